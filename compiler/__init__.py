@@ -1,0 +1,1 @@
+"""Network to residual module: energies, descriptor forms, generated code."""

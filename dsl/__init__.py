@@ -1,0 +1,1 @@
+"""Text to checked network: the language of sysdyn."""

@@ -1,0 +1,1 @@
+"""Residual module to trace: consistent start, stepping core, HDF5."""

@@ -1,0 +1,1 @@
+"""The stepping core: plain C11, built once as an extension module."""
