@@ -1,0 +1,79 @@
+/* The contract between a compiled model and the runtime, version 1.
+ *
+ * A compiled model (C library or Python module) is a set of BLOCKS.  A block is a group of rows of the
+ * descriptor form; the runtime chooses which blocks stand where and so assembles every index form from
+ * them.  Array sizes and parameters are run-time values: no generated text depends on them.
+ *
+ * Shapes
+ *   p   [parameters]        values in SI units: scalar parameters first, then arrays and tables' numbers
+ *   ix  [integers]          loop bounds, first indices, strides, offsets of arrays in p
+ *   y   [unknowns]          the unknowns; family k begins at at[k]
+ *   yd  [unknowns]          their time derivatives, same places
+ *   r   [rows]              row family k begins at to[k]; a block ADDS to r
+ *   v   [entries]           a block WRITES its Jacobian entries in the order its pattern lists them
+ *
+ * Blocks (missing ones have no rows; with T*, V, D, Q of the book and M = d2T*/df2)
+ *   dynamics          Lagrange: M f' - Y;  Hamilton: p' - U (coordinates with momentum), -U (without)
+ *   phi_reaction      Phi_q^T kappa, added to the rows of dynamics
+ *   psi_reaction      Psi_f^T mu, added to the rows of dynamics
+ *   momentum          p - dT/df (Hamilton), or dT/dp - f where the author gave T
+ *   momentum_rate     its total time derivative
+ *   phi, phi_rate, phi_acceleration    Phi;  Phi_q f + Phi_t;  Phi_q f' + Z1
+ *   psi, psi_rate     Psi;  Psi_f f' + Z2
+ *   gamma, gamma_rate Gamma and its total time derivative (reads yd of f, s, e)
+ *   lambda            s' - Lambda
+ *   observe           one row family a traced quantity (and each side of an expect); reads y, yd and the audit
+ *   observe_rate      their time derivatives, where known
+ *   observe_scale     sum of the magnitudes of the terms of each
+ *   audit             four rows: kinetic energy T, potential energy V, power dissipated, power supplied
+ *   initial           one row family an `init` that is no unknown of this formulation: expression - value
+ * Rates read f as yd of q, f' as yd of f: they never read yd of q.
+ * q' = f has no block: the runtime writes those rows itself.
+ */
+#ifndef SYSDYN_MODEL_H
+#define SYSDYN_MODEL_H
+
+#include <stdint.h>
+
+#define SD_CONTRACT 1
+
+typedef struct sd_frame {
+    const double *p;
+    const int32_t *ix;
+    const int32_t *at;
+    const int32_t *to;
+} sd_frame;
+
+/* rows: r += block(t, y, yd);  entries: v = d block/dy or d block/dyd in the order of the pattern */
+typedef void sd_rows(const sd_frame *frame, double t, const double *y, const double *yd, double *r);
+typedef void sd_entries(const sd_frame *frame, double t, const double *y, const double *yd, double *v);
+
+/* A C library exports `const int sd_contract = 1` and, for each block B of its manifest, functions
+ *   sd_B_rows, sd_B_dy, sd_B_dyd
+ * (dy, dyd only where the manifest lists entries for them).  A Python module defines CONTRACT = 1 and
+ *   B_rows(p, ix, at, to, t, y, yd, r), B_dy(p, ix, at, to, t, y, yd, v), B_dyd(...)   on NumPy arrays.
+ *
+ * The manifest's "structure":
+ *   families  [{"name", "kind", "owner", "unit", "nominal"}]          in the order of `at`
+ *             kind: q f p s e kappa mu | audit.  owner: coordinate (q f p), constraint label (kappa, mu),
+ *             the name itself otherwise.  `audit` families are scalars energy, kinetic, potential, dissipated,
+ *             supplied, constraints: the runtime hands them to `observe` behind y.
+ *   rows      [{"block", "label", "owner", "kind", "file", "line", "unit"}]   in the order of `to`;
+ *             dynamics, phi_reaction, psi_reaction share the row families of block "dynamics" (owner:
+ *             coordinate); phi, phi_rate, phi_acceleration those of "phi"; psi, psi_rate those of "psi"; gamma,
+ *             gamma_rate those of "gamma"; momentum, momentum_rate those of "momentum"; observe,
+ *             observe_rate, observe_scale those of "observe".
+ *             rows of observe also hold {"name", "stored": bool, "rate": bool}.
+ *   blocks    {name: {"kernels": [{"loops": [[lo, hi], ...], "rows": [REF, ...], "dy": [[REF row, REF column], ...],
+ *             "dyd": [...]}, ...]}}
+ *             lo, hi: slots of ix (both ends included).  v runs kernel by kernel, iteration by iteration (last loop
+ *             fastest), entry by entry.  One place may occur several times: entries add up.
+ *   REF       [family, [INDEX, ...]], INDEX = [loop or -1, offset slot of ix or -1, constant]:
+ *             value = (loop variable or 0) + (ix[slot] or 0) + constant.
+ *             Position in the family: row-major over its shape.
+ *
+ * The binding (made by the compiler for one set of parameter values; plain arrays):
+ *   p, ix; shapes: for each family and row_shapes: for each row family a list of [first, last] (scalars: []);
+ *   initial: [{"family", "positions": int array, "values": float array, "fixed": bool, "label", "file", "line"}]
+ */
+#endif
