@@ -1,0 +1,223 @@
+"""The checked network: what a model says, names bound, values in SI units, arrays kept as families.
+
+Received by the compiler.  Every expression is a node of `expression`; every statement keeps its place in the text.
+A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the range 1..n.  A statement inside
+`for i in ..` (or under a sum) is one value here with its loops; nothing is unrolled but arrays written as literals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from sysdyn.dsl.diagnostics import Place
+from sysdyn.dsl.expression import Node
+from sysdyn.dsl.units import Unit
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """`for index in first..last`: bounds are whole numbers made of parameters and outer loop variables."""
+
+    index: str
+    first: Node
+    last: Node
+
+
+Shape = tuple[tuple[Node, Node], ...]  # (first, last) of each index of a family; () is a scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A run-time constant; value holds one node, one per element of a literal array, or one over `loops`.
+
+    A parameter that is an array by a formula (`param x[1..n] = i*l`) has one value over the loop variables `indices`.
+    """
+
+    name: str
+    shape: Shape
+    unit: Unit
+    values: tuple[Node, ...]
+    indices: tuple[str, ...]
+    place: Place
+    whole: bool = False  # used as a size or an index: its value must be a whole number
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """An interpolation table in SI units; points: breakpoints of each argument, values row-major."""
+
+    name: str
+    method: str  # linear pchip cubic hold
+    outside: str  # clamp extend stop
+    points: tuple[tuple[float, ...], ...]
+    values: tuple[float, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """A displacement coordinate (a momentum coordinate where complementary) with its domain's units."""
+
+    name: str
+    shape: Shape
+    complementary: bool
+    displacement: Unit  # of q (of p where complementary)
+    flow: Unit  # of q' (of p')
+    momentum: Unit  # conjugate of the displacement
+    effort: Unit
+    asserted: bool | None  # tangible, intangible, or not said
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """An implicit effort (or flow) closed by a gamma."""
+
+    name: str
+    shape: Shape
+    unit: Unit
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A dynamic variable s."""
+
+    name: str
+    shape: Shape
+    unit: Unit
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """One summand of a state function: function is T* T V V* (J) or D G (W)."""
+
+    function: str
+    expression: Node
+    loops: tuple[Loop, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """Virtual work: effort * delta(on)."""
+
+    effort: Node
+    on: Node
+    loops: tuple[Loop, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Constraint:
+    """`kind name[at]: left = right` as left - right = 0; at: indices in the family of that label."""
+
+    kind: str  # phi psi gamma
+    name: str
+    at: tuple[Node, ...]
+    expression: Node
+    loops: tuple[Loop, ...]
+    unit: Unit
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamic:
+    """state' = expression."""
+
+    state: Node  # var of kind s
+    expression: Node
+    loops: tuple[Loop, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Initial:
+    """target = value (fixed) or ~ value (a guess) at the start; target may be any expression of the unknowns.
+
+    Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
+    """
+
+    target: Node
+    value: Node
+    fixed: bool
+    loops: tuple[Loop, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """A traced quantity in the unit asked for: value = (expression - offset)/scale of that unit, already applied."""
+
+    name: str
+    expression: Node
+    unit: Unit
+    text: str  # as the author wrote it, formatted
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """`expect moment: left op right within d`; moment is always, finally, static, at (an instant), or start."""
+
+    moment: str
+    at: Node | None
+    operator: str
+    left: Node
+    right: Node
+    within: Node | None
+    unit: Unit
+    text: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Golden:
+    """`expect golden "file" within r`."""
+
+    file: str
+    within: Node
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is asked of a model; None where the scene does not say."""
+
+    name: str
+    place: Place
+    start: Node | None = None
+    end: Node | None = None
+    every: Node | None = None
+    accuracy: Node | None = None
+    accuracy_on: tuple[str, ...] = ()
+    formulation: str | None = None
+    formulation_place: Place | None = None
+    solver: str | None = None
+    solver_options: tuple[tuple[str, Node], ...] = ()
+    redundancy: str | None = None
+    limits: tuple[tuple[str, Node], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A model under a scene, checked: names bound, dimensions agree, SI units everywhere."""
+
+    model: str
+    place: Place
+    parameters: tuple[Parameter, ...]
+    tables: tuple[Table, ...]
+    coordinates: tuple[Coordinate, ...]
+    unknowns: tuple[Unknown, ...]
+    states: tuple[State, ...]
+    energies: tuple[Energy, ...]
+    works: tuple[Work, ...]
+    constraints: tuple[Constraint, ...]
+    dynamics: tuple[Dynamic, ...]
+    initials: tuple[Initial, ...]
+    observations: tuple[Observation, ...]
+    expectations: tuple[Expectation, ...]
+    goldens: tuple[Golden, ...]
+    scene: Scene | None
+    shapes: dict[str, Shape] = field(default_factory=dict)  # of constraint labels, too (hull of their loops)
