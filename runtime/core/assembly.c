@@ -1,0 +1,55 @@
+/* Residual and Jacobian of a system: see assembly.h. */
+#include "assembly.h"
+
+#include <math.h>
+#include <string.h>
+
+void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r)
+{
+    memset(r, 0, (size_t)system->rows * sizeof *r);
+    for (int32_t i = 0; i < system->kinematics; i++)
+        r[system->k_row[i]] = yd[system->k_q[i]] - y[system->k_f[i]];
+    for (int32_t c = 0; c < system->calls; c++)
+        system->call[c].rows(&system->call[c].frame, t, y, yd, r);
+    system->residual_evaluations++;
+}
+
+/* adds one block's entries into their places; entries of one place add up */
+static void add_entries(sd_entries *block, const sd_frame *frame, int32_t n, const int32_t *slot, double t,
+                        const double *y, const double *yd, double *v, double *values)
+{
+    if (n == 0)
+        return;
+    block(frame, t, y, yd, v);
+    for (int32_t e = 0; e < n; e++)
+        values[slot[e]] += v[e];
+}
+
+void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
+{
+    memset(jy, 0, (size_t)system->entries * sizeof *jy);
+    memset(jyd, 0, (size_t)system->entries * sizeof *jyd);
+    for (int32_t i = 0; i < system->kinematics; i++) {
+        jyd[system->k_slot_q[i]] += 1.0;
+        jy[system->k_slot_f[i]] -= 1.0;
+    }
+    for (int32_t c = 0; c < system->calls; c++) {
+        const sd_call *call = &system->call[c];
+        add_entries(call->dy, &call->frame, call->n_dy, call->slot_dy, t, y, yd, system->v, jy);
+        add_entries(call->dyd, &call->frame, call->n_dyd, call->slot_dyd, t, y, yd, system->v, jyd);
+    }
+    system->jacobian_evaluations++;
+}
+
+int32_t sd_first_bad(int32_t n, const double *x)
+{
+    double sum = 0.0; /* x - x is 0 for a finite number and not a number otherwise */
+    for (int32_t i = 0; i < n; i++)
+        sum += x[i] - x[i];
+    if (sum == 0.0)
+        return -1;
+    for (int32_t i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return i;
+    return -1;
+}

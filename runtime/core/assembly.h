@@ -1,0 +1,45 @@
+/* A system: residual and Jacobian assembled from the blocks of a compiled model.
+ *
+ * F(t, y, yd) = sum over calls of block(t, y, yd)  +  rows q' - f.
+ * The index form is nothing but the choice of calls and of their tables `at` (where unknown families begin) and
+ * `to` (where row families begin).  dF/dy and dF/dyd are kept apart on one pattern (compressed columns), so that
+ * G = dF/dy + cj dF/dyd needs no new evaluation when cj changes.
+ *
+ * Shapes
+ *   y, yd [unknowns]   r [rows]   column [unknowns + 1]   row, jy, jyd [entries]   v [largest list of entries]
+ *   slot_dy [n_dy], slot_dyd [n_dyd]      place in jy / jyd of each entry of the block's list
+ *   k_row, k_q, k_f, k_slot_q, k_slot_f [kinematics]      the rows q' - f and their two entries
+ * All arrays belong to the caller.
+ */
+#ifndef SYSDYN_ASSEMBLY_H
+#define SYSDYN_ASSEMBLY_H
+
+#include "contract.h"
+
+typedef struct sd_call {
+    sd_rows *rows;
+    sd_entries *dy;
+    sd_entries *dyd;
+    sd_frame frame;
+    int32_t n_dy, n_dyd;
+    const int32_t *slot_dy, *slot_dyd;
+} sd_call;
+
+typedef struct sd_system {
+    int32_t unknowns, rows, entries, calls, kinematics;
+    const int32_t *column, *row;
+    const sd_call *call;
+    const int32_t *k_row, *k_q, *k_f, *k_slot_q, *k_slot_f;
+    double *v;
+    const int32_t *stop; /* nonzero: a callback of the caller failed, give up */
+    int64_t residual_evaluations, jacobian_evaluations;
+} sd_system;
+
+/* r := F(t, y, yd) */
+void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r);
+/* jy := dF/dy, jyd := dF/dyd */
+void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd);
+/* position of the first number that is not finite, -1 where all are */
+int32_t sd_first_bad(int32_t n, const double *x);
+
+#endif

@@ -1,0 +1,322 @@
+/* The step of the BDF: predict, correct, test, choose order and step size (see bdf.h). */
+#include "bdf.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ITERATIONS 4        /* of Newton a step */
+#define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
+#define SLOW 0.9            /* contraction above which Newton gives up */
+#define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
+#define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
+#define FAILURES_NEWTON 20
+#define FAILURES_ERROR 20
+
+sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
+{
+    sd_bdf *bdf = calloc(1, sizeof *bdf);
+    if (!bdf)
+        return NULL;
+    size_t n = (size_t)system->unknowns, nnz = (size_t)system->entries, m = n > 0 ? n : 1;
+    bdf->memory = calloc((SD_MAX_ORDER + 2 + 9) * m + 3 * (nnz + 1), sizeof(double));
+    if (!bdf->memory) {
+        free(bdf);
+        return NULL;
+    }
+    double *next = bdf->memory;
+    for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
+        bdf->phi[i] = next;
+    double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->delta,
+                          &bdf->predicted, &bdf->predicted_d, &bdf->scale};
+    for (int i = 0; i < 9; i++, next += m)
+        *vectors[i] = next;
+    bdf->jy = next;
+    bdf->jyd = bdf->jy + nnz + 1;
+    bdf->g = bdf->jyd + nnz + 1;
+    bdf->system = system;
+    bdf->linear = linear;
+    bdf->n = system->unknowns;
+    bdf->max_order = SD_MAX_ORDER;
+    return bdf;
+}
+
+void sd_bdf_free(sd_bdf *bdf)
+{
+    if (!bdf)
+        return;
+    free(bdf->memory);
+    free(bdf);
+}
+
+/* weight := 1 / (atol + rtol |y|) at the last accepted point */
+static void set_weights(sd_bdf *bdf)
+{
+    const double *y = bdf->phi[0];
+    for (int32_t i = 0; i < bdf->n; i++) {
+        double size = fabs(y[i]);
+        if (bdf->track && size > bdf->magnitude[i])
+            bdf->magnitude[i] = size;
+        double atol = bdf->atol && bdf->test[i] >= 0 ? bdf->atol[i] : bdf->rtol * bdf->magnitude[i];
+        bdf->weight[i] = 1.0 / (atol + bdf->rtol * size);
+    }
+}
+
+/* Newton's weights, and magnitudes of the columns: index-2 unknowns and index-3 multipliers with powers of h */
+static void set_newton_weights(sd_bdf *bdf)
+{
+    for (int32_t i = 0; i < bdf->n; i++) {
+        double power = bdf->power[i] == 0 ? 1.0 : bdf->power[i] == 1 ? bdf->h : bdf->h * bdf->h;
+        bdf->newton_weight[i] = bdf->weight[i] * power;
+        bdf->scale[i] = bdf->magnitude[i] / power;
+    }
+}
+
+void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h)
+{
+    bdf->t = t;
+    bdf->tested = 0;
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->tested += bdf->test[i] >= 0;
+    memcpy(bdf->phi[0], y, (size_t)bdf->n * sizeof *y);
+    bdf->h = 1.0;
+    set_weights(bdf);
+    bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, yd, bdf->t_end - t);
+    bdf->h = fmin(bdf->h, bdf->h_max);
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->phi[1][i] = bdf->h * yd[i];
+    bdf->psi[0] = bdf->h;
+    bdf->order = 1;
+    bdf->order_used = 0;
+    bdf->h_used = 0.0;
+    bdf->ns = 0;
+    bdf->rising = bdf->max_order > 1;
+    bdf->contraction = 20.0;
+    bdf->ready = 0;
+    memcpy(bdf->y, y, (size_t)bdf->n * sizeof *y);
+    memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
+}
+
+/* y, yd := the polynomial through the past, at the new t */
+static void predict(sd_bdf *bdf)
+{
+    int32_t n = bdf->n;
+    memcpy(bdf->predicted, bdf->phi[0], (size_t)n * sizeof(double));
+    memset(bdf->predicted_d, 0, (size_t)n * sizeof(double));
+    for (int32_t k = 1; k <= bdf->order; k++) {
+        const double *phi = bdf->phi[k];
+        double gamma = bdf->gamma[k];
+        for (int32_t i = 0; i < n; i++) {
+            bdf->predicted[i] += phi[i];
+            bdf->predicted_d[i] += gamma * phi[i];
+        }
+    }
+}
+
+/* G := dF/dy + cj dF/dyd and its factors; a fresh Jacobian where asked */
+static int factorise(sd_bdf *bdf, double t, int fresh)
+{
+    if (fresh) {
+        sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
+        bdf->jacobian_age = 0;
+        bdf->fresh_jacobian = 1;
+        if (*bdf->system->stop)
+            return SD_STOPPED;
+        if (sd_first_bad(bdf->system->entries, bdf->jy) >= 0 || sd_first_bad(bdf->system->entries, bdf->jyd) >= 0) {
+            bdf->ready = 0;
+            int32_t e = sd_first_bad(bdf->system->entries, bdf->jy);
+            bdf->bad_row = bdf->system->row[e >= 0 ? e : sd_first_bad(bdf->system->entries, bdf->jyd)];
+            return SD_NONFINITE;
+        }
+    }
+    for (int32_t e = 0; e < bdf->system->entries; e++)
+        bdf->g[e] = bdf->jy[e] + bdf->cj * bdf->jyd[e];
+    set_newton_weights(bdf);
+    bdf->ready = 0;
+    int failed = sd_linear_factor(bdf->linear, bdf->g, bdf->scale);
+    if (failed) {
+        bdf->bad_row = bdf->linear->bad_row;
+        bdf->bad_column = bdf->linear->bad_column;
+        return failed == 2 ? SD_MEMORY : SD_SINGULAR;
+    }
+    bdf->cj_factored = bdf->cj;
+    bdf->contraction = 20.0;
+    bdf->ready = 1;
+    return SD_FINE;
+}
+
+static double newton_norm(const sd_bdf *bdf, const double *x)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < bdf->n; i++) {
+        double v = x[i] * bdf->newton_weight[i];
+        sum += v * v;
+    }
+    return sqrt(sum / bdf->n);
+}
+
+/* Newton's iteration from the prediction with the present factors */
+static int iterate(sd_bdf *bdf, double t)
+{
+    int32_t n = bdf->n;
+    double first = 0.0;
+    memcpy(bdf->y, bdf->predicted, (size_t)n * sizeof(double));
+    memcpy(bdf->yd, bdf->predicted_d, (size_t)n * sizeof(double));
+    memset(bdf->ee, 0, (size_t)n * sizeof(double));
+    for (int m = 0; m < ITERATIONS; m++) {
+        double *d = bdf->delta;
+        sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
+        bdf->newton_iterations++;
+        if (*bdf->system->stop)
+            return SD_STOPPED;
+        int32_t bad = sd_first_bad(n, d);
+        if (bad >= 0) {
+            bdf->bad_row = bad;
+            return SD_NONFINITE;
+        }
+        sd_linear_solve(bdf->linear, d);
+        double size = newton_norm(bdf, d);
+        if (!isfinite(size))
+            return SD_NEWTON;
+        for (int32_t i = 0; i < n; i++) {
+            bdf->ee[i] -= d[i];
+            bdf->y[i] -= d[i];
+            bdf->yd[i] -= bdf->cj * d[i];
+        }
+        if (m == 0) {
+            first = size;
+            if (size <= 100.0 * DBL_EPSILON)
+                return SD_FINE;
+        } else {
+            double rate = pow(size / first, 1.0 / m);
+            if (rate > SLOW)
+                return SD_NEWTON;
+            bdf->contraction = rate / (1.0 - rate);
+            if (rate > SLUGGISH)
+                bdf->jacobian_age = OLD_JACOBIAN;
+        }
+        if (bdf->contraction * size <= NEWTON_TOLERANCE)
+            return SD_FINE;
+    }
+    return SD_NEWTON;
+}
+
+/* Corrects the prediction; factors are renewed when cj changed, the Jacobian when it is old or fails. */
+static int correct(sd_bdf *bdf)
+{
+    double t = bdf->t + bdf->h;
+    bdf->fresh_jacobian = 0;
+    set_newton_weights(bdf);
+    for (;;) {
+        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->steps == 0 || bdf->fresh_jacobian < 0;
+        if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {
+            memcpy(bdf->y, bdf->predicted, (size_t)bdf->n * sizeof(double));
+            memcpy(bdf->yd, bdf->predicted_d, (size_t)bdf->n * sizeof(double));
+            int cause = factorise(bdf, t, fresh);
+            if (cause == SD_SINGULAR && bdf->fresh_jacobian == 0) {
+                bdf->fresh_jacobian = -1;
+                continue;
+            }
+            if (cause)
+                return cause;
+        }
+        int cause = iterate(bdf, t);
+        if (cause == SD_FINE || cause == SD_STOPPED || bdf->fresh_jacobian)
+            return cause;
+        bdf->fresh_jacobian = -1; /* once more with a fresh Jacobian */
+    }
+}
+
+/* a smaller step after a failure; on the first step the difference phi[1] = h yd follows */
+static void reduce(sd_bdf *bdf, double ratio)
+{
+    bdf->h *= ratio;
+    if (bdf->steps == 0) {
+        bdf->psi[0] = bdf->h;
+        for (int32_t i = 0; i < bdf->n; i++)
+            bdf->phi[1][i] *= ratio;
+    }
+}
+
+/* the step ends at t_end exactly, and never leaves less than its half for the last one */
+static void fit_end(sd_bdf *bdf)
+{
+    double left = bdf->t_end - bdf->t, h = bdf->h;
+    if (h >= left * (1.0 - 1e-12))
+        h = left;
+    else if (2.0 * h > left && bdf->steps > 0 && !(bdf->fixed_h > 0.0))
+        h = 0.5 * left;
+    if (h != bdf->h)
+        reduce(bdf, h / bdf->h);
+    if (bdf->h != h)
+        bdf->h = h;
+}
+
+int sd_bdf_step(sd_bdf *bdf)
+{
+    int32_t newton = 0, error_failures = 0, order_next = 1;
+    double ck, error;
+    set_weights(bdf);
+    bdf->jacobian_age++;
+    for (;;) {
+        fit_end(bdf);
+        sd_bdf_coefficients(bdf, &ck);
+        predict(bdf);
+        int cause = correct(bdf);
+        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, &error, &order_next) || bdf->fixed_h > 0.0))
+            break;
+        sd_bdf_restore(bdf);
+        bdf->cause = cause ? cause : SD_ERROR_TEST;
+        if (cause == SD_STOPPED || cause == SD_MEMORY || bdf->fixed_h > 0.0)
+            return bdf->cause;
+        if (cause) {
+            /* Newton, a singular matrix, a number that is not finite: much smaller */
+            bdf->newton_failures++;
+            if (++newton >= FAILURES_NEWTON)
+                return bdf->cause;
+            reduce(bdf, 0.25);
+        } else {
+            bdf->rejected_steps++;
+            bdf->rising = 0;
+            if (++error_failures >= FAILURES_ERROR)
+                return bdf->cause;
+            double ratio = 0.25;
+            if (error_failures == 1)
+                ratio = fmax(0.25, fmin(0.9, 0.9 * pow(2.0 * bdf->error_next + 1e-4, -1.0 / (order_next + 1))));
+            bdf->order = error_failures > 2 ? 1 : order_next;
+            reduce(bdf, ratio);
+        }
+        if (bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), bdf->t_end - bdf->t)) {
+            bdf->cause = cause ? cause : SD_STEP;
+            return bdf->cause;
+        }
+    }
+    bdf->cause = SD_FINE;
+    double t = bdf->t + bdf->h;
+    bdf->t = fabs(bdf->t_end - t) <= 1e-12 * bdf->h ? bdf->t_end : t;
+    sd_bdf_accept(bdf, order_next);
+    return SD_FINE;
+}
+
+/* Polynomial through the last order + 1 points, in divided differences. */
+void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
+{
+    int32_t n = bdf->n, k = bdf->order_used > 0 ? bdf->order_used : 1;
+    double delta = t - bdf->t, c = 1.0, d = 0.0, gamma = bdf->psi[0] != 0.0 ? delta / bdf->psi[0] : 0.0;
+    memcpy(y, bdf->phi[0], (size_t)n * sizeof *y);
+    memset(yd, 0, (size_t)n * sizeof *yd);
+    if (bdf->steps == 0)
+        k = 0;
+    for (int32_t j = 1; j <= k; j++) {
+        d = d * gamma + c / bdf->psi[j - 1];
+        c *= gamma;
+        gamma = (delta + bdf->psi[j - 1]) / bdf->psi[j];
+        for (int32_t i = 0; i < n; i++) {
+            y[i] += c * bdf->phi[j][i];
+            yd[i] += d * bdf->phi[j][i];
+        }
+    }
+    if (bdf->steps == 0)
+        memcpy(yd, bdf->yd, (size_t)n * sizeof *yd);
+}

@@ -1,0 +1,117 @@
+/* Local error, order and step size of the BDF (Brenan, Campbell & Petzold, section 5.2.3 f.; see bdf.h). */
+#include "bdf.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Root mean square of (x + plus - minus) in the error weights over the tested unknowns; plus, minus may be NULL. */
+double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *plus, const double *minus)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < bdf->n; i++) {
+        if (bdf->test[i] < 0)
+            continue;
+        double v = x[i];
+        if (plus)
+            v += plus[i];
+        if (minus)
+            v -= minus[i];
+        v *= bdf->weight[i];
+        if (bdf->test[i])
+            v *= bdf->h;
+        sum += v * v;
+    }
+    return bdf->tested ? sqrt(sum / bdf->tested) : 0.0;
+}
+
+/* Error of the step and the order that promises more (never a higher one here).  1: the step passes. */
+int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next)
+{
+    int32_t k = bdf->order;
+    double size = sd_bdf_norm(bdf, bdf->ee, NULL, NULL);
+    double here = bdf->sigma[k] * size, term = (k + 1) * here;
+    *order_next = k;
+    bdf->error_next = here;
+    if (k > 1) {
+        double below = bdf->sigma[k - 1] * sd_bdf_norm(bdf, bdf->ee, bdf->phi[k], NULL);
+        double term_below = k * below;
+        int lower;
+        if (k > 2) {
+            /* two orders down: ee + phi[k] + phi[k-1] */
+            for (int32_t i = 0; i < bdf->n; i++)
+                bdf->delta[i] = bdf->ee[i] + bdf->phi[k][i];
+            double term_two = (k - 1) * bdf->sigma[k - 2] * sd_bdf_norm(bdf, bdf->delta, bdf->phi[k - 1], NULL);
+            lower = fmax(term_below, term_two) <= term;
+        } else {
+            lower = term_below <= 0.5 * term;
+        }
+        if (lower) {
+            *order_next = k - 1;
+            bdf->error_next = below;
+        }
+    }
+    *error = ck * size;
+    return *error <= 1.0;
+}
+
+/* Order and step size after an accepted step, then the differences of the next. */
+void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
+{
+    int32_t k = bdf->order, order_change = k - bdf->order_used;
+    double error = bdf->error_next, h = bdf->h, h_next = h;
+    bdf->steps++;
+    bdf->order_used = k;
+    bdf->h_used = h;
+    if (order_next == k - 1 || k == bdf->max_order)
+        bdf->rising = 0;
+    if (bdf->rising) {
+        /* at the start: order and step rise together */
+        if (bdf->steps > 1) {
+            bdf->order = k + 1;
+            h_next = 2.0 * h;
+        }
+    } else {
+        int32_t order = order_next;
+        if (order_next == k && k < bdf->max_order && k + 1 < bdf->ns && order_change != 1) {
+            double above = sd_bdf_norm(bdf, bdf->ee, NULL, bdf->phi[k + 1]) / (k + 2);
+            double term_above = (k + 2) * above;
+            double term = (k + 1) * bdf->sigma[k] * sd_bdf_norm(bdf, bdf->ee, NULL, NULL);
+            if (k == 1) {
+                if (term_above < 0.5 * term)
+                    order = 2;
+            } else {
+                double term_below = k * bdf->sigma[k - 1] * sd_bdf_norm(bdf, bdf->ee, bdf->phi[k], NULL);
+                if (term_below <= fmin(term, term_above))
+                    order = k - 1;
+                else if (term_above < term)
+                    order = k + 1;
+            }
+            if (order == k + 1)
+                error = above;
+            else if (order == k - 1)
+                error = bdf->sigma[k - 1] * sd_bdf_norm(bdf, bdf->ee, bdf->phi[k], NULL);
+        }
+        bdf->order = order;
+        double ratio = pow(2.0 * error + 1e-4, -1.0 / (order + 1));
+        if (ratio >= 2.0)
+            h_next = 2.0 * h;
+        else if (ratio <= 1.0)
+            h_next = h * fmax(0.5, fmin(0.9, ratio));
+    }
+    bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : fmin(h_next, bdf->h_max);
+    /* the differences at the new point */
+    if (k < SD_MAX_ORDER)
+        memcpy(bdf->phi[k + 1], bdf->ee, (size_t)bdf->n * sizeof(double));
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->phi[k][i] += bdf->ee[i];
+    for (int32_t j = k - 1; j >= 0; j--)
+        for (int32_t i = 0; i < bdf->n; i++)
+            bdf->phi[j][i] += bdf->phi[j + 1][i];
+}
+
+/* A first step: a thousandth of the span, or such that y changes by half its tolerance over it. */
+double sd_bdf_first_step(const sd_bdf *bdf, const double *yd, double span)
+{
+    double h = 1e-3 * span, change = sd_bdf_norm(bdf, yd, NULL, NULL);
+    return isfinite(change) && change > 0.5 / h ? 0.5 / change : h;
+}

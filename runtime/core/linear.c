@@ -1,0 +1,184 @@
+/* Scaling, dense LU and the choice between dense and sparse: see linear.h. */
+#include "linear.h"
+#include "sparse.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define REFINE 1e-8 /* pivots smaller than this part of their column: one step of iterative refinement */
+
+void sd_linear_free(sd_linear *linear)
+{
+    if (!linear)
+        return;
+    sd_sparse_free(linear->sparse);
+    free(linear->row_scale);
+    free(linear->dense);
+    free(linear->pivot);
+    free(linear);
+}
+
+sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order)
+{
+    sd_linear *linear = calloc(1, sizeof *linear);
+    if (!linear)
+        return NULL;
+    size_t m = (size_t)n, nnz = (size_t)column[n];
+    linear->n = n;
+    linear->entries = column[n];
+    linear->column = column;
+    linear->row = row;
+    linear->row_scale = calloc(4 * m + nnz + 1, sizeof(double));
+    linear->pivot = calloc(m + 1, sizeof(int32_t));
+    if (order)
+        linear->sparse = sd_sparse_new(n, column, row, order);
+    else
+        linear->dense = calloc(m * m + 1, sizeof(double));
+    if (!linear->row_scale || !linear->pivot || !(order ? (void *)linear->sparse : (void *)linear->dense)) {
+        sd_linear_free(linear);
+        return NULL;
+    }
+    linear->column_scale = linear->row_scale + m;
+    linear->work = linear->row_scale + 2 * m;
+    linear->work2 = linear->row_scale + 3 * m;
+    linear->scaled = linear->row_scale + 4 * m;
+    return linear;
+}
+
+/* scaled := R values C with rows of largest entry 1 */
+static void equilibrate(sd_linear *linear, const double *values, const double *scale)
+{
+    for (int32_t i = 0; i < linear->n; i++)
+        linear->row_scale[i] = 0.0;
+    for (int32_t j = 0; j < linear->n; j++) {
+        double s = linear->column_scale[j] = scale ? scale[j] : 1.0;
+        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++) {
+            double size = fabs(linear->scaled[e] = values[e] * s);
+            if (size > linear->row_scale[linear->row[e]])
+                linear->row_scale[linear->row[e]] = size;
+        }
+    }
+    for (int32_t i = 0; i < linear->n; i++)
+        linear->row_scale[i] = linear->row_scale[i] > 0.0 ? 1.0 / linear->row_scale[i] : 1.0;
+    for (int32_t e = 0; e < linear->entries; e++)
+        linear->scaled[e] *= linear->row_scale[linear->row[e]];
+}
+
+/* LU of the scaled matrix by columns with row exchanges */
+static int dense_factor(sd_linear *linear)
+{
+    int32_t n = linear->n;
+    double *a = linear->dense;
+    memset(a, 0, (size_t)n * (size_t)n * sizeof *a);
+    for (int32_t j = 0; j < n; j++)
+        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
+            a[(size_t)j * n + linear->row[e]] += linear->scaled[e];
+    for (int32_t i = 0; i < n; i++)
+        linear->pivot[i] = i;
+    linear->smallest = 1.0;
+    for (int32_t k = 0; k < n; k++) {
+        double *ck = a + (size_t)k * n, size = 0.0;
+        int32_t best = k;
+        for (int32_t i = k; i < n; i++)
+            if (fabs(ck[i]) > fabs(ck[best]))
+                best = i;
+        for (int32_t e = linear->column[k]; e < linear->column[k + 1]; e++)
+            size = fmax(size, fabs(linear->scaled[e]));
+        double relative = size > 0.0 ? fabs(ck[best]) / size : 0.0;
+        if (!(relative >= linear->smallest)) {
+            linear->smallest = relative;
+            linear->bad_row = linear->pivot[best];
+            linear->bad_column = k;
+        }
+        if (!(fabs(ck[best]) > 0.0) || !isfinite(ck[best]))
+            return 1;
+        if (best != k) {
+            int32_t p = linear->pivot[k];
+            linear->pivot[k] = linear->pivot[best];
+            linear->pivot[best] = p;
+            for (int32_t j = 0; j < n; j++) {
+                double swap = a[(size_t)j * n + k];
+                a[(size_t)j * n + k] = a[(size_t)j * n + best];
+                a[(size_t)j * n + best] = swap;
+            }
+        }
+        double inverse = 1.0 / ck[k];
+        for (int32_t i = k + 1; i < n; i++)
+            ck[i] *= inverse;
+        for (int32_t j = k + 1; j < n; j++) {
+            double *cj = a + (size_t)j * n, u = cj[k];
+            if (u == 0.0)
+                continue;
+            for (int32_t i = k + 1; i < n; i++)
+                cj[i] -= ck[i] * u;
+        }
+    }
+    return 0;
+}
+
+static void dense_solve(const sd_linear *linear, double *x, double *work)
+{
+    int32_t n = linear->n;
+    const double *a = linear->dense;
+    for (int32_t i = 0; i < n; i++)
+        work[i] = x[linear->pivot[i]];
+    for (int32_t k = 0; k < n; k++) {
+        const double *ck = a + (size_t)k * n;
+        for (int32_t i = k + 1; i < n; i++)
+            work[i] -= ck[i] * work[k];
+    }
+    for (int32_t k = n - 1; k >= 0; k--) {
+        const double *ck = a + (size_t)k * n;
+        double v = x[k] = work[k] / ck[k];
+        for (int32_t i = 0; i < k; i++)
+            work[i] -= ck[i] * v;
+    }
+}
+
+int sd_linear_factor(sd_linear *linear, const double *values, const double *scale)
+{
+    equilibrate(linear, values, scale);
+    linear->factorisations++;
+    if (linear->dense)
+        return dense_factor(linear);
+    sd_sparse *lu = linear->sparse;
+    int failed = 1;
+    if (lu->pivoted)
+        failed = sd_sparse_refactor(lu, linear->column, linear->row, linear->scaled);
+    if (failed) {
+        failed = sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
+        linear->pivotings++;
+    }
+    linear->smallest = lu->smallest;
+    linear->bad_row = lu->bad_row;
+    linear->bad_column = lu->bad_column;
+    return failed;
+}
+
+static void scaled_solve(sd_linear *linear, double *x)
+{
+    if (linear->dense)
+        dense_solve(linear, x, linear->work);
+    else
+        sd_sparse_solve(linear->sparse, x, linear->work);
+}
+
+void sd_linear_solve(sd_linear *linear, double *x)
+{
+    int32_t n = linear->n;
+    double *rest = linear->work2;
+    for (int32_t i = 0; i < n; i++)
+        rest[i] = x[i] *= linear->row_scale[i];
+    scaled_solve(linear, x);
+    if (linear->smallest < REFINE) {
+        for (int32_t j = 0; j < n; j++)
+            for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
+                rest[linear->row[e]] -= linear->scaled[e] * x[j];
+        scaled_solve(linear, rest);
+        for (int32_t i = 0; i < n; i++)
+            x[i] += isfinite(rest[i]) ? rest[i] : 0.0;
+    }
+    for (int32_t i = 0; i < n; i++)
+        x[i] *= linear->column_scale[i];
+}

@@ -1,0 +1,40 @@
+/* Linear systems G x = b on one fixed pattern, factorised again and again with new values.
+ *
+ * Dense LU with partial pivoting up to SD_DENSE unknowns; above, sparse LU: the column order is given, rows are
+ * chosen by threshold partial pivoting (Gilbert & Peierls 1988), later matrices are refactorised on the found
+ * pattern and pivots while these stay healthy and pivoted anew when not.
+ * G is scaled: columns by the caller (magnitudes of the unknowns), rows by their largest scaled entry, so that
+ * nano-farads and mega-pascals live in one matrix.
+ */
+#ifndef SYSDYN_LINEAR_H
+#define SYSDYN_LINEAR_H
+
+#include <stdint.h>
+
+#define SD_DENSE 50 /* measured: below, the dense loops win over indirect ones */
+
+typedef struct sd_sparse sd_sparse;
+
+typedef struct sd_linear {
+    int32_t n, entries;
+    const int32_t *column, *row; /* pattern, compressed columns, of the caller */
+    double *row_scale, *column_scale;
+    double *scaled;              /* entries of the scaled matrix */
+    double *dense;               /* LU of small matrices, [n][n] by columns; NULL for sparse ones */
+    int32_t *pivot;
+    sd_sparse *sparse;
+    double *work, *work2;
+    double smallest;             /* smallest pivot relative to its column: 0 singular */
+    int32_t bad_row, bad_column; /* where it was found */
+    int64_t factorisations, pivotings;
+} sd_linear;
+
+/* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */
+sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order);
+void sd_linear_free(sd_linear *linear);
+/* values [entries], scale [n] magnitudes of the unknowns or NULL.  0 done, 1 singular (bad_row, bad_column), 2 memory. */
+int sd_linear_factor(sd_linear *linear, const double *values, const double *scale);
+/* x [n]: right side in, solution out */
+void sd_linear_solve(sd_linear *linear, double *x);
+
+#endif

@@ -1,0 +1,47 @@
+/* One integration in chunks: steps, quadratures of the energy balance, values at the instants asked for.
+ *
+ * An output row is [t, kind, kinetic, potential, dissipated, supplied, energy, constraints,
+ *                   observe [observed], observe_rate [observed]]   (SI units; kind 1: instant of the trace,
+ * 2: accepted step, 3: both).  At the instants the dense output is moved onto the constraints and their hidden
+ * derivatives (settle.h), so multipliers and accelerations are as exact as positions.
+ * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt, the integrals by the 4-point
+ * Gauss-Lobatto rule (exact to degree 5) on the dense output of each accepted step.
+ */
+#ifndef SYSDYN_RUN_H
+#define SYSDYN_RUN_H
+
+#include "bdf.h"
+#include "settle.h"
+
+#define SD_ROW_HEAD 8
+
+enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3 };
+
+typedef struct sd_run {
+    sd_bdf *bdf;
+    sd_settle *settle;
+    int32_t written;                  /* unknowns as written: y of blocks observe, audit */
+    int32_t observed;
+    const sd_call *audit;             /* NULL: no audit block */
+    const sd_call *observe, *observe_rate, *observe_scale;   /* NULL where missing */
+    const int32_t *audit_at;          /* [6] places of energy, kinetic, potential, dissipated, supplied, constraints */
+    const double *instant;            /* [instants] ascending, within the span */
+    int32_t instants, every_step, sample_steps;
+    double *row;                      /* [room][SD_ROW_HEAD + 2 observed] */
+    int32_t room;
+    /* progress */
+    int32_t rows, next, pending, started;
+    double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
+    double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
+    double t_from, power_dissipated, power_supplied;
+    double *point, *point_d, *aux, *aux_d, *values, *largest, *memory;   /* largest [observed]: of observe_scale */
+    int64_t rows_written;
+    double first_energy;
+} sd_run;
+
+sd_run *sd_run_new(sd_bdf *bdf, sd_settle *settle, int32_t written, int32_t extended, int32_t observed);
+void sd_run_free(sd_run *run);
+/* steps until `steps` more are taken, `seconds` are over, the rows are full, the end or a failure */
+int sd_run_advance(sd_run *run, int64_t steps, double seconds);
+
+#endif

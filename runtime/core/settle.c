@@ -1,0 +1,168 @@
+/* Least change onto the equations and their hidden derivatives: see settle.h. */
+#include "settle.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EPSILON 1e-14   /* of redundant rows */
+#define ITERATIONS 6
+#define EXACT 4e-15     /* scaled residual that counts as round-off */
+#define CLOSE 1e-9      /* scaled residual with which one may live */
+#define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
+
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
+{
+    sd_settle *settle = calloc(1, sizeof *settle);
+    if (!settle)
+        return NULL;
+    size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
+    settle->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * m + 5 * n, sizeof(double));
+    if (!settle->memory) {
+        free(settle);
+        return NULL;
+    }
+    settle->system = system;
+    settle->linear = linear;
+    settle->unknowns = system->unknowns;
+    settle->rates = rates;
+    settle->rows = system->rows;
+    settle->jy = settle->memory;
+    settle->jyd = settle->jy + nnz;
+    settle->row_scale = settle->jyd + nnz;
+    settle->r = settle->row_scale + m;
+    settle->x = settle->r + m;
+    settle->x0 = settle->x + n;
+    settle->scale = settle->x0 + n;
+    settle->step = settle->scale + n; /* unknowns, rates and rows */
+    settle->matrix = settle->step + n + m;
+    return settle;
+}
+
+void sd_settle_free(sd_settle *settle)
+{
+    if (!settle)
+        return;
+    free(settle->memory);
+    free(settle);
+}
+
+/* largest scaled residual at (t, x) */
+static double measure(sd_settle *settle, double t, const double *y, const double *yd)
+{
+    double worst = 0.0, sum = 0.0;
+    sd_residual(settle->system, t, y, yd, settle->r);
+    for (int32_t i = 0; i < settle->rows; i++) {
+        double v = fabs(settle->r[i] * settle->row_scale[i]);
+        if (!(v <= worst))
+            worst = v;
+        if (settle->constraint[i])
+            sum += v * v;
+    }
+    settle->residual = worst;
+    settle->constraints = sqrt(sum);
+    return worst;
+}
+
+/* row scales from the magnitudes of the terms, the saddle-point matrix and its factors at (t, y, yd) */
+static int factorise(sd_settle *settle, double t, const double *y, const double *yd)
+{
+    sd_system *system = settle->system;
+    int32_t n = settle->unknowns, rates = settle->rates;
+    sd_jacobian(system, t, y, yd, settle->jy, settle->jyd);
+    memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
+    memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
+    settle->ready = 0;
+    for (int32_t j = 0; j < n; j++) /* scale of yd at [step] for the moment */
+        settle->step[j] = 0.0;
+    for (int32_t k = 0; k < rates; k++)
+        settle->step[settle->rate[k]] = settle->scale[n + k];
+    for (int32_t j = 0; j < n; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
+            settle->jy[e] *= settle->scale[j];
+            settle->jyd[e] *= settle->step[j];
+            settle->row_scale[system->row[e]] += fabs(settle->jy[e]) + fabs(settle->jyd[e]);
+        }
+    for (int32_t i = 0; i < settle->rows; i++)
+        settle->row_scale[i] = settle->row_scale[i] > 0.0 ? 1.0 / settle->row_scale[i] : 1.0;
+    for (int32_t e = 0; e < system->entries; e++) {
+        double scale = settle->row_scale[system->row[e]];
+        double a = settle->jy[e] * scale, b = settle->jyd[e] * scale;
+        if (settle->slot_y[e] >= 0) {
+            settle->matrix[settle->slot_y[e]] += a;
+            settle->matrix[settle->slot_y_t[e]] += a;
+        }
+        if (settle->slot_yd[e] >= 0) {
+            settle->matrix[settle->slot_yd[e]] += b;
+            settle->matrix[settle->slot_yd_t[e]] += b;
+        }
+    }
+    for (int32_t j = 0; j < n + rates; j++)
+        settle->matrix[settle->slot_x[j]] += settle->weight[j];
+    for (int32_t i = 0; i < settle->rows; i++)
+        settle->matrix[settle->slot_r[i]] -= EPSILON;
+    if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
+        sd_linear_factor(settle->linear, settle->matrix, NULL))
+        return 1;
+    settle->ready = 1;
+    return 0;
+}
+
+/* one Gauss-Newton step of x = (y, chosen yd) */
+static void move(sd_settle *settle, double *y, double *yd)
+{
+    int32_t n = settle->unknowns, moves = n + settle->rates;
+    for (int32_t j = 0; j < moves; j++) {
+        double now = j < n ? y[j] : yd[settle->rate[j - n]];
+        settle->step[j] = -settle->weight[j] * (now - settle->x0[j]) / settle->scale[j];
+    }
+    for (int32_t i = 0; i < settle->rows; i++)
+        settle->step[moves + i] = -settle->r[i] * settle->row_scale[i];
+    sd_linear_solve(settle->linear, settle->step);
+    for (int32_t j = 0; j < n; j++)
+        y[j] += settle->step[j] * settle->scale[j];
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
+}
+
+int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
+{
+    int32_t n = settle->unknowns;
+    settle->calls++;
+    memcpy(settle->x0, y, (size_t)n * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        settle->x0[n + k] = yd[settle->rate[k]];
+    int failed = !settle->ready && factorise(settle, t, y, yd);
+    double before = failed ? INFINITY : measure(settle, t, y, yd), best = before;
+    memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
+    for (int m = 0; m < ITERATIONS && !failed && !(before <= EXACT) && !*settle->system->stop; m++) {
+        move(settle, y, yd);
+        double now = measure(settle, t, y, yd);
+        if (now < best) {
+            best = now;
+            memcpy(settle->x, y, (size_t)n * sizeof *y);
+            for (int32_t k = 0; k < settle->rates; k++)
+                settle->x[n + k] = yd[settle->rate[k]];
+        }
+        if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < CLOSE))
+            break;
+        if (now > CONTRACTS * before && now > EXACT)
+            failed = factorise(settle, t, y, yd);
+        before = now;
+    }
+    /* the best point met, or the given one */
+    int done = best <= CLOSE;
+    if (!done) {
+        memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
+        settle->failures++;
+        settle->ready = 0;
+    }
+    memcpy(y, settle->x, (size_t)n * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] = settle->x[n + k];
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    measure(settle, t, y, yd);
+    return !done;
+}

@@ -1,0 +1,41 @@
+/* Moves a point onto every equation that holds there: the rows as written and their hidden derivatives.
+ *
+ * Unknowns x = (y, chosen yd).  Rows: dynamics, momentum, momentum_rate, phi, phi_rate, phi_acceleration, psi,
+ * psi_rate, gamma, gamma_rate, lambda (a system of assembly.h whose rows may be fewer than its unknowns).
+ * Weighted least change (Gauss-Newton, each step the saddle-point system
+ *      [ D   G^T ] [ z      ]   [ -D (x - x0) ]
+ *      [ G  -eps ] [ lambda ] = [ -r          ]
+ * in scaled unknowns z and rows): unknowns that carry the state have weight 1, those that follow from it almost
+ * none.  eps makes redundant rows harmless.  The factors are kept from point to point while the iteration contracts.
+ */
+#ifndef SYSDYN_SETTLE_H
+#define SYSDYN_SETTLE_H
+
+#include "assembly.h"
+#include "linear.h"
+
+typedef struct sd_settle {
+    sd_system *system;
+    sd_linear *linear;               /* of the saddle-point matrix [unknowns + rates + rows] */
+    int32_t unknowns, rates, rows;
+    const int32_t *rate;             /* [rates] positions in yd */
+    const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
+    const int32_t *slot_yd, *slot_yd_t;   /* [entries] the same of dF/dyd */
+    const int32_t *slot_x, *slot_r;       /* [unknowns + rates], [rows] diagonal */
+    const double *weight;            /* [unknowns + rates] */
+    double *scale;                   /* [unknowns + rates] magnitudes */
+    const int32_t *constraint;       /* [rows] 1: counts in the norm of constraints */
+    const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
+    int32_t kinematics;
+    double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;
+    int32_t ready;
+    double residual, constraints;    /* after the last call: largest scaled row; norm of the constraint rows */
+    int64_t calls, failures;
+} sd_settle;
+
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);
+void sd_settle_free(sd_settle *settle);
+/* y, yd [unknowns] moved in place; 0 done, 1 it did not converge (they are unchanged) */
+int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
+
+#endif
