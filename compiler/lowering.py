@@ -1,0 +1,201 @@
+"""EnergyModel -> DescriptorForm: what both primal formulations (and their mirrors) share.
+
+With u the loop-local unknowns of a term, every gradient is taken once per term and scattered:
+
+    carrier of a momentum      p' - dT*/dq + dT/dq + dV/dq + dD/df - Q          (4.14)
+    any other coordinate       d/dt(dT*/df) - dT*/dq + dV/dq + dD/df - Q        (3.34); d/dt brings M f' in
+    momentum                   p - dT*/df,  or dT/dp - f where T is given
+    reactions                  Phi_q^T kappa, Psi_f^T mu                         the multiplier rule
+    phi rate, acceleration     Phi_q f + Phi_t;  Phi_q f' + Z1                   total derivatives (6.32)
+"""
+
+from __future__ import annotations
+
+from sysdyn.compiler.assembly import Assembly
+from sysdyn.compiler.audit import add_audit
+from sysdyn.compiler.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.energies import EnergyModel, Family, Row
+from sysdyn.compiler.momenta import given, inertial, resolve
+from sysdyn.compiler.observing import add_initials, add_observations, observed, pins_and_equations
+from sysdyn.compiler.terms import Nest, counter, local_variables
+from sysdyn.dsl.diagnostics import Place
+from sysdyn.dsl.expression import Node, derivative, mul, neg, time_derivative, var
+from sysdyn.dsl.network import Loop
+
+
+def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> DescriptorForm:
+    """The descriptor form; `legendre`: every inertial coordinate carries its momentum as an unknown."""
+    stores = given(model)
+    carriers = stores | inertial(model) if legendre else stores
+    form = _Lowering(model, stores, frozenset(carriers))
+    form.declare()
+    form.kinetic()
+    form.gradients()
+    form.works()
+    form.constraints()
+    add_observations(form.assembly, model, form.carriers)
+    add_audit(form.assembly, model, form.carriers)
+    pins, equations = pins_and_equations(model, form.carriers, form.families)
+    add_initials(form.assembly, model, form.carriers, equations)
+    owners = (*model.coordinates, *model.unknowns, *model.states)
+    shapes = [(f.name, f.shape) for f in owners]
+    shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
+    hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
+    for row in model.rows:
+        if row.kind != "lambda":
+            hulls.setdefault(row.name, []).append((row.at, row.nest, row.place))
+    return DescriptorForm(
+        formulation,
+        tuple(form.families),
+        tuple(form.assembly.rows),
+        form.assembly.blocks(),
+        pins,
+        model.offsets,
+        tuple(shapes),
+        tuple((name, tuple(places)) for name, places in hulls.items()),
+    )
+
+
+def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
+    """The loop nest over all elements of a family, and the indices of its element there."""
+    nest = tuple(Loop(f"#{k}", first, last) for k, (first, last) in enumerate(family.shape))
+    return nest, tuple(counter(k) for k in range(len(nest)))
+
+
+class _Lowering:
+    """One lowering under way: the families decided, rows collected in `assembly`."""
+
+    def __init__(self, model: EnergyModel, stores: frozenset[str], carriers: frozenset[str]) -> None:
+        self.model = model
+        self.stores = stores
+        self.carriers = carriers
+        self.assembly = Assembly()
+        self.families = self._families()
+
+    def _families(self) -> list[Unknowns]:
+        m = self.model
+        seen = observed(m, self.carriers)
+        found = [
+            Unknowns(c.name, "q", c.name, c.units["q"], c.place)
+            for c in m.coordinates
+            if c.tangible or c.name in seen
+        ]
+        found += [Unknowns(f"{c.name}'", "f", c.name, c.units["f"], c.place) for c in m.coordinates]
+        found += [
+            Unknowns(f"{c.name}.p", "p", c.name, c.units["p"], c.place)
+            for c in m.coordinates
+            if c.name in self.carriers
+        ]
+        found += [Unknowns(s.name, "s", s.name, s.units["s"], s.place) for s in m.states]
+        found += [Unknowns(u.name, "e", u.name, u.units["e"], u.place) for u in m.unknowns]
+        for kind, row_kind in (("kappa", "phi"), ("mu", "psi")):
+            names = dict.fromkeys(row.name for row in m.of_kind(row_kind))
+            places = {row.name: row.place for row in reversed(m.rows)}
+            found += [Unknowns(f"{n}.multiplier", kind, n, f"J/({m.labels[n]})", places[n]) for n in names]
+        found += [Unknowns(f"audit.{n}", "audit", n, "J", None) for n in AUDIT]
+        return found
+
+    def declare(self) -> None:
+        """All row families, in the order of the contract."""
+        declare = self.assembly.family
+        for c in self.model.coordinates:
+            declare(Equations("dynamics", c.name, c.name, "dynamics", c.units["e"], c.place))
+        for c in self.model.coordinates:
+            if c.name in self.carriers:
+                declare(Equations("momentum", c.name, c.name, "momentum", c.units["p"], c.place))
+        for kind in ("phi", "psi", "gamma"):
+            names = dict.fromkeys(row.name for row in self.model.of_kind(kind))
+            for name in names:
+                rows = [row for row in self.model.of_kind(kind) if row.name == name]
+                rate = all(self._has_rate(row) for row in rows)
+                unit = self.model.labels[name]
+                declare(Equations(kind, name, name, kind, unit, rows[0].place, rate))
+        for s in self.model.states:
+            rows = [row for row in self.model.of_kind("lambda") if row.name == s.name]
+            place = rows[0].place if rows else s.place
+            declare(Equations("lambda", s.name, s.name, "lambda", f"{s.units['s']}/s", place))
+
+    def _has_rate(self, row: Row) -> bool:
+        """Whether the total time derivative of every row is known: multipliers have none."""
+        return not any(local_variables(t.expression, ("kappa", "mu", "audit"), None) for t in row.terms)
+
+    def kinetic(self) -> None:
+        """Momenta: M f' + ... of coordinates without, p' and the momentum row of those with one."""
+        add, mirror = self.assembly.add, self.model.mirror
+        for family in self.model.coordinates:
+            if family.name not in self.carriers:
+                continue
+            nest, at = whole(family)
+            add("dynamics", family.name, at, nest, var(family.name, mirror.conjugate, *at, order=1))
+            held = var(family.name, mirror.conjugate, *at)
+            if family.name in self.stores:
+                held = neg(var(family.name, mirror.rate, *at))
+            self._momentum(family.name, at, nest, held)
+        for term in self.model.function(mirror.coenergy):
+            for rate in local_variables(term.expression, mirror.rate):
+                slope = derivative(term.expression, rate)
+                if rate.data[0] in self.carriers - self.stores:
+                    self._momentum(rate.data[0], rate.args, term.loops, neg(slope))
+                else:
+                    add("dynamics", rate.data[0], rate.args, term.loops, time_derivative(slope))
+        for term in self.model.function(mirror.energy):
+            for p in local_variables(term.expression, mirror.conjugate):
+                self._momentum(p.data[0], p.args, term.loops, derivative(term.expression, p))
+
+    def _momentum(self, owner: str, at: tuple[Node, ...], nest: Nest, expression: Node) -> None:
+        self.assembly.add("momentum", owner, at, nest, expression)
+        self.assembly.add("momentum_rate", owner, at, nest, time_derivative(expression))
+
+    def gradients(self) -> None:
+        """-dT*/dq + dT/dq + dV/dq + dD/df."""
+        m = self.model.mirror
+        functions = ((m.coenergy, -1.0, m.coordinate), (m.energy, 1.0, m.coordinate), (m.potential, 1.0, m.coordinate))
+        for name, sign, kind in (*functions, (m.content, 1.0, m.rate)):
+            for term in self.model.function(name):
+                for node in local_variables(term.expression, kind):
+                    slope = derivative(term.expression, node)
+                    value = slope if sign > 0 else neg(slope)
+                    self.assembly.add("dynamics", node.data[0], node.args, term.loops, self._known(value))
+
+    def works(self) -> None:
+        """-Q_j = -E du/dq_j."""
+        for work in self.model.works:
+            effort = self._known(work.effort)
+            for node in local_variables(work.on, self.model.mirror.coordinate):
+                force = mul(effort, derivative(work.on, node))
+                self.assembly.add("dynamics", node.data[0], node.args, work.loops, neg(force))
+
+    def constraints(self) -> None:
+        """Phi, Psi with their reactions, Gamma, Lambda, and the total time derivatives of all."""
+        for row in self.model.rows:
+            for term in row.terms:
+                expression = self._known(term.expression)
+                if row.kind == "lambda":
+                    self.assembly.add("lambda", row.name, row.at, term.loops, neg(expression))
+                    continue
+                self.assembly.add(row.kind, row.name, row.at, term.loops, expression)
+                self._rates(row, term.loops, expression)
+                if row.kind in ("phi", "psi"):
+                    self._reaction(row, term.loops, expression)
+            if row.kind == "lambda":
+                own = var(row.name, "s", *row.at, order=1)
+                self.assembly.add("lambda", row.name, row.at, row.nest, own)
+
+    def _reaction(self, row: Row, nest: Nest, expression: Node) -> None:
+        m = self.model.mirror
+        kind, name = (m.coordinate, "kappa") if row.kind == "phi" else (m.rate, "mu")
+        multiplier = var(row.name, name, *row.at)
+        for node in local_variables(expression, kind):
+            value = mul(derivative(expression, node), multiplier)
+            self.assembly.add(f"{row.kind}_reaction", node.data[0], node.args, nest, value)
+
+    def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
+        if not self._has_rate(row):
+            return
+        rate = time_derivative(expression)
+        self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
+        if row.kind == "phi":
+            self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))
+
+    def _known(self, expression: Node) -> Node:
+        return resolve(self.model, self.carriers, expression)

@@ -1,0 +1,137 @@
+"""Summands over loops: the pieces that everything in the compiler is made of.
+
+A `Term` is a local expression under a loop nest.  Loop variables have canonical names, `#0` for the outermost loop,
+`#1` for the next, so that equal nests are equal values and their expressions may share nodes.  A sum over a range is
+linear, so `k*sum(i in 1..n: g)` at the top level of an expression becomes the term `k*g` with one loop more; a sum
+inside a nonlinear expression stays a node (`reduce`), its loop variable named `#r1`, `#r2`, ... by its height.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place
+from sysdyn.dsl.expression import (
+    Node,
+    const,
+    index,
+    linear,
+    mul,
+    product,
+    rebuild,
+    reduction,
+    substitute,
+    topological,
+    variables,
+)
+from sysdyn.dsl.network import Loop
+
+Nest = tuple[Loop, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One summand: `expression` summed (or one row each) over `loops`."""
+
+    expression: Node
+    loops: Nest
+    place: Place
+
+
+def counter(depth: int) -> Node:
+    """The loop variable of the loop at that depth."""
+    return index(f"#{depth}")
+
+
+def canonical_reductions(root: Node) -> Node:
+    """Rename the loop variables of all reductions below root by their height: `#r1` innermost."""
+    done: dict[Node, Node] = {}
+    height: dict[Node, int] = {}
+    for node in topological([root]):
+        args = tuple(done[a] for a in node.args)
+        level = max((height[a] for a in node.args), default=0)
+        if node.op == "reduce":
+            level += 1
+            operator, name = node.data
+            own = f"#r{level}"
+            done[node] = reduction(operator, own, args[0], args[1], substitute(args[2], {index(name): index(own)}))
+        else:
+            done[node] = rebuild(node, args)
+        height[node] = level
+    return done[root]
+
+
+def canonical(loops: Sequence[Loop], *roots: Node) -> tuple[Nest, tuple[Node, ...]]:
+    """The nest with canonical loop variables, and the expressions under it likewise; sums inside stay nodes."""
+    change: dict[Node, Node] = {}
+    nest = []
+    for depth, loop in enumerate(loops):
+        nest.append(Loop(f"#{depth}", substitute(loop.first, change), substitute(loop.last, change)))
+        change[index(loop.index)] = counter(depth)
+    return tuple(nest), tuple(substitute(canonical_reductions(root), change) for root in roots)
+
+
+def has_reduction(root: Node) -> bool:
+    """Whether a sum (product, minimum, maximum) over a range occurs anywhere below."""
+    return any(node.op == "reduce" for node in topological([root]))
+
+
+def split(root: Node, loops: Nest, place: Place) -> tuple[Term, ...]:
+    """The terms of a canonical expression: top-level sums taken apart, top-level sums over ranges made loops.
+
+    Terms under one nest that are parameters and constants only are kept: a constraint needs them.
+    """
+    found: list[Term] = []
+    work: deque[tuple[float, Node, Node, Nest]] = deque([(1.0, const(1.0), root, loops)])
+    while work:
+        factor, by, node, nest = work.popleft()
+        if node.op == "sum":
+            constant, coefficients = node.data
+            work.extend((factor * c, by, a, nest) for c, a in zip(coefficients, node.args, strict=True))
+            if constant:
+                found.append(Term(linear(0.0, ((factor * constant, by),)), nest, place))
+        elif node.op == "reduce" and node.data[0] == "sum":
+            first, last, body = node.args
+            own = counter(len(nest))
+            deeper = (*nest, Loop(f"#{len(nest)}", first, last))
+            work.append((factor, by, substitute(body, {index(node.data[1]): own}), deeper))
+        elif node.op == "mul" and (parts := _linear_factor(node)):
+            work.append((factor, mul(by, parts[0]), parts[1], nest))
+        elif has_reduction(by):
+            work.append((factor, const(1.0), mul(by, node), nest))
+        else:
+            found.append(Term(product(factor, ((1.0, by), (1.0, node))), nest, place))
+    return tuple(t for t in found if not (t.expression.op == "const" and t.expression.data == 0.0))
+
+
+def _linear_factor(node: Node) -> tuple[Node, Node] | None:
+    """(rest, factor) where one factor of a product holds a sum over a range that may be multiplied out."""
+    for k, (exponent, factor) in enumerate(zip(node.data, node.args, strict=True)):
+        whole = exponent > 0 and exponent == int(exponent)
+        linear_sum = factor.op == "reduce" and factor.data[0] == "sum"
+        if whole and (linear_sum or (factor.op == "sum" and has_reduction(factor))):
+            exponents = [(e - (j == k), a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True))]
+            return product(1.0, exponents), factor
+    return None
+
+
+def terms(expression: Node, loops: Sequence[Loop], place: Place) -> tuple[Term, ...]:
+    """The terms of an expression as the network holds it."""
+    nest, (root,) = canonical(loops, expression)
+    return split(root, nest, place)
+
+
+def refuse_nested(found: Iterable[Term], what: str) -> None:
+    """ModelError N608 where a sum over a range stands inside a nonlinear expression that must be differentiated."""
+    for term in found:
+        if has_reduction(term.expression):
+            text = f"a sum over a range inside a nonlinear expression is not supported yet in {what}"
+            raise ModelError([Diagnostic("N608", text, term.place)])
+
+
+def local_variables(root: Node, kinds: str | Sequence[str], order: int | None = 0) -> list[Node]:
+    """The unknowns of those kinds that occur, in the order they were made."""
+    found = (n for n in variables(root) if n.op == "var" and n.data[1] in kinds)
+    return sorted((n for n in found if order is None or n.data[2] == order), key=lambda n: n.number)
