@@ -10,9 +10,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from sysdyn.dsl.source import Place as Place
-from sysdyn.dsl.source import SourceText as SourceText
-from sysdyn.dsl.source import Span as Span
+from sysdyn.dsl.source import Place, SourceText, Span
+
+__all__ = ["Diagnostic", "ModelError", "Place", "Related", "Report", "SourceText", "Span"]
 
 _SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
 

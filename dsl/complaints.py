@@ -1,0 +1,215 @@
+"""Sentences for errors of syntax, in the author's terms: what was found, what was expected.
+
+Pure functions from words and sets of terminals to (code, message, help).
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Collection
+from difflib import get_close_matches
+
+MODEL_WORDS = frozenset(
+    "param node port branch input output coord cocoord implicit state discrete dynamic let law energy content "
+    "work phi psi gamma init when every for level require expect lossless".split()
+)
+SCENE_WORDS = frozenset(
+    "time set level init trace accuracy formulation solver redundancy limit expect when".split()
+)
+ITEM_WORDS = frozenset("from domain bundle unit const fn table component model scene".split())
+DOMAIN_WORDS = frozenset("effort flow momentum displacement node ground pseudo".split())
+
+_OWN = {
+    "statement": MODEL_WORDS,
+    "scene_statement": SCENE_WORDS,
+    "item": ITEM_WORDS,
+    "role": DOMAIN_WORDS,
+    "bundle_member": frozenset[str](),
+    "action": frozenset[str](),
+}
+_HERE = {
+    "statement": "in a model",
+    "scene_statement": "in a scene",
+    "item": "at the top of a file",
+    "role": "in a domain",
+    "bundle_member": "in a bundle",
+    "action": "among the actions of 'when' or 'every'",
+}
+_CONTINUE = "end the line above with a comma, or break it inside the parentheses"
+_OTHERS = {
+    "connect": "ports are joined by naming nodes: label: component() a -> b",
+    "parameter": "param k = 3 N/m",
+    "var": "let x = ...",
+    "variable": "let x = ..., or state s = ...",
+    "equation": "let, law, phi, psi or gamma",
+    "equations": "let, law, phi, psi or gamma",
+    "import": "from std.electrical import resistor",
+    "include": "from std.electrical import resistor",
+    "class": "component or model",
+    "function": "fn f(x: m) -> N = ...",
+    "def": "fn f(x: m) -> N = ...",
+    "constant": "const g0 = 9.81 m/s^2",
+    "if": "when c { a := b }, or let x = if c then a else b",
+    "plot": "trace x, y every 1 ms",
+    "simulate": "scene s of m { time 0 s to 1 s }",
+}
+_SIGNS = {
+    "&": "and",
+    "|": "or",
+    "!": "not, !=",
+    "%": "percent (the unit), or mod(a, b)",
+    "\u2019": "' (the straight apostrophe)",
+    "\u2018": "' (the straight apostrophe)",
+    "\u201c": '" (the straight quotation mark)',
+    "\u201d": '" (the straight quotation mark)',
+    "\u2212": "- (the hyphen of the keyboard)",
+    "\u2013": "- (the hyphen of the keyboard)",
+    "\u00b7": "* between factors, . between units",
+    "\u00d7": "*",
+    "\u00f7": "/",
+    "\u2264": "<=",
+    "\u2265": ">=",
+    "\u2260": "!=",
+    "\u00a0": "an ordinary space",
+    "\u202f": "an ordinary space",
+    "\u00b0": "deg",
+    "@": "at, in 'expect at 1 s: ...'",
+}
+_ATOMS = frozenset(
+    {"<name>", "<number>", "<quantity>", "<text>", "(", "[", "-", "true", "false", "not", "if", "$"}
+)
+_OPERATORS = frozenset({"+", "-", "*", "/", "^", "==", "!=", "<", ">", "<=", ">=", "and", "or", "."})
+_CLASSES = {
+    "<number>": "a number",
+    "<text>": 'a text in quotes "..."',
+    "<function>": "one of T* T V* V (energies), D G (contents)",
+    "<newline>": "the end of the statement",
+    "<end>": "the end of the file",
+}
+_GROUPS = (
+    (frozenset({"effort", "flow", "momentum", "displacement"}), "'effort', 'flow', 'momentum' or 'displacement'"),
+    (frozenset({"linear", "pchip", "cubic", "hold"}), "'linear', 'pchip', 'cubic' or 'hold'"),
+)
+
+Complaint = tuple[str, str, str | None]
+"""Code, message, help."""
+
+
+def quoted(text: str, kind: str = "") -> str:
+    """What was found, for a message."""
+    if kind == "<end>":
+        return "the end of the file"
+    if kind == "<newline>" or text in (";", "\n", "\r"):
+        return "';'" if text == ";" else "the end of the line"
+    shown = text if len(text) <= 40 else text[:36] + "..."
+    return f"'{shown}'"
+
+
+def character(sign: str) -> Complaint:
+    """A character that begins no token."""
+    name = unicodedata.name(sign, "a control character").lower()
+    shown = f"'{sign}'" if sign.isprintable() and sign != "\u00a0" else "a character"
+    return "E113", f"{shown} (U+{ord(sign):04X}, {name}) has no meaning here", _SIGNS.get(sign)
+
+
+def first_token(text: str, kind: str, body: str) -> Complaint:
+    """A sign where a statement should begin."""
+    if text == "/":
+        return "E113", "a statement cannot begin with '/'", "a comment begins with '#'"
+    if kind == "<end>":
+        return "E113", "the file ends where a statement should begin", None
+    if text in ("}", ")", "]"):
+        return "E112", f"'{text}' closes nothing that is open", None
+    if kind == "<newline>":
+        return "E113", "';' ends nothing here", None
+    return "E109", f"a statement cannot begin with {quoted(text, kind)}", _CONTINUE
+
+
+def connection() -> Complaint:
+    """A line that only continues the element above it."""
+    return "E109", "a statement cannot begin with a connection", _CONTINUE
+
+
+def conditional() -> Complaint:
+    """`if` inside an expression."""
+    message = "a conditional in a relation or inside an expression needs parentheses"
+    return "E110", message, "(if ... then ... else ...)"
+
+
+def unknown(word: str, after: str, body: str) -> Complaint:
+    """A statement whose first word begins no statement of this body; `after` is the text behind it."""
+    here = _HERE[body]
+    if word not in _OWN[body]:
+        for words, place in (
+            (SCENE_WORDS, "in a scene"),
+            (MODEL_WORDS, "in a model or component"),
+            (ITEM_WORDS, "at the top of a file"),
+        ):
+            if word in words:
+                return "E107", f"'{word}' belongs {place}, not {here}", None
+    if body == "action":
+        return "E113", "an action assigns: name := expression", None
+    if body == "bundle_member":
+        return "E113", "a bundle lists nodes: x, y: translation", None
+    if after.startswith("=") and not after.startswith("=="):
+        wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
+        return "E113", f"no statement begins with '{word}'; a value is given by a word before it", f"{wanted} {word} = ..."
+    if after.startswith("'"):
+        return "E113", f"no statement begins with '{word}''", f"dynamic {word}' = ..."
+    near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
+    return "E113", f"no statement begins with '{word}'", _OTHERS.get(word.lower()) or (near[0] if near else None)
+
+
+def expected(accepted: Collection[str], kind: str, text: str, before: str) -> Complaint:
+    """A token that does not fit, with what would; `before` is the token before it."""
+    return "E113", f"expected {_listed(accepted)}, found {quoted(text, kind)}", _hint(kind, text, before, accepted)
+
+
+def _listed(accepted: Collection[str]) -> str:
+    """Terminals in the author's terms."""
+    rest = set(accepted)
+    parts: list[str] = []
+    if {"(", "<name>", "<number>"} <= rest:
+        parts.append("an expression")
+        rest -= _ATOMS
+    elif "$" in rest:
+        parts.append("a unit")
+        rest -= {"$", "<name>", "<number>"}
+    elif "<name>" in rest:
+        parts.append("a name")
+        rest -= {"<name>"}
+    for words, said in _GROUPS:
+        if words <= rest:
+            parts.append(said)
+            rest -= words
+    if len(rest & _OPERATORS) > 2:
+        parts.append("an operator")
+        rest -= _OPERATORS | {"(", "[", "'", "^"}
+    if {"<=", ">=", "=="} <= rest:
+        parts.append("a comparison")
+        rest -= {"==", "!=", "<", ">", "<=", ">="}
+    if "<newline>" in rest:
+        parts.append(_CLASSES["<newline>"])
+        rest -= {"<newline>", "<end>", "}"}
+    signs = sorted(rest, key=lambda terminal: (terminal.isalpha(), terminal))
+    parts.extend(_CLASSES.get(terminal, f"'{terminal}'") for terminal in signs[: max(1, 6 - len(parts))])
+    if not parts:
+        return "nothing more"
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " or " + parts[-1]
+
+
+def _hint(kind: str, text: str, before: str, accepted: Collection[str]) -> str | None:
+    """The text to write for a slip that is easily named."""
+    if text == "*" and before == "*":
+        return "a power is written a^b"
+    if text == "+" and "<number>" in accepted:
+        return "a number has no leading '+'"
+    if text == "." and "<number>" in accepted:
+        return "a number begins with a digit: 0.5"
+    if kind == "<quantity>" and "<number>" in accepted:
+        return "bare numbers here: their units stand in the head of the table"
+    if text in ("<", ">", "<=", ">=", "==", "!=") and "and" in accepted:
+        return "comparisons do not chain: a < b and b < c"
+    if before == "." and kind != "<name>":
+        return "a number ends with a digit: 5.0"
+    return None
