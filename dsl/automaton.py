@@ -29,9 +29,7 @@ _BLOCKS_OF_STATEMENTS = ("for_", "when", "every", "level", "scene")
 
 def _rows() -> tuple[dict[str, int], ...]:
     """For each state the action on each terminal: a state to shift to, or -1 - rule."""
-    return tuple(
-        {terminal: action for action, number in row for terminal in LOOKAHEADS[number]} for row in ROWS
-    )
+    return tuple({terminal: action for action, number in row for terminal in LOOKAHEADS[number]} for row in ROWS)
 
 
 def _build(name: str) -> Build:
@@ -50,9 +48,7 @@ def _actions() -> tuple[tuple[str, int, Build | None, bool, tuple[tuple[int, boo
     for _, _, name, _ in RULES:
         if name not in functions:
             functions[name] = _build(name)
-    return tuple(
-        (left, length, functions[name], name == "", children) for left, length, name, children in RULES
-    )
+    return tuple((left, length, functions[name], name == "", children) for left, length, name, children in RULES)
 
 
 _TABLE_ROWS = _rows()
@@ -133,9 +129,7 @@ class Automaton:
             return Text(text[1:-1], Span(start, end))
         return None
 
-    def _reduce(
-        self, left: str, length: int, build: Build | None, children: tuple[tuple[int, bool], ...]
-    ) -> None:
+    def _reduce(self, left: str, length: int, build: Build | None, children: tuple[tuple[int, bool], ...]) -> None:
         """Replace the topmost `length` entries by what the rule makes of them."""
         states, values, starts, ends, depths = self.states, self.values, self.starts, self.ends, self.depths
         if length:

@@ -9,15 +9,31 @@ import unicodedata
 from collections.abc import Collection
 from difflib import get_close_matches
 
+# fmt: off
 MODEL_WORDS = frozenset(
-    "param node port branch input output coord cocoord implicit state discrete dynamic let law energy content "
-    "work phi psi gamma init when every for level require expect lossless".split()
+    {
+        "param", "node", "port", "branch", "input", "output", "coord", "cocoord", "implicit", "state",
+        "discrete", "dynamic", "let", "law", "energy", "content", "work", "phi", "psi", "gamma", "init", "when",
+        "every", "for", "level", "require", "expect", "lossless",
+    }
 )
 SCENE_WORDS = frozenset(
-    "time set level init trace accuracy formulation solver redundancy limit expect when".split()
+    {
+        "time", "set", "level", "init", "trace", "accuracy", "formulation", "solver", "redundancy", "limit",
+        "expect", "when",
+    }
 )
-ITEM_WORDS = frozenset("from domain bundle unit const fn table component model scene".split())
-DOMAIN_WORDS = frozenset("effort flow momentum displacement node ground pseudo".split())
+ITEM_WORDS = frozenset(
+    {
+        "from", "domain", "bundle", "unit", "const", "fn", "table", "component", "model", "scene",
+    }
+)
+DOMAIN_WORDS = frozenset(
+    {
+        "effort", "flow", "momentum", "displacement", "node", "ground", "pseudo",
+    }
+)
+# fmt: on
 
 _OWN = {
     "statement": MODEL_WORDS,
@@ -75,9 +91,7 @@ _SIGNS = {
     "\u00b0": "deg",
     "@": "at, in 'expect at 1 s: ...'",
 }
-_ATOMS = frozenset(
-    {"<name>", "<number>", "<quantity>", "<text>", "(", "[", "-", "true", "false", "not", "if", "$"}
-)
+_ATOMS = frozenset({"<name>", "<number>", "<quantity>", "<text>", "(", "[", "-", "true", "false", "not", "if", "$"})
 _OPERATORS = frozenset({"+", "-", "*", "/", "^", "==", "!=", "<", ">", "<=", ">=", "and", "or", "."})
 _CLASSES = {
     "<number>": "a number",
@@ -153,7 +167,11 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", "a bundle lists nodes: x, y: translation", None
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
-        return "E113", f"no statement begins with '{word}'; a value is given by a word before it", f"{wanted} {word} = ..."
+        return (
+            "E113",
+            f"no statement begins with '{word}'; a value is given by a word before it",
+            f"{wanted} {word} = ...",
+        )
     if after.startswith("'"):
         return "E113", f"no statement begins with '{word}''", f"dynamic {word}' = ..."
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)

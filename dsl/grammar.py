@@ -33,13 +33,11 @@ _COMPARE = ("==", "!=", "<=", ">=", "<", ">")
 
 
 def build_lark() -> Any:
-    """lark's parser of `sd.lark`; raises lark's GrammarError where the grammar has a conflict."""
+    """Lark's parser of `sd.lark`; raises lark's GrammarError where the grammar has a conflict."""
     from lark import Lark
 
     text = (_HERE / "sd.lark").read_text(encoding="utf-8")
-    return Lark(
-        text, parser="lalr", lexer="contextual", strict=True, start="start", maybe_placeholders=True
-    )
+    return Lark(text, parser="lalr", lexer="contextual", strict=True, start="start", maybe_placeholders=True)
 
 
 def table_text() -> str:
@@ -106,14 +104,10 @@ def _symbol(entry: tuple[str, Any]) -> str:
     return entry[0]
 
 
-def _numbered(
-    by_action: dict[int, set[str]], lookaheads: dict[tuple[str, ...], int]
-) -> tuple[tuple[int, int], ...]:
+def _numbered(by_action: dict[int, set[str]], lookaheads: dict[tuple[str, ...], int]) -> tuple[tuple[int, int], ...]:
     """Actions of a state with the number of the set of terminals that each is taken on."""
     sets = {action: tuple(sorted(terminals)) for action, terminals in by_action.items()}
-    return tuple(
-        (action, lookaheads.setdefault(sets[action], len(lookaheads))) for action in sorted(sets)
-    )
+    return tuple((action, lookaheads.setdefault(sets[action], len(lookaheads))) for action in sorted(sets))
 
 
 def _rule(rule: Any) -> tuple[str, int, str, tuple[tuple[int, bool], ...]]:
@@ -140,9 +134,7 @@ def _rule(rule: Any) -> tuple[str, int, str, tuple[tuple[int, bool], ...]]:
     return rule.origin.name, len(rule.expansion), name, tuple(children)
 
 
-def _print(
-    states: list[Any], gotos: list[Any], rules: list[Any], lookaheads: dict[Any, int], final: int
-) -> str:
+def _print(states: list[Any], gotos: list[Any], rules: list[Any], lookaheads: dict[Any, int], final: int) -> str:
     """The module's text."""
     lines = [
         '"""Tables of the parser, generated from `sd.lark` by `grammar.py`: do not edit."""',

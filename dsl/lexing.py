@@ -63,9 +63,14 @@ class Scanner:
     """The reading position in one text, with everything that the newline rule has to remember."""
 
     __slots__ = (
+        "_doc",
+        "_doc_end",
+        "_fresh",
+        "_lines",
         "brackets",
         "closed",
         "comments",
+        "dangling",
         "docs",
         "end",
         "fault",
@@ -78,10 +83,6 @@ class Scanner:
         "suspect",
         "text",
         "unit",
-        "_doc",
-        "_doc_end",
-        "_fresh",
-        "_lines",
     )
 
     def __init__(self, source: SourceText) -> None:
@@ -106,6 +107,8 @@ class Scanner:
         """Offset of the first token of the present statement."""
         self.suspect: int | None = None
         """First token of a continuation line that looks like a statement of its own."""
+        self.dangling = Span(0, 0)
+        """The sign before the suspect line."""
         self.pending = False
         """Whether a newline is to be read that is not in the text (recovery)."""
         self.comments: list[Comment] = []
@@ -187,7 +190,7 @@ class Scanner:
 
     def _ends_statement(self, sign: str) -> bool:
         """Whether a newline (or `;`) ends the statement here."""
-        if self.last == "<newline>" or self.last == "{":
+        if self.last in ("<newline>", "{"):
             return False
         if sign == ";":
             return True
@@ -202,6 +205,7 @@ class Scanner:
         first = _BLANK.match(self.text, end).end()  # type: ignore[union-attr]
         if self.column(first) <= self.column(self.statement) and _OPENS.match(self.text, first):
             self.suspect = first
+            self.dangling = Span(self.start, self.start + len(self.last))
 
     def _begin(self, start: int) -> None:
         """The first token of a statement."""

@@ -22,6 +22,7 @@ MAX_ERRORS = 100
 
 _WORD = re.compile(r"[^\W\d]\w*+")
 _BLANK = re.compile(r"[ \t]*+")
+_SLIPS = RESERVED | {"=", "=="}
 _OUTERMOST = frozenset({"model", "component", "scene", "domain", "bundle", "from"})
 _HEADS = {
     "model": ("model", "<name>"),
@@ -44,8 +45,6 @@ class Recovery:
         self.automaton = automaton
         self.scanner = automaton.scanner
         self.errors = 0
-        self.before = ("", 0)
-        """The token before the present one, and where it ended."""
 
     # --- slips that are mended ---
 
@@ -54,7 +53,9 @@ class Recovery:
         scanner, automaton = self.scanner, self.automaton
         if kind == "<quantity>" and scanner.glued:
             kind = self._glued()
-        elif kind not in automaton.row:
+        elif kind not in automaton.row or kind in _SLIPS:
+            if automaton.accepts(kind):
+                return kind
             if kind == "==" and automaton.accepts("="):
                 self._error(("E111", f"'==' compares; {self._defined()}", "="), self._token())
                 kind = "="
@@ -64,9 +65,9 @@ class Recovery:
             elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
                 self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
                 kind = "<name>"
-        if kind == "=" and not automaton.accepts("=") and automaton.accepts("=="):
-            self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token())
-            kind = "=="
+            elif kind == "=" and automaton.accepts("=="):
+                self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token())
+                kind = "=="
         return kind
 
     def _glued(self) -> str:
@@ -97,7 +98,7 @@ class Recovery:
 
     def recover(self, kind: str) -> None:
         """Report a terminal that does not fit and bring the automaton to where it can go on."""
-        automaton, scanner = self.automaton, self.scanner
+        automaton = self.automaton
         if self.errors >= MAX_ERRORS:
             self._stop()
             return
@@ -128,11 +129,8 @@ class Recovery:
         elif kind == "<fault>":
             self._error(complaints.character(text), self._token())
         elif scanner.suspect is not None:
-            last, end = scanner.text[: scanner.suspect].rstrip()[-1:], scanner.suspect
-            self._error(
-                ("E113", f"the statement above ends with '{last}': something is missing", None),
-                Span(end, scanner.end),
-            )
+            sign = scanner.text[scanner.dangling.start : scanner.dangling.end]
+            self._error(("E113", f"the statement ends with '{sign}': something is missing", None), scanner.dangling)
         elif size == len(automaton.states) and kind != "<name>" and kind not in RESERVED:
             self._error(complaints.first_token(text, kind, body), self._token())
         elif kind == "if" and automaton.accepts("("):
@@ -160,7 +158,9 @@ class Recovery:
         """Whether this is the scene's `level` in a model, or the model's in a scene."""
         if word != "level":
             return False
-        return (body == "statement" and kind == "=") or (body == "scene_statement" and kind in ("{", "extends", "<name>"))
+        if body == "statement":
+            return kind == "="
+        return body == "scene_statement" and kind in ("{", "extends", "<name>")
 
     def _indented(self, start: int) -> bool:
         """Whether the statement stands further right than the one before it."""
@@ -290,13 +290,15 @@ class Recovery:
         brackets = scanner.brackets
         if len(brackets) < base and scanner.closed is not None:
             brackets.append(scanner.closed)
-        elif any(item.sign == "{" for item in brackets[base:]) or body == "item":
-            return False
-        elif scanner.closed is not None and scanner.closed.end == scanner.end:
+        elif body == "item" or self._closed_now() or any(item.sign == "{" for item in brackets[base:]):
             return False
         del brackets[base:]
         scanner.restart(scanner.start, fresh=False)
         return True
+
+    def _closed_now(self) -> bool:
+        """Whether the token just read closed a bracket."""
+        return self.scanner.closed is not None and self.scanner.closed.end == self.scanner.end
 
     def _mend_head(self, start: int) -> bool:
         """Read a head in place of the faulty one before a '{', so that the block can be read."""
@@ -308,12 +310,17 @@ class Recovery:
         name = _WORD.match(after)
         first = scanner.text.index(after, start + len(word)) if after else start
         named = (first, first + len(name.group())) if name else (start, start)
-        automaton.damaged.add(start)
+        size = len(automaton.states)
+        fits = True
         for number, terminal in enumerate(_HEADS[word]):
             scanner.start, scanner.end = (start, start + len(word)) if number == 0 else named
-            automaton.advance(terminal)
+            fits = fits and automaton.advance(terminal)
         scanner.start, scanner.end = brace
-        return automaton.advance("{")
+        if fits and automaton.advance("{"):
+            automaton.damaged.add(start)
+            return True
+        automaton.cut(size)
+        return False
 
     def _stop(self) -> None:
         """Leave the rest of the text unread."""

@@ -209,16 +209,5 @@ class File:
 
 DomainPart = DomainRole | DomainNode | DomainGround | DomainPseudo | Broken
 TopLevel = (
-    Import
-    | Domain
-    | Bundle
-    | UnitAlias
-    | UnitBase
-    | Const
-    | Function
-    | Table
-    | Component
-    | Model
-    | Scene
-    | Broken
+    Import | Domain | Bundle | UnitAlias | UnitBase | Const | Function | Table | Component | Model | Scene | Broken
 )
