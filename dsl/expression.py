@@ -112,7 +112,7 @@ def _terms(node: Node) -> tuple[float, Sequence[tuple[float, Node]]]:
 
 
 def linear(constant: float, terms: Iterable[tuple[float, Node]]) -> Node:
-    """constant + sum of coefficient*node, canonical."""
+    """Constant + sum of coefficient*node, canonical."""
     total = constant
     found: dict[Node, float] = {}
     for coefficient, node in terms:
@@ -139,7 +139,7 @@ def add(*nodes: Node) -> Node:
 
 
 def sub(left: Node, right: Node) -> Node:
-    """left - right."""
+    """Left - right."""
     return linear(0.0, ((1.0, left), (-1.0, right)))
 
 
@@ -169,7 +169,7 @@ def _whole(value: float) -> bool:
 
 
 def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
-    """constant * prod(node^exponent), canonical."""
+    """Constant * prod(node^exponent), canonical."""
     total = constant
     found: dict[Node, float] = {}
     for exponent, node in factors:
@@ -257,7 +257,27 @@ FUNCTIONS: Mapping[str, Callable[..., float]] = {
     **{
         n: _safe(getattr(math, n))
         for n in (
-            "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log10 sqrt hypot floor ceil".split()
+            [
+                "sin",
+                "cos",
+                "tan",
+                "asin",
+                "acos",
+                "atan",
+                "atan2",
+                "sinh",
+                "cosh",
+                "tanh",
+                "asinh",
+                "acosh",
+                "atanh",
+                "exp",
+                "log10",
+                "sqrt",
+                "hypot",
+                "floor",
+                "ceil",
+            ]
         )
     },
     "ln": _safe(math.log),

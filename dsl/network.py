@@ -7,7 +7,7 @@ A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from sysdyn.dsl.diagnostics import Place
 from sysdyn.dsl.expression import Node
@@ -40,6 +40,16 @@ class Parameter:
     indices: tuple[str, ...]
     place: Place
     whole: bool = False  # used as a size or an index: its value must be a whole number
+
+
+@dataclass(frozen=True, slots=True)
+class ElementSetting:
+    """`set m[2] = value`: one element of a parameter array."""
+
+    name: str
+    at: tuple[Node, ...]
+    value: Node
+    place: Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +169,7 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """`expect moment: left op right within d`; moment is always, finally, static, at (an instant), or start."""
+    """`expect moment: left op right within d`; moment is always, finally, static or at (an instant)."""
 
     moment: str
     at: Node | None
@@ -220,4 +230,4 @@ class Network:
     expectations: tuple[Expectation, ...]
     goldens: tuple[Golden, ...]
     scene: Scene | None
-    shapes: dict[str, Shape] = field(default_factory=dict)  # of constraint labels, too (hull of their loops)
+    elements: tuple[ElementSetting, ...] = ()

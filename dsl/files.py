@@ -1,0 +1,219 @@
+"""The names that a file declares: domains, bundles, units, constants, functions, tables, components, models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+from sysdyn.dsl import dimensions as dim
+from sysdyn.dsl import syntax
+from sysdyn.dsl.diagnostics import Place, Related, Report, SourceText
+from sysdyn.dsl.network import Table
+from sysdyn.dsl.parse import parse
+from sysdyn.dsl.resolve import Failed, Resolver
+from sysdyn.dsl.symbols import (
+    BundleSymbol,
+    ComponentSymbol,
+    Definition,
+    DomainSymbol,
+    FunctionSymbol,
+    Scope,
+    Symbol,
+    TableSymbol,
+    Unsupported,
+    nearest,
+)
+from sysdyn.dsl.unit_reading import read_unit
+from sysdyn.dsl.units import NONE, Unit, multiply
+
+LIBRARY = Path(__file__).parent / "std"
+_MODULES = ("electrical", "mechanical", "fluid", "thermal", "transduce", "control")
+
+
+@cache
+def prelude() -> syntax.File:
+    """The file that is loaded before every other one."""
+    file, problems = parse(SourceText.read(LIBRARY / "prelude.sd", "std/prelude.sd"))
+    assert not problems, problems
+    return file
+
+
+class FileScope:
+    """A file's own names on top of the prelude's, and the values of its tables."""
+
+    def __init__(self, file: syntax.File, report: Report) -> None:
+        self.file = file
+        self.report = report
+        self.tables: dict[str, Table] = {}
+        outer = Scope()
+        self._declare(prelude(), outer)
+        self.scope = Scope(outer)
+        self._declare(file, self.scope)
+
+    def _declare(self, file: syntax.File, scope: Scope) -> None:
+        for item in file.items:
+            if isinstance(item, syntax.Broken):
+                scope.broken |= item.names
+        for item in file.items:  # units first: everything else is written in them
+            if isinstance(item, (syntax.UnitAlias, syntax.UnitBase)):
+                self._unit(item, scope, file.source)
+        for item in file.items:
+            for symbol in self._symbols(item, scope, file.source):
+                self._enter(symbol, scope)
+
+    def _enter(self, symbol: Symbol, scope: Scope) -> None:
+        before = scope.symbols.get(symbol.name)
+        if before is not None:
+            related = (Related("first declared here", before.place),)
+            self.report.error("E106", f"'{symbol.name}' is declared twice", symbol.place, related=related)
+            return
+        scope.symbols[symbol.name] = symbol
+
+    def _unit(self, item: syntax.UnitAlias | syntax.UnitBase, scope: Scope, source: SourceText) -> None:
+        name = item.name.name
+        if name in scope.units:
+            self.report.error("E106", f"unit '{name}' is declared twice", Place(source, item.name.span))
+        elif isinstance(item, syntax.UnitBase):
+            scope.units[name] = Unit(((name, 1),), Fraction(1), name)
+        else:
+            resolver = Resolver(self.report)
+            try:
+                with resolver.within(scope, source):
+                    value = resolver.scalar(item.value)
+            except Failed:
+                return
+            if value.node.op != "const" or not 0.0 < value.node.data < float("inf"):
+                message = f"unit '{name}' is not a positive constant"
+                self.report.error("E201", message, Place(source, item.value.span))
+                return
+            scope.units[name] = Unit(value.dimension or NONE, Fraction(value.node.data), name)
+
+    def _symbols(self, item: syntax.TopLevel, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        match item:
+            case syntax.Domain():
+                yield from self._domain(item, scope, source)
+            case syntax.Bundle():
+                yield BundleSymbol(item.name.name, Place(source, item.name.span))
+            case syntax.Component() | syntax.Model():
+                yield ComponentSymbol(item.name.name, Place(source, item.name.span))
+            case syntax.Const():
+                span = item.name.span
+                place = Place(source, span)
+                yield Definition(item.name.name, "const", item.value, (), None, source, place, span)
+            case syntax.Function():
+                yield FunctionSymbol(item, source, Place(source, item.name.span))
+            case syntax.Table():
+                yield from self._table(item, scope, source)
+            case syntax.Import():
+                yield from self._import(item, source)
+
+    def _import(self, item: syntax.Import, source: SourceText) -> Iterator[Symbol]:
+        names = item.module.names
+        if names[0] != "std" or len(names) != 2 or names[1] not in _MODULES:
+            text = ".".join(names)
+            near = nearest(names[-1], _MODULES)
+            place = Place(source, item.module.span)
+            help_ = f"nearest module: 'std.{near}'" if near else None
+            self.report.error("E103", f"there is no module '{text}'", place, help=help_)
+        for word in item.names:
+            yield Unsupported(word.name, "library component", Place(source, word.span))
+
+    def _domain(self, item: syntax.Domain, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        units: dict[str, Unit] = {}
+        common, pseudo = "effort", None
+        for part in item.body:
+            match part:
+                case syntax.DomainRole():
+                    unit = read_unit(part.unit, scope, source, self.report)
+                    if unit is not None:
+                        units[part.kind] = unit
+                case syntax.DomainNode():
+                    common = part.common
+                case syntax.DomainPseudo():
+                    pseudo = read_unit(part.unit, scope, source, self.report)
+        place = Place(source, item.name.span)
+        missing = [k for k in ("effort", "flow", "momentum", "displacement") if k not in units]
+        if missing:
+            self.report.error("E210", f"domain {item.name.name}: its {missing[0]} is not given", place)
+            return
+        self._check_domain(item.name.name, units, pseudo, place)
+        e, f, p, q = (units[k] for k in ("effort", "flow", "momentum", "displacement"))
+        yield DomainSymbol(item.name.name, e, f, p, q, common, pseudo is not None, place)
+
+    def _check_domain(self, name: str, units: dict[str, Unit], pseudo: Unit | None, place: Place) -> None:
+        power = multiply(units["effort"].dimension, units["flow"].dimension)
+        want = dim.POWER if pseudo is None else pseudo.dimension
+        if power != want:
+            message = f"domain {name}: effort*flow is {dim.show(power)}, not {dim.show(want)}"
+            help_ = f"fix a unit, or declare 'pseudo: {dim.show(power)}'"
+            self.report.error("E210", message, place, help=help_)
+        for code, integral, rate in (("E211", "displacement", "flow"), ("E212", "momentum", "effort")):
+            wanted = multiply(units[rate].dimension, dim.TIME)
+            if units[integral].dimension != wanted:
+                letter = "q = int f dt" if integral == "displacement" else "p = int e dt"
+                edge = "bottom" if integral == "displacement" else "top"
+                message = f"domain {name}: {integral} is not the time integral of {rate} ({edge} edge: {letter})"
+                self.report.error(code, message, place, help=f"its unit should be {dim.show(wanted)}")
+
+    def _table(self, item: syntax.Table, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        heads = [(p.name, read_unit(p.unit, scope, source, self.report)) for p in item.params]
+        result = read_unit(item.result, scope, source, self.report)
+        place = Place(source, item.name.span)
+        units = [u for _, u in heads if u is not None]
+        if result is None or len(units) != len(heads):
+            return
+        if item.rows is None:
+            self.report.error("N608", "a table from a file is not supported yet (planned: libraries)", place)
+            return
+        yield TableSymbol(
+            item.name.name,
+            tuple((n, u.dimension) for (n, _), u in zip(heads, units, strict=True)),
+            result.dimension,
+            place,
+        )
+        table = self._points(item, units, result, place)
+        if table is not None:
+            self.tables[table.name] = table
+
+    def _points(self, item: syntax.Table, units: list[Unit], result: Unit, place: Place) -> Table | None:
+        rows = item.rows or ()
+        columns = len(units) + 1
+        wrong = next((r for r in rows if len(r.numbers) != columns), None)
+        if wrong is not None:
+            message = f"a row of table {item.name.name} has {columns} numbers, {len(wrong.numbers)} given"
+            self.report.error("E206", message, Place(place.source, wrong.span))
+            return None
+        values = {
+            tuple(_scaled(n, u) for n, u in zip(r.numbers, units, strict=False)): _scaled(r.numbers[-1], result)
+            for r in rows
+        }
+        axes = tuple(tuple(sorted({key[k] for key in values})) for k in range(len(units)))
+        if len(units) == 1:
+            keys = [_scaled(r.numbers[0], units[0]) for r in rows]
+            if len(keys) < 2 or any(a >= b for a, b in zip(keys, keys[1:], strict=False)):
+                message = f"the arguments of table {item.name.name} must increase from row to row, two rows at least"
+                self.report.error("E206", message, place)
+                return None
+        elif (
+            len(units) > 2 or len(values) != len(axes[0]) * len(axes[1]) or item.interpolation not in ("linear", "hold")
+        ):
+            message = f"table {item.name.name} must be a full grid of two arguments, linear or hold"
+            self.report.error("E206", message, place)
+            return None
+        if item.extrapolation == "extend":
+            self.report.error(
+                "W302",
+                f"table '{item.name.name}' is extrapolated ('extend') beyond its data",
+                place,
+                help="clamp or stop",
+            )
+        grid = tuple(values[key] for key in sorted(values))
+        return Table(item.name.name, item.interpolation, item.extrapolation or "clamp", axes, grid, place)
+
+
+def _scaled(number: syntax.Number, unit: Unit) -> float:
+    if unit.scale == 1 and not unit.offset:
+        return number.value
+    return float(Fraction(number.text.replace(" ", "")) * unit.scale + unit.offset)

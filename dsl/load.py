@@ -1,0 +1,164 @@
+"""From a text to the checked networks of its models and scenes: the front end's list of calls."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from sysdyn.dsl import checks, syntax
+from sysdyn.dsl.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.elaborate import Elaborator
+from sysdyn.dsl.files import FileScope
+from sysdyn.dsl.network import Network, Scene
+from sysdyn.dsl.parse import parse
+from sysdyn.dsl.scenes import SceneReader
+from sysdyn.dsl.symbols import nearest
+from sysdyn.dsl.values import Values
+
+_FRAMES = 20_000  # nesting is bounded by the parser (200 levels); chains of definitions by the file's size
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A parsed file with its models and scenes by name."""
+
+    file: syntax.File
+    models: dict[str, syntax.Model]
+    scenes: dict[str, syntax.Scene]
+
+
+def read(path: str | Path, report: Report, name: str | None = None) -> Document:
+    """Parse a file; OSError where it cannot be read."""
+    return document(SourceText.read(path, name), report)
+
+
+def document(source: SourceText, report: Report) -> Document:
+    """Parse a text; what is wrong with its syntax goes to the report."""
+    file, problems = parse(source)
+    report.extend(problems)
+    models = {i.name.name: i for i in reversed(file.items) if isinstance(i, syntax.Model)}
+    scenes: dict[str, syntax.Scene] = {}
+    for item in file.items:
+        if isinstance(item, syntax.Scene):
+            if item.name.name in scenes:
+                place = Place(source, item.name.span)
+                report.error("E106", f"scene '{item.name.name}' is declared twice", place)
+            else:
+                scenes[item.name.name] = item
+    return Document(file, dict(reversed(models.items())), scenes)
+
+
+def model_of(document: Document, scene: syntax.Scene, report: Report) -> syntax.Model | None:
+    """The model that a scene is of; None after E902."""
+    name = ".".join(scene.model.names)
+    if name in document.models:
+        return document.models[name]
+    broken = any(isinstance(i, syntax.Broken) and name in i.names for i in document.file.items)
+    if not broken:
+        near = nearest(name, document.models)
+        help_ = f"nearest: '{near}'" if near else f"models here: {', '.join(document.models) or 'none'}"
+        place = Place(document.file.source, scene.model.span)
+        report.error(
+            "E902", f"scene '{scene.name.name}' is of '{name}', which is no model of this file", place, help=help_
+        )
+    return None
+
+
+def network(
+    document: Document,
+    model: syntax.Model,
+    scene: syntax.Scene | None,
+    report: Report,
+    settings: Sequence[tuple[str, str]] = (),
+    *,
+    required: bool = True,
+) -> Network | None:
+    """The network of a model under a scene; settings are (name, value) of the command line.
+
+    None where the report has errors, or N608: a network that lacks a part of the text
+    is none.  required: parameters and inputs must have values.
+    """
+    with _deep():
+        return _network(document, model, scene, report, settings, required=required)
+
+
+def _network(
+    document: Document,
+    model: syntax.Model,
+    scene: syntax.Scene | None,
+    report: Report,
+    settings: Sequence[tuple[str, str]],
+    *,
+    required: bool,
+) -> Network | None:
+    files = FileScope(document.file, report)
+    elaborator = Elaborator(files, model, report)
+    elaborator.declare()
+    reader = SceneReader(elaborator)
+    if scene is not None:
+        reader.settings(scene)
+    for name, value in settings:
+        _set(reader, name, value, report)
+    elaborator.statements()
+    read_scene: Scene | None = None
+    if scene is not None:
+        read_scene = reader.read(scene, Place(document.file.source, scene.name.span))
+    checks.run(elaborator, report, required=required)
+    known = Values(elaborator.parameters, reader.elements)
+    checks.values(elaborator, known, report)
+    if report.failed or any(d.code == "N608" for d in report):
+        return None
+    return _result(elaborator, reader, read_scene)
+
+
+def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) -> Network:
+    whole = elaborator.resolver.whole
+    return Network(
+        model=elaborator.model.name.name,
+        place=Place(elaborator.source, elaborator.model.name.span),
+        parameters=tuple(replace(p, whole=p.name in whole) for p in elaborator.parameters.values()),
+        tables=tuple(elaborator.files.tables.values()),
+        coordinates=tuple(elaborator.coordinates),
+        unknowns=tuple(elaborator.unknowns),
+        states=tuple(elaborator.states),
+        energies=tuple(elaborator.energies),
+        works=tuple(elaborator.works),
+        constraints=tuple(elaborator.constraints),
+        dynamics=tuple(elaborator.dynamics),
+        initials=tuple(elaborator.initials),
+        observations=tuple(reader.observations),
+        expectations=tuple(elaborator.expectations),
+        goldens=tuple(elaborator.goldens),
+        scene=scene,
+        elements=tuple(reader.elements),
+    )
+
+
+def _set(reader: SceneReader, name: str, value: str, report: Report) -> None:
+    """One `--set NAME=VALUE` of the command line, read as the statement of a scene."""
+    text = f"scene command_line of model {{\n  set {name} = {value}\n}}\n"
+    source = SourceText("--set", text)
+    inner = Report()
+    parsed = document(source, inner)
+    statements = [s for scene in parsed.scenes.values() for s in scene.body]
+    if len(inner) or "\n" in name + value or len(statements) != 1 or not isinstance(statements[0], syntax.Set):
+        report.extend(inner)
+        if not inner.failed:
+            report.error("E910", f"--set {name}={value} is not NAME=VALUE", source.place(0, 0))
+        return
+    with reader.resolver.within(reader.model.scope, source):
+        reader.guarded(reader.set_value, statements[0])
+
+
+@contextmanager
+def _deep() -> Iterator[None]:
+    """Room for nested expressions: frames of pure Python cost no C stack."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, _FRAMES))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)
