@@ -1,0 +1,74 @@
+"""What the runtime raises: one class an audience, each with its data in fields.
+
+`SolverFailure` the integration stopped (exit 3), `InconsistentStart` the initial values (E903, E505, E510, E519),
+`TraceError` input or output (exit 5), `ContractError` a compiled model that is none (a fault, exit 4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class RowLabel:
+    """Where a row or an initial value stands in the author's text: label, kind, element index, file, line."""
+
+    label: str
+    kind: str = ""
+    file: str = ""
+    line: int = 0
+
+    def __str__(self) -> str:
+        place = f" ({self.file}:{self.line})" if self.file else ""
+        return f"{self.label}{place}"
+
+
+class ContractError(Exception):
+    """A compiled model does not keep the contract of core/model.h."""
+
+
+class TraceError(Exception):
+    """The trace cannot be written or read."""
+
+
+class SolverFailure(Exception):
+    """The integration stopped at `time` [s] with step `step` [s].
+
+    cause: newton, error_test, singular, nonfinite, step_too_small, max_steps, max_wall, memory.
+    unknown: name of the unknown in the way, row: its row; None where the cause has no place.
+    """
+
+    def __init__(
+        self, cause: str, time: float, step: float, unknown: str | None = None, row: RowLabel | None = None
+    ) -> None:
+        self.cause, self.time, self.step, self.unknown, self.row = cause, time, step, unknown, row
+        self.partial: object = None
+        place = "".join(
+            [f", row {row}" if row else "", f", unknown {unknown}" if unknown else ""],
+        )
+        super().__init__(f"{cause} at t = {time:.17g} s, step {step:.3g} s{place}")
+
+
+class InconsistentStart(Exception):
+    """No consistent state exists at t0, or none was found.
+
+    kind: "fixed" fixed initial values contradict each other or the rows; "gamma" an effort constraint has no
+    solution; "implicit" the effort constraints do not determine an implicit unknown; "nonfinite" the residual is
+    not a number; "stuck" the iteration did not converge.
+    rows: labels in the way; residual: smallest residual reached, in the first row's unit; candidates: labels of
+    the fixed values to free, best first; names: the unknowns concerned.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        residual: float,
+        rows: tuple[RowLabel, ...] = (),
+        candidates: tuple[RowLabel, ...] = (),
+        names: tuple[str, ...] = (),
+    ) -> None:
+        self.kind, self.residual = kind, residual
+        self.rows, self.candidates, self.names = rows, candidates, names
+        where = ", ".join(map(str, rows)) or ", ".join(names)
+        free = f"; fixed values in the way: {', '.join(map(str, candidates))}" if candidates else ""
+        super().__init__(f"{kind}: residual {residual:.3g} in {where}{free}")

@@ -1,0 +1,285 @@
+"""A consistent state at t0 from fixed values and guesses.
+
+Unknowns: y as written and the derivatives that the settled rows read; equations: all settled rows (as written,
+phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.  Fixed values never move.
+Guesses move least: each step is the minimum-norm solution of the linearised rows around the *guess* (Gauss-Newton,
+in unknowns scaled by magnitude, rank-deficient rows tolerated).  Stages: positions onto phi, then flows and momenta
+onto the first derivatives, then everything.  Where the rows are singular at the guess (a valve C f|f| at rest),
+seeded perturbations of the free unknowns are tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysdyn.runtime.description import Floats
+from sysdyn.runtime.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.least_change import Problem, Solution, solve
+from sysdyn.runtime.scales import propagate
+from sysdyn.runtime.settled import rates_of
+from sysdyn.runtime.system import System
+
+Mask = NDArray[np.bool_]
+STATE = ("q", "f", "p", "s")
+_WEIGHT = {"written": 1.0, "unwritten": 0.3, "following": 1e-3}
+_AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
+EXACT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class ConsistentState:
+    """y, yd [unknowns as written] at t; residual: largest scaled row.
+
+    moved: (name, guess, value, "asked for by ...") of written guesses that moved.  freedom: how many more
+    fixed values the state would take, guesses: names of the free unknowns among which.
+    """
+
+    t: float
+    y: Floats
+    yd: Floats
+    moved: tuple[tuple[str, float, float, str], ...]
+    residual: float
+    freedom: int
+    guesses: tuple[str, ...]
+
+    def for_form(self, system: System) -> tuple[Floats, Floats]:
+        """y, yd in the layout of an index form: new multipliers are zero."""
+        y, yd = np.zeros(system.unknowns), np.zeros(system.unknowns)
+        y[: self.y.size], yd[: self.y.size] = self.y, self.yd
+        return y, yd
+
+
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """The initial values on y: guess [unknowns], fixed and written masks, label of each written one."""
+
+    guess: Floats
+    fixed: Mask
+    written: Mask
+    label: Mapping[int, RowLabel]
+
+
+def _given(system: System) -> _Given:
+    n = system.form.written
+    guess, fixed, written = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    label: dict[int, RowLabel] = {}
+    for item in sorted(system.description.initial, key=lambda item: item.fixed):
+        places = system.form.at[item.family] + item.positions
+        for place, value in zip(places[fixed[places]], item.values[fixed[places]], strict=True):
+            if item.fixed and abs(guess[place] - value) > 1e-12 * max(abs(value), abs(guess[place])):
+                raise InconsistentStart(
+                    "fixed", abs(guess[place] - value), (), (label[int(place)], item.label), (system.name(int(place)),)
+                )
+        guess[places] = item.values
+        fixed[places] |= item.fixed
+        written[places] = True
+        label.update(dict.fromkeys(places.tolist(), item.label))
+    return _Given(guess, fixed, written, label)
+
+
+class Starter:
+    """The equations of the start of one model (t0 apart)."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.settled = system.another("start")
+        self.rates = rates_of(self.settled)
+        self.given = _given(system)
+        self.n = system.form.written
+        self.kinds = system.kinds[: self.n]
+        pattern = self.settled.pattern
+        columns = pattern.columns_of()
+        rate_at = np.full(self.n, -1, dtype=np.int64)
+        rate_at[self.rates] = self.n + np.arange(self.rates.size)
+        self._rated = rate_at[columns] >= 0
+        self.rows = np.concatenate([pattern.row, pattern.row[self._rated]]).astype(np.int64)
+        self.columns = np.concatenate([columns, rate_at[columns[self._rated]]])
+
+    def expand(self, x: Floats) -> tuple[Floats, Floats]:
+        """y, yd of x = (y, chosen derivatives)."""
+        y, yd = x[: self.n].copy(), np.zeros(self.n)
+        yd[self.rates] = x[self.n :]
+        form = self.system.form
+        yd[form.k_q] = y[form.k_f]
+        return y, yd
+
+    def residual(self, t: float, x: Floats) -> Floats:
+        """All rows [rows]."""
+        return self.settled.residual(t, *self.expand(x))
+
+    def jacobian(self, t: float, x: Floats) -> Floats:
+        """Values at (self.rows, self.columns)."""
+        jy, jyd = self.settled.jacobian(t, *self.expand(x))
+        return np.concatenate([jy, jyd[self._rated]])
+
+    def groups(self, *names: str) -> Mask:
+        """Rows of the named groups."""
+        mask = np.zeros(self.settled.rows, dtype=bool)
+        for group, family, first in self.settled.form.groups:
+            if group in names:
+                mask[first : first + self.settled.description.rows[family].size] = True
+        return mask
+
+    def following(self, t: float, x: Floats) -> Mask:
+        """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia."""
+        jy, jyd = self.system.jacobian(t, *self.expand(x))
+        carries = self.system.differential(jyd)[: self.n] & np.isin(self.kinds, STATE)
+        carries |= self.given.written & np.isin(self.kinds, STATE)
+        return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
+
+    def scale(self, t: float, x: Floats) -> Floats:
+        """Magnitudes of x, found by balancing rows where the guess is zero."""
+        known = np.abs(x)
+        nominal = self.system.nominal[: self.n]
+        known[: self.n] = np.where(nominal > 0.0, nominal, known[: self.n])
+        values = np.abs(self.jacobian(t, x))
+        free = np.abs(self.residual(t, x))
+        values, free = (np.where(np.isfinite(item), item, 0.0) for item in (values, free))
+        found = propagate(known, self.rows, self.columns, values, free)
+        for kind in np.unique(self.kinds):
+            members = np.flatnonzero(self.kinds == kind)
+            largest = found[members].max(initial=0.0)
+            found[members] = np.maximum(found[members], 1e-3 * largest)
+        return np.where(found > 1e-280, found, 1.0)
+
+
+def _problem(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask) -> Problem:
+    """The equations `rows` in the unknowns `free`, the others as in x."""
+    follows = starter.following(t, x)
+    weight = np.full(x.size, _WEIGHT["unwritten"])
+    weight[: starter.n][starter.given.written] = _WEIGHT["written"]
+    weight[follows] = _WEIGHT["following"]
+    return Problem(
+        residual=lambda z: starter.residual(t, z),
+        jacobian=lambda z: starter.jacobian(t, z),
+        rows=starter.rows,
+        columns=starter.columns,
+        number=starter.settled.rows,
+        use=rows,
+        free=free,
+        guess=guess,
+        scale=starter.scale(t, x),
+        weight=weight,
+    )
+
+
+def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
+    """Positions, then first derivatives: a good place from which to solve for everything."""
+    kinds = np.concatenate([starter.kinds, np.full(starter.rates.size, "rate")])
+    for groups, moving in (
+        (("phi",), ("q",)),
+        (("phi", "phi_rate", "psi", "momentum"), ("q", "f", "p")),
+    ):
+        rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
+        if not rows.any() or not may.any():
+            continue
+        found = solve(_problem(starter, t, x, guess, rows, may), x)
+        if found.residual < EXACT:
+            x = found.x
+    return x
+
+
+def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> Solution:
+    """Everything at once from the staged point, then from perturbed ones."""
+    every = np.ones(starter.settled.rows, dtype=bool)
+    x = _stages(starter, t, guess.copy(), guess, free)
+    problem = _problem(starter, t, x, guess, every, free)
+    best = solve(problem, x)
+    random = np.random.default_rng(20)
+    for amplitude in _AMPLITUDES:
+        if best.residual < EXACT:
+            break
+        shaken = x + np.where(free, amplitude * problem.scale * random.standard_normal(x.size), 0.0)
+        found = solve(problem, shaken)
+        if found.residual < best.residual:
+            best = found
+    return best
+
+
+def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
+    """Labels of the constraint rows that an unknown stands in."""
+    found: list[str] = []
+    values = starter.jacobian(t, x)
+    hit = np.unique(starter.rows[(starter.columns == place) & (values != 0.0)])
+    for row in hit:
+        label = starter.settled.row_label(int(row))
+        base = label.kind.split("_")[0]
+        text = f"{base} {label.label}"
+        if base in ("phi", "psi", "gamma", "momentum", "initial") and text not in found:
+            found.append(text)
+    return "asked for by " + ", ".join(found[:4]) if found else "asked for by the balance of efforts"
+
+
+def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[str, float, float, str], ...]:
+    given = starter.given
+    change = np.abs(x[: starter.n] - given.guess)
+    places = np.flatnonzero(given.written & ~given.fixed & (change > 1e-9 * np.maximum(np.abs(given.guess), 1e-3 * scale[: starter.n])))
+    return tuple(
+        (starter.system.name(int(k)), float(given.guess[k]), float(x[k]), _asked(starter, t, x, int(k)))
+        for k in places[:100]
+    )
+
+
+def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
+    """Why there is no consistent state: rows in the way, and the fixed values that would have to move."""
+    if not np.isfinite(best.residual):
+        bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
+        rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
+        return InconsistentStart("nonfinite", float("inf"), rows)
+    raw = np.abs(starter.residual(t, best.x))
+    order = np.argsort(-best.scaled)
+    worst = [int(row) for row in order[:5] if best.scaled[row] > 0.1 * best.scaled[order[0]]]
+    rows = tuple(dict.fromkeys(starter.settled.row_label(row) for row in worst))
+    freed = _attempt(starter, t, guess, np.ones_like(free))
+    candidates: tuple[RowLabel, ...] = ()
+    if freed.residual < EXACT:
+        scale = starter.scale(t, freed.x)
+        change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
+        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
+        candidates = tuple(dict.fromkeys(starter.given.label[k] for k in places))
+    kind = "fixed"
+    if not candidates:
+        kind = "gamma" if rows and rows[0].kind.startswith("gamma") else "stuck"
+        if rows and rows[0].kind.startswith(("phi", "psi", "initial")):
+            kind = "fixed"
+    return InconsistentStart(kind, float(raw[order[0]]), rows, candidates)
+
+
+def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tuple[str, ...]]:
+    """How many fixed values are missing, and the free unknowns that could take them (dense; else unknown: 0)."""
+    if x.size > 400:
+        return 0, ()
+    scale = starter.scale(t, x)
+    full = np.zeros((starter.settled.rows, x.size))
+    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(t, x) * scale[starter.columns])
+    size = np.abs(full).max(axis=1, initial=0.0)
+    full /= np.where(size > 0.0, size, 1.0)[:, None]
+    carries = ~starter.following(t, x) & free
+    follows = free & ~carries
+    if not carries.any():
+        return 0, ()
+    inner = np.linalg.matrix_rank(full[:, follows], tol=1e-9) if follows.any() else 0
+    missing = int(carries.sum()) - (int(np.linalg.matrix_rank(full[:, free], tol=1e-9)) - int(inner))
+    names = tuple(starter.system.name(int(k)) for k in np.flatnonzero(carries)) if missing > 0 else ()
+    return missing, names
+
+
+def consistent_start(system: System, t0: float) -> ConsistentState:
+    """A state at t0 that satisfies all rows and their hidden derivatives.
+
+    system: any index form of the model.  Raises InconsistentStart.
+    """
+    starter = Starter(system if system.form.name == "3" else system.another("3"))
+    guess = np.concatenate([starter.given.guess, np.zeros(starter.rates.size)])
+    free = np.concatenate([~starter.given.fixed, np.ones(starter.rates.size, dtype=bool)])
+    best = _attempt(starter, t0, guess, free)
+    if not best.residual < EXACT:
+        raise _explain(starter, t0, guess, free, best)
+    y, yd = starter.expand(best.x)
+    freedom, names = _freedom(starter, t0, best.x, free)
+    moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
+    return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)
