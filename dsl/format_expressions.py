@@ -44,7 +44,10 @@ def format_unit(unit: s.Unit) -> str:
 
 
 def pieces(expr: s.Expr | s.Range) -> list[str]:
-    """The text of an expression in pieces; a line may be broken after a piece that ends with a space."""
+    """The text of an expression in pieces, which `layout` puts into lines.
+
+    A quantity before `/ name` or `^` keeps its distance, or its unit would swallow what follows.
+    """
     out: list[str] = []
     stack: list[Part] = [(expr, _CONDITIONAL)]
     after_unit = False
@@ -62,7 +65,10 @@ def pieces(expr: s.Expr | s.Range) -> list[str]:
         if _LEVELS.get(type(node), _ATOM) < level:
             stack.extend((")", (node, _CONDITIONAL), "("))
             continue
-        after_unit = isinstance(node, s.Quantity)
+        if isinstance(node, s.Quantity):
+            out.append(f"{node.text} {format_unit(node.unit)}")
+            after_unit = True
+            continue
         stack.extend(reversed(_PARTS[type(node)](node)))
     return out
 
