@@ -169,7 +169,7 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """`expect moment: left op right within d`; moment is always, finally, static or at (an instant)."""
+    """`expect moment: left op right within d`; moment is always, finally, at (an instant) or static."""
 
     moment: str
     at: Node | None
@@ -228,6 +228,7 @@ class Network:
     initials: tuple[Initial, ...]
     observations: tuple[Observation, ...]
     expectations: tuple[Expectation, ...]
+    statics: tuple[Expectation, ...]  # on static quantities, parameters `static dof` etc.
     goldens: tuple[Golden, ...]
     scene: Scene | None
     elements: tuple[ElementSetting, ...] = ()
