@@ -1,0 +1,102 @@
+"""Network -> CompiledModel: the list of arrows, each timed.
+
+    energies -> integration -> lagrangian | hamiltonian -> program -> C or NumPy text
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sysdyn.compiler import binding as binding_
+from sysdyn.compiler import build, descriptor, energies, manifest
+from sysdyn.compiler import program as program_
+from sysdyn.compiler.binding import Binding, Overrides
+from sysdyn.compiler.checks import check_energies
+from sysdyn.compiler.descriptor import DescriptorForm
+from sysdyn.compiler.emit_c import emit_c
+from sysdyn.compiler.emit_numpy import emit_numpy
+from sysdyn.compiler.energies import EnergyModel
+from sysdyn.compiler.hamiltonian import hamiltonian
+from sysdyn.compiler.integration import integrate
+from sysdyn.compiler.lagrangian import lagrangian
+from sysdyn.compiler.program import Program
+from sysdyn.dsl.diagnostics import Diagnostic, ModelError
+from sysdyn.dsl.network import Network
+
+FORMULATIONS: dict[str, Callable[[EnergyModel], DescriptorForm]] = {
+    "lagrangian": lagrangian,
+    "hamiltonian": hamiltonian,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Wall and CPU seconds of one stage."""
+
+    stage: str
+    wall: float
+    cpu: float
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledModel:
+    """A model in one formulation: every stage's value, the generated text, and how long each stage took."""
+
+    network: Network
+    energies: EnergyModel
+    form: DescriptorForm
+    program: Program
+    backend: str
+    text: str
+    notes: tuple[Diagnostic, ...]
+    timings: tuple[Timing, ...]
+
+    def bind(self, overrides: Overrides | None = None) -> Binding:
+        """The numbers for one set of parameter values; never recompiles."""
+        return binding_.bind(self.network, self.form, self.program, overrides)
+
+    def manifest(self, binding: Binding, index: int | None = None) -> dict[str, Any]:
+        """The object of manifest.json."""
+        return manifest.manifest(self.network, self.form, self.program, binding, index)
+
+    def structure(self) -> dict[str, Any]:
+        """The manifest's `structure` alone."""
+        return manifest.structure(self.form, self.program)
+
+    def library(self) -> Path:
+        """The compiled library of the C text; `build.NoCompiler` where there is no compiler."""
+        return build.build(self.text)
+
+
+def compile_network(
+    network: Network, formulation: str = "lagrangian", backend: str = "c", *, integrating: bool = True
+) -> CompiledModel:
+    """Lower a checked network; ModelError with everything the energies' rules found."""
+    timings: list[Timing] = []
+    with _timed("energies", timings):
+        model = energies.energies(network)
+        energies.verify_energies(model)
+        model, notes = integrate(model) if integrating else (model, ())
+        found = check_energies(model, network)
+        if any(d.severity == "error" for d in found):
+            raise ModelError(found)
+    with _timed("descriptor", timings):
+        form = FORMULATIONS[formulation](model)
+        descriptor.verify_descriptor(form)
+    with _timed("program", timings):
+        program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))
+    with _timed("emit", timings):
+        text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
+    return CompiledModel(network, model, form, program, backend, text, (*notes, *found), tuple(timings))
+
+
+@contextmanager
+def _timed(stage: str, timings: list[Timing]) -> Iterator[None]:
+    wall, cpu = time.perf_counter(), time.process_time()
+    yield
+    timings.append(Timing(stage, time.perf_counter() - wall, time.process_time() - cpu))
