@@ -16,6 +16,8 @@ from sysdyn.runtime.system import System
 
 GROUP = 1e-3
 SPAN = 1e-2
+NOISE = 1e-6
+"""Values below this part of what balances their rows are round-off, or zero by chance."""
 _SAMPLES = 16
 _SWEEPS = 8
 
@@ -75,12 +77,14 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     known = np.maximum(known, GROUP * _groups(system, known))
     known = np.where(np.isfinite(known), known, 0.0)
     found = np.where(system.nominal > 0.0, system.nominal, known)
-    if (found == 0.0).any():
-        jy, jyd = system.jacobian(t0, y, yd)
-        size = np.abs(jy) + np.abs(jyd) / (SPAN * span)
-        excited = excitation(system, t0, t_end, y, yd)
-        size = np.where(np.isfinite(size), size, 0.0)
-        found = propagate(found, system.pattern.row, system.pattern.columns_of(), size, excited)
+    jy, jyd = system.jacobian(t0, y, yd)
+    size = np.abs(jy) + np.abs(jyd) / (SPAN * span)
+    size = np.where(np.isfinite(size), size, 0.0)
+    excited = excitation(system, t0, t_end, y, yd)
+    pattern = system.pattern
+    # what follows from the state is balanced against it, so that round-off of a start does not pass for a magnitude
+    balanced = propagate(np.where(state, found, 0.0), pattern.row, pattern.columns_of(), size, excited)
+    found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, _groups(system, found), found)
     tiny = np.finfo(np.float64).tiny * 1e30
     return np.where(found > tiny, found, 1.0)

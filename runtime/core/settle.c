@@ -74,6 +74,11 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
     memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
     memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
     settle->ready = 0;
+    for (int32_t j = 0; j < n + rates; j++) { /* magnitudes grow with what is met */
+        double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
+        if (size > settle->scale[j] && isfinite(size))
+            settle->scale[j] = size;
+    }
     for (int32_t j = 0; j < n; j++) /* scale of yd at [step] for the moment */
         settle->step[j] = 0.0;
     for (int32_t k = 0; k < rates; k++)
