@@ -74,7 +74,9 @@ class _Lowering:
 
     def _families(self) -> list[Unknowns]:
         m = self.model
-        seen = observed(m, self.carriers)
+        # an integrated psi makes nothing tangible, but its displacements are variables
+        held = {n.data[0] for row in m.of_kind("phi") for t in row.terms for n in local_variables(t.expression, "q")}
+        seen = observed(m, self.carriers) | held
         found = [
             Unknowns(c.name, "q", c.name, c.units["q"], c.place)
             for c in m.coordinates

@@ -45,10 +45,10 @@ def add_observations(assembly: Assembly, model: EnergyModel, carriers: frozenset
         name, known = quantity.name, slope is not None
         unit, place = quantity.unit, quantity.place
         assembly.family(Equations("observe", name, name, "observe", unit, place, known, quantity.stored))
-        for term in split(expression, (), place):
+        for term in split(expression, (), place, read=True):
             assembly.add("observe", name, (), term.loops, term.expression)
             assembly.add("observe_scale", name, (), term.loops, call("abs", term.expression))
-        for term in split(slope, (), place) if slope is not None else ():
+        for term in split(slope, (), place, read=True) if slope is not None else ():
             assembly.add("observe_rate", name, (), term.loops, term.expression)
 
 

@@ -44,7 +44,8 @@ class Oracle:
             for summand in kernel.rows:
                 roots = (*summand.at, summand.expression)
                 *at, values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, t, y, yd))
-                np.add.at(r, self.to[summand.row] + self._position(self.binding.row_shapes[summand.row], at), values)
+                where = self._position(self.binding.row_shapes[summand.row], at)
+                np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), values)
         return r
 
     def magnitudes(self, block: str, t: float, y: Array, yd: Array) -> Array:
@@ -58,7 +59,7 @@ class Oracle:
                 *at, = over(kernel.nest, (*summand.at, *terms), lambda n, a: self._leaf(n, a, t, y, yd))
                 where = self._position(self.binding.row_shapes[summand.row], at[: len(summand.at)])
                 for c, values in zip(scales, at[len(summand.at) :], strict=True):
-                    np.add.at(r, self.to[summand.row] + where, np.abs(c * values))
+                    np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), np.abs(c * values))
         return r
 
     def entries(self, block: str, order: int, t: float, y: Array, yd: Array) -> tuple[Array, Array, Array]:

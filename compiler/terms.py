@@ -78,10 +78,11 @@ def has_reduction(root: Node) -> bool:
     return any(node.op == "reduce" for node in topological([root]))
 
 
-def split(root: Node, loops: Nest, place: Place) -> tuple[Term, ...]:
+def split(root: Node, loops: Nest, place: Place, *, read: bool = False) -> tuple[Term, ...]:
     """The terms of a canonical expression: top-level sums taken apart, top-level sums over ranges made loops.
 
-    Terms under one nest that are parameters and constants only are kept: a constraint needs them.
+    A product of two sums over ranges becomes a double loop, because its terms are differentiated; where the expression
+    is only `read`, it stays a product.
     """
     found: list[Term] = []
     work: deque[tuple[float, Node, Node, Nest]] = deque([(1.0, const(1.0), root, loops)])
@@ -97,9 +98,9 @@ def split(root: Node, loops: Nest, place: Place) -> tuple[Term, ...]:
             own = counter(len(nest))
             deeper = (*nest, Loop(f"#{len(nest)}", first, last))
             work.append((factor, by, substitute(body, {index(node.data[1]): own}), deeper))
-        elif node.op == "mul" and (parts := _linear_factor(node)):
+        elif node.op == "mul" and (parts := _linear_factor(node)) and not (read and has_reduction(parts[0])):
             work.append((factor, mul(by, parts[0]), parts[1], nest))
-        elif has_reduction(by):
+        elif has_reduction(by) and not read:
             work.append((factor, const(1.0), mul(by, node), nest))
         else:
             found.append(Term(product(factor, ((1.0, by), (1.0, node))), nest, place))

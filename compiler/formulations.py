@@ -1,0 +1,70 @@
+"""Which formulations can express a network, and the one that `auto` takes.
+
+E601 to E604 name the statement in the way: the complementary family needs laws and constraints that do not depend on
+displacements (book 5.14), and coordinates of one style serve one family.
+"""
+
+from __future__ import annotations
+
+from sysdyn.dsl.diagnostics import Diagnostic, Place, Related
+from sysdyn.dsl.expression import Node, variables
+from sysdyn.dsl.network import Network
+
+PRIMAL = ("lagrangian", "hamiltonian")
+COMPLEMENTARY = ("co_lagrangian", "co_hamiltonian")
+
+
+def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tuple[Diagnostic, ...]]:
+    """The formulation to use for `wanted` (auto or a name); diagnostics where it cannot be.
+
+    auto takes Hamilton's form where the author gave kinetic energies T(p), else Lagrange's.
+    """
+    co = [c for c in network.coordinates if c.complementary]
+    if co and len(co) < len(network.coordinates):
+        related = (Related(f"cocoordinate {co[0].name}", co[0].place),)
+        message = "no formulation satisfies all statements: coordinates and cocoordinates in one model"
+        return "lagrangian", (Diagnostic("E604", message, network.place, "one system is written in one family", related),)
+    if wanted == "kane":
+        message = "formulation kane is not supported yet (planned: four formulations)"
+        return "lagrangian", (Diagnostic("N608", message, place or network.place),)
+    if co:
+        return _complementary(network, wanted, place)
+    if wanted in COMPLEMENTARY:
+        return "lagrangian", (_obstacle(network, wanted, place),)
+    if wanted == "auto":
+        return ("hamiltonian" if any(e.function == "T" for e in network.energies) else "lagrangian"), ()
+    return wanted, ()
+
+
+def _complementary(network: Network, wanted: str, place: Place | None) -> tuple[str, tuple[Diagnostic, ...]]:
+    name = next(c for c in network.coordinates if c.complementary)
+    if wanted in PRIMAL:
+        message = f"{wanted} of a model with the cocoordinate '{name.name}'"
+        related = (Related("a momentum coordinate", name.place),)
+        return wanted, (Diagnostic("E603", message, place or name.place, "co_lagrangian, co_hamiltonian", related),)
+    message = "the complementary formulations are not supported yet (planned: four formulations)"
+    return "lagrangian", (Diagnostic("N608", message, place or name.place),)
+
+
+def _unknowns(node: Node, kind: str) -> list[Node]:
+    return sorted((n for n in variables(node) if n.op == "var" and n.data[1] == kind), key=lambda n: n.number)
+
+
+def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic:
+    """The first statement that keeps a model with `coord` out of the complementary family."""
+    help_ = "formulation lagrangian, hamiltonian"
+    for energy in network.energies:
+        rates = _unknowns(energy.expression, "f") + _unknowns(energy.expression, "p")
+        displacements = _unknowns(energy.expression, "q")
+        if energy.function in ("T*", "T") and rates and displacements:
+            message = f"not expressible in {wanted}: {energy.function} depends on displacement {displacements[0]}"
+            return Diagnostic("E601", f"{message} and on {rates[0]}", energy.place, help_)
+    for constraint in network.constraints:
+        displacements = _unknowns(constraint.expression, "q")
+        if displacements:
+            label = f"{constraint.kind} {constraint.name}"
+            message = f"not expressible in {wanted}: {label} depends on displacement {displacements[0]}"
+            return Diagnostic("E602", message, constraint.place, help_)
+    first = network.coordinates[0] if network.coordinates else None
+    message = f"{wanted} of a model with 'coord'" + (f" ('{first.name}')" if first else "")
+    return Diagnostic("E603", message, place or (first.place if first else network.place), "network style expresses both")
