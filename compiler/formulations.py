@@ -23,7 +23,9 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
     if co and len(co) < len(network.coordinates):
         related = (Related(f"cocoordinate {co[0].name}", co[0].place),)
         message = "no formulation satisfies all statements: coordinates and cocoordinates in one model"
-        return "lagrangian", (Diagnostic("E604", message, network.place, "one system is written in one family", related),)
+        return "lagrangian", (
+            Diagnostic("E604", message, network.place, "one system is written in one family", related),
+        )
     if wanted == "kane":
         message = "formulation kane is not supported yet (planned: four formulations)"
         return "lagrangian", (Diagnostic("N608", message, place or network.place),)
@@ -67,4 +69,6 @@ def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic:
             return Diagnostic("E602", message, constraint.place, help_)
     first = network.coordinates[0] if network.coordinates else None
     message = f"{wanted} of a model with 'coord'" + (f" ('{first.name}')" if first else "")
-    return Diagnostic("E603", message, place or (first.place if first else network.place), "network style expresses both")
+    return Diagnostic(
+        "E603", message, place or (first.place if first else network.place), "network style expresses both"
+    )

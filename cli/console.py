@@ -1,0 +1,85 @@
+"""What a command shows: diagnostics and messages on standard error, data or one JSON object on standard output."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import click
+
+from sysdyn.cli.failures import envelope
+from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Report
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Console:
+    """The output of one command."""
+
+    def __init__(self, command: str, *, as_json: bool, quiet: bool, color: str) -> None:
+        self.command = command
+        self.as_json = as_json
+        self.quiet = quiet
+        plain = bool(os.environ.get("NO_COLOR")) or not sys.stderr.isatty()
+        self.color = color == "always" or (color == "auto" and not plain)
+        self.report = Report()
+        self.result: dict[str, Any] = {}
+
+    def say(self, message: str) -> None:
+        """A message for the person at the terminal."""
+        if not (self.quiet or self.as_json):
+            print(message, file=sys.stderr)
+
+    def data(self, text: str) -> None:
+        """Data that was asked for."""
+        if not self.as_json:
+            sys.stdout.write(text if text.endswith("\n") else text + "\n")
+
+    def finish(self, code: int = 0) -> int:
+        """Show the findings; the exit code (1 where there are errors)."""
+        found = self.report.diagnostics
+        if code == 0 and self.report.failed:
+            code = 1
+        if self.as_json:
+            print(json.dumps(envelope(self.command, code, [d.to_json() for d in found], self.result), allow_nan=False))
+        else:
+            self._render(found)
+        return code
+
+    def _render(self, found: Iterable[Diagnostic]) -> None:
+        from sysdyn.dsl.render import render
+
+        shown = [d for d in found if not self.quiet or d.severity == "error"]
+        for diagnostic in shown:
+            print(render(diagnostic, color=self.color), file=sys.stderr)
+        errors = sum(d.severity == "error" for d in shown)
+        if errors > 1:
+            print(f"{errors} errors", file=sys.stderr)
+
+
+def with_console(name: str) -> Callable[[F], Callable[..., Any]]:
+    """Add --json, --quiet and --color; the command receives a Console and returns the exit code."""
+
+    def decorate(function: F) -> Callable[..., Any]:
+        @click.option("--json", "as_json", is_flag=True, help="Print one JSON object (version 1).")
+        @click.option("-q", "--quiet", is_flag=True, help="Errors only.")
+        @click.option("--color", type=click.Choice(["auto", "always", "never"]), default="auto", help="Coloured messages.")
+        def command(as_json: bool, quiet: bool, color: str, **options: Any) -> int:
+            console = Console(name, as_json=as_json, quiet=quiet, color=color)
+            try:
+                code = function(console, **options)
+            except ModelError as error:
+                console.report.extend(error.diagnostics)
+                return console.finish(1)
+            assert isinstance(code, int)
+            return code
+
+        command.__doc__ = function.__doc__
+        for parameter in reversed(getattr(function, "__click_params__", [])):
+            command.__dict__.setdefault("__click_params__", []).append(parameter)
+        return click.command(name)(command)
+
+    return decorate

@@ -1,0 +1,78 @@
+"""From an exception to a message and an exit code: the only place that knows both."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+USAGE, SOLVER, FAULT, INPUT_OUTPUT, INTERRUPTED = 2, 3, 4, 5, 130
+
+
+class UsageError(click.UsageError):
+    """Wrong usage that is found after the options are read."""
+
+
+def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
+    """Print what went wrong (as JSON where asked for) and return the exit code."""
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else 1
+    code, message = _classify(error)
+    if "--json" in arguments:
+        command = next((a for a in arguments if not a.startswith("-")), None)
+        print(json.dumps(envelope(command, code, [_plain(message, code)], {})))
+    elif code == INTERRUPTED:
+        print("interrupted", file=sys.stderr)
+    else:
+        print(f"sysdyn: {message}", file=sys.stderr)
+        if isinstance(error, click.UsageError) and error.ctx is not None:
+            print(f"try '{error.ctx.command_path} --help'", file=sys.stderr)
+    if code == FAULT and os.environ.get("SYSDYN_DEBUG"):
+        traceback.print_exception(error)
+    return code
+
+
+def _classify(error: BaseException) -> tuple[int, str]:
+    if isinstance(error, (KeyboardInterrupt, click.Abort)):
+        return INTERRUPTED, "interrupted"
+    if isinstance(error, click.UsageError):
+        return USAGE, error.format_message()
+    if isinstance(error, click.ClickException):
+        return INPUT_OUTPUT, error.format_message()
+    if isinstance(error, BrokenPipeError):
+        _silence()
+        return 0, "the reader of the output went away"
+    if isinstance(error, OSError):
+        name = f"{error.filename}: " if error.filename else ""
+        return INPUT_OUTPUT, f"{name}{error.strerror or error}"
+    if type(error).__name__ == "TraceError":
+        return INPUT_OUTPUT, str(error)
+    return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} (SYSDYN_DEBUG=1 shows where; please report it)"
+
+
+def _silence() -> None:
+    """Python flushes standard output at exit: give it a place that takes it."""
+    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, PTH123
+
+
+def _plain(message: str, code: int) -> dict[str, object]:
+    """A finding without a place in a text."""
+    kinds = {USAGE: "usage", SOLVER: "solver", FAULT: "fault", INPUT_OUTPUT: "input_output", INTERRUPTED: "interrupted"}
+    fields = dict.fromkeys(("help", "file", "line", "column", "end_line", "end_column"))
+    return {"code": kinds.get(code, "error"), "severity": "error", "message": message, **fields, "related": []}
+
+
+def envelope(command: str | None, code: int, diagnostics: Sequence[object], result: object) -> dict[str, object]:
+    """The object that --json prints, version 1."""
+    return {
+        "version": 1,
+        "command": command,
+        "ok": code == 0,
+        "exit": code,
+        "diagnostics": list(diagnostics),
+        "result": result,
+    }

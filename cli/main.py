@@ -1,0 +1,79 @@
+"""The `sysdyn` command: a group whose commands are imported only when one of them runs."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+
+import click
+
+COMMANDS = {
+    "check": "Check models: everything that needs no time integration.",
+    "compile": "Write the residual module and its manifest.",
+    "explain": "Say what a diagnostic code means.",
+    "fmt": "Bring model texts into the canonical layout.",
+    "plot": "Draw quantities of a trace.",
+    "simulate": "Run a scene: text in, trace out.",
+}
+
+
+class Group(click.Group):
+    """Knows its commands by name; imports `sysdyn.cli.<name>` when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of the alphabet."""
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"sysdyn.cli.{cmd_name}_command")
+        found = module.command
+        assert isinstance(found, click.Command)
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands, without importing one."""
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted(COMMANDS.items()))
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Name the nearest command where there is none of that name."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            import difflib
+
+            near = difflib.get_close_matches(args[0], COMMANDS, 1)
+            hint = f" Did you mean '{near[0]}'?" if near else f" There are {', '.join(sorted(COMMANDS))}."
+            raise click.UsageError(f"There is no command '{args[0]}'.{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="sysdyn", prog_name="sysdyn")
+def group() -> None:
+    """Compile and run models of physical systems written in .sd files.
+
+    Exit codes: 0 done, 1 the model has errors or an expectation failed, 2 wrong usage, 3 the solver failed,
+    4 a fault in sysdyn, 5 input or output, 130 interrupted.
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit with its code."""
+    sys.exit(run(arguments))
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = group.main(given, prog_name="sysdyn", standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except BaseException as error:
+        from sysdyn.cli.failures import report_failure
+
+        return report_failure(error, given)

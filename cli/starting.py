@@ -1,0 +1,134 @@
+"""The consistent start as the author should see it: what was moved, what stands in the way (E903, E505, E510, E519)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysdyn.cli.prepare import Prepared, place_at
+from sysdyn.dsl import expression as ex
+from sysdyn.dsl.diagnostics import Place, Related, Report
+from sysdyn.dsl.network import Expectation
+from sysdyn.runtime.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.start import ConsistentState, consistent_start
+from sysdyn.runtime.structure import Structure, structure
+from sysdyn.runtime.system import System
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """A model at its start."""
+
+    system: System
+    state: ConsistentState
+    facts: Structure
+
+
+def start(prepared: Prepared, t0: float, report: Report) -> Started | None:
+    """The consistent start and the structural facts there; None where the report says what is in the way."""
+    system = System(prepared.manifest, prepared.arrays, prepared.carrier)
+    try:
+        state = consistent_start(system, t0)
+    except InconsistentStart as error:
+        _inconsistent(prepared, error, report)
+        return None
+    facts = structure(system, state)
+    _structural(prepared, facts, report)
+    _statics(prepared, facts, report)
+    return Started(system, state, facts)
+
+
+def described(state: ConsistentState) -> list[str]:
+    """What the start moved, a line each."""
+    return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
+
+
+def _place(prepared: Prepared, label: RowLabel) -> Place:
+    return place_at(prepared.network, label.file, label.line)
+
+
+def _inconsistent(prepared: Prepared, error: InconsistentStart, report: Report) -> None:
+    where = _place(prepared, error.rows[0]) if error.rows else prepared.network.place
+    names = ", ".join(dict.fromkeys(r.label for r in error.rows)) or ", ".join(error.names)
+    unit = f"residual {error.residual:.3g}"
+    related = tuple(Related("this value is fixed", _place(prepared, c)) for c in error.candidates)
+    free = ", ".join(f"'{c.label}'" for c in error.candidates)
+    match error.kind:
+        case "gamma":
+            message = f"gamma '{names}' has no solution at the start: the residual cannot fall below {error.residual:.3g}"
+            report.error("E519", message, where, related=related)
+        case "implicit":
+            message = f"the gammas do not determine {', '.join(error.names)} at the start"
+            report.error("E505", message, where)
+        case "nonfinite":
+            message = f"{names} is not a number at the initial values: a root or logarithm out of its range?"
+            report.error("E519", message, where, help="other guesses: init ... ~ ...")
+        case _ if error.candidates:
+            message = f"fixed initial values contradict {names}: {unit}"
+            report.error("E903", message, where, help=f"free one of {free}: '~' for '='", related=related)
+        case "fixed":
+            report.error("E510", f"the constraints contradict each other at the start: {unit} in {names}", where)
+        case _:
+            message = f"no consistent start was found: {unit} in {names}"
+            report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
+
+
+def _structural(prepared: Prepared, facts: Structure, report: Report) -> None:
+    if facts.redundant:
+        first = facts.dependent[0][0] if facts.dependent else None
+        where = _place(prepared, first) if first else prepared.network.place
+        group = ", ".join(f"{label.label} ({weight:+.3g})" for label, weight in facts.dependent)
+        plural = "s" if facts.redundant > 1 else ""
+        message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
+        report.error("E509", message, where, help="delete one of them")
+    elif facts.undetermined:
+        names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
+        message = f"the equations do not determine {names}"
+        report.error("E516", message, prepared.network.place, help="inertia, stiffness, dissipation or a constraint is missing")
+
+
+def _statics(prepared: Prepared, facts: Structure, report: Report) -> None:
+    """`expect static`: claims about counts (E909)."""
+    known = {
+        "coordinates": facts.coordinates,
+        "m1": facts.m1,
+        "m2": facts.m2,
+        "dof": facts.dof,
+        "configuration_dof": facts.configuration_dof,
+        "redundant": facts.redundant,
+        "index": facts.index,
+    }
+    for claim in prepared.network.statics:
+        _static(prepared, claim, known, report)
+
+
+def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None], report: Report) -> None:
+    missing = []
+
+    def lookup(node: ex.Node) -> float:
+        name = node.data if node.op == "param" and not node.args else ""
+        if name.startswith("static "):
+            value = known.get(name.removeprefix("static "))
+            if value is None:
+                missing.append(name.removeprefix("static "))
+            return float("nan") if value is None else float(value)
+        return prepared.binding.evaluate(node)
+
+    left, right = ex.evaluate([claim.left, claim.right], lookup)
+    if missing:
+        message = f"static quantity '{missing[0]}' is not supported yet (planned: four formulations)"
+        report.note("N608", message, claim.place)
+    elif not holds(claim.operator, left, right, 0.0):
+        report.error("E909", f"expect failed: {claim.text.removeprefix('expect ')}, found {left:g} and {right:g}", claim.place)
+
+
+def holds(operator: str, left: float, right: float, within: float) -> bool:
+    """Whether left op right, a tolerance granted to the author's side."""
+    match operator:
+        case "==":
+            return abs(left - right) <= within
+        case "!=":
+            return abs(left - right) > within
+        case "<" | "<=":
+            return left <= right + within if operator == "<=" or within else left < right
+        case _:
+            return left >= right - within if operator == ">=" or within else left > right
