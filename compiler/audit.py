@@ -41,9 +41,9 @@ def add_audit(assembly: Assembly, model: EnergyModel, carriers: frozenset[str]) 
     for term in model.function(m.coenergy):
         into("kinetic", term.loops, sub(_along(term.expression, m.rate), term.expression))
         into("supplied", term.loops, neg(explicit(term.expression)))
-    for name, row in ((m.energy, "kinetic"), (m.potential, "potential")):
+    for name, stored in ((m.energy, "kinetic"), (m.potential, "potential")):
         for term in model.function(name):
-            into(row, term.loops, term.expression)
+            into(stored, term.loops, term.expression)
             into("supplied", term.loops, explicit(term.expression))
     for term in model.function(m.content):
         into("dissipated", term.loops, _along(term.expression, m.rate))
@@ -65,7 +65,7 @@ def explicit(expression: Node) -> Node:
 
 
 def _along(expression: Node, kind: str) -> Node:
-    """f . d/df."""
+    """F . d/df."""
     return add(*(mul(f, derivative(expression, f)) for f in local_variables(expression, kind)))
 
 

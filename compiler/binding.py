@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.compiler.descriptor import DescriptorForm
 from sysdyn.compiler.integers import Slot
 from sysdyn.compiler.interpret import Value, evaluate, over
@@ -74,9 +73,7 @@ def bind(network: Network, form: DescriptorForm, program: Program, overrides: Ov
     p, where = _layout(program, network, parameters, offsets)
     ix = [_integer(slot, owners, parameters, where, network) for slot in program.slots]
     rows = {(r.owner, r.block): k for k, r in enumerate(form.rows)}
-    constants = tuple(
-        (rows[o.label, "phi"], where[o.name], offsets[o.name].size) for o in form.offsets
-    )
+    constants = tuple((rows[o.label, "phi"], where[o.name], offsets[o.name].size) for o in form.offsets)
     return Binding(
         p,
         np.asarray(ix, dtype=np.int32),
@@ -97,9 +94,7 @@ def _owners(form: DescriptorForm, parameters: Parameters) -> dict[str, Extents]:
     return owners
 
 
-def _hull(
-    name: str, places: tuple[tuple[tuple[Node, ...], Nest, Place], ...], parameters: Parameters
-) -> Extents:
+def _hull(name: str, places: tuple[tuple[tuple[Node, ...], Nest, Place], ...], parameters: Parameters) -> Extents:
     """The box around all rows of a label; a hole or a second row of one index is E805."""
     if not places[0][0]:
         return ()

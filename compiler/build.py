@@ -26,7 +26,7 @@ class BuildError(Exception):
         super().__init__(message)
 
 
-class NoCompiler(BuildError):
+class NoCompilerError(BuildError):
     """There is no C compiler: the caller takes the NumPy backend and says so."""
 
 
@@ -40,13 +40,13 @@ def cache_folder() -> Path:
 
 
 def compiler() -> str:
-    """The C compiler: $CC, cc, gcc or clang; NoCompiler where none is found."""
+    """The C compiler: $CC, cc, gcc or clang; NoCompilerError where none is found."""
     wanted = os.environ.get("CC")
     for name in (wanted,) if wanted else ("cc", "gcc", "clang"):
         path = shutil.which(name)
         if path is not None:
             return path
-    raise NoCompiler(f"there is no C compiler ({wanted or 'cc, gcc, clang'})")
+    raise NoCompilerError(f"there is no C compiler ({wanted or 'cc, gcc, clang'})")
 
 
 @cache
@@ -54,9 +54,9 @@ def _version(path: str, _changed: float) -> str:
     try:
         run = subprocess.run([path, "--version"], capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise NoCompiler(f"{path} cannot be run: {error}") from error
+        raise NoCompilerError(f"{path} cannot be run: {error}") from error
     if run.returncode:
-        raise NoCompiler(f"{path} --version fails with status {run.returncode}", run.stderr)
+        raise NoCompilerError(f"{path} --version fails with status {run.returncode}", run.stderr)
     return run.stdout
 
 
@@ -79,7 +79,7 @@ def _compile(path: str, flags: tuple[str, ...], text: str, library: Path) -> Non
         try:
             run = subprocess.run(command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
         except OSError as error:
-            raise NoCompiler(f"{path} cannot be run: {error}") from error
+            raise NoCompilerError(f"{path} cannot be run: {error}") from error
         if run.returncode:
             raise BuildError(f"the C compiler failed with status {run.returncode}", run.stderr)
-        os.replace(output, library)
+        output.replace(library)

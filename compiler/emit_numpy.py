@@ -120,7 +120,9 @@ class _Writer:
         routine, rows = self.routine, self.routine.part == "rows"
         lines = [f"def _f{self.number}(p, ix, at, to, t, y, yd, {'r' if rows else 'v, o'}):"]
         kinds = dict.fromkeys(form.rows[row].kind for row in routine.rows)
-        lines.append(f"    # {routine.block}, {routine.part}: rows {', '.join(map(str, routine.rows[:8]))} ({', '.join(kinds)})")
+        lines.append(
+            f"    # {routine.block}, {routine.part}: rows {', '.join(map(str, routine.rows[:8]))} ({', '.join(kinds)})"
+        )
         lines += self.head()
         if not rows and self.depth:
             lines.append(f"    v = v[o : o + n*{routine.entries}].reshape(n, {routine.entries})")
@@ -189,7 +191,7 @@ class _Writer:
         for b in (s.first, s.last):
             if b.loop >= 0:
                 raise NotImplementedError("bounds of an inner sum follow an outer index")
-        axes = ", 1"*((1 if self.depth else 0) + self.open)
+        axes = ", 1" * ((1 if self.depth else 0) + self.open)
         first, last = bound(s.first, _loop), bound(s.last, _loop)
         name = _loop(s.loop)
         shape = f".reshape(-1{axes})" if axes else ""

@@ -103,5 +103,3 @@ class Integers:
 def topological_of(rest: list[tuple[float, Node]]) -> list[Node]:
     """All nodes of the parts."""
     return topological(n for _, n in rest)
-
-

@@ -94,7 +94,9 @@ def _note(row: Row, offset: Offset, tangible: frozenset[str], mirror: Mirror) ->
 
 
 def _at_start(expression: Node, mirror: Mirror) -> str:
-    marks = {n: var(f"{n.data[0]}(0)", mirror.coordinate, *n.args) for n in local_variables(expression, mirror.coordinate)}
+    marks = {
+        n: var(f"{n.data[0]}(0)", mirror.coordinate, *n.args) for n in local_variables(expression, mirror.coordinate)
+    }
     return to_text(substitute(expression, {**marks, time(): const(0.0)}))
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.compiler.terms import Nest
 from sysdyn.dsl.expression import Node, topological_unbound
 
@@ -123,6 +122,4 @@ def over(nest: Nest, roots: Sequence[Node], lookup: Lookup) -> list[NDArray[np.f
 
 def _with(columns: Mapping[str, Value], lookup: Lookup) -> Lookup:
     """Loop variables by name: nodes of other `fresh` blocks mean the same."""
-    return lambda node, args: (
-        columns[node.data] if node.op == "index" and node.data in columns else lookup(node, args)
-    )
+    return lambda node, args: columns[node.data] if node.op == "index" and node.data in columns else lookup(node, args)

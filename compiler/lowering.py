@@ -75,7 +75,8 @@ class _Lowering:
     def _families(self) -> list[Unknowns]:
         m = self.model
         # an integrated psi makes nothing tangible, but its displacements are variables
-        held = {n.data[0] for row in m.of_kind("phi") for t in row.terms for n in local_variables(t.expression, m.mirror.coordinate)}
+        pieces = [t.expression for row in m.of_kind("phi") for t in row.terms]
+        held = {n.data[0] for piece in pieces for n in local_variables(piece, m.mirror.coordinate)}
         seen = observed(m, self.carriers) | held
         found = [
             Unknowns(c.name, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.tangible or c.name in seen

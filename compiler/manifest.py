@@ -77,8 +77,7 @@ def manifest(
         "unknowns": _unknowns(form, program, binding),
         "rows": _rows(form, binding),
         "parameters": [
-            {"name": p.name, "unit": p.unit.text, "value": _plain(binding.values[p.name])}
-            for p in network.parameters
+            {"name": p.name, "unit": p.unit.text, "value": _plain(binding.values[p.name])} for p in network.parameters
         ],
         "structure": structure(form, program),
     }
@@ -98,7 +97,7 @@ def _named(name: str, box: Extents) -> dict[str, Any]:
 
 
 def _head(name: str) -> tuple[str, str, str]:
-    """x' and x.p with the index behind x."""
+    """X' and x.p with the index behind x."""
     if name.endswith("'"):
         return name[:-1], "'", ""
     head, _, tail = name.rpartition(".")

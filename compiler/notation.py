@@ -32,7 +32,7 @@ def number(value: float, notation: Notation) -> str:
 
 
 def total(data: tuple[float, Sequence[float]], args: Sequence[str], notation: Notation) -> str:
-    """constant + sum of coefficient*argument."""
+    """Constant + sum of coefficient*argument."""
     constant, coefficients = data
     text = ""
     for c, a in zip(coefficients, args, strict=True):

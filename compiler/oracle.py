@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.compiler.binding import Binding
 from sysdyn.compiler.descriptor import DescriptorForm, Kernel
 from sysdyn.compiler.interpret import Value, over
@@ -16,6 +15,7 @@ from sysdyn.compiler.parameters import Extents, extents, positions
 from sysdyn.dsl.expression import Node, derivative, is_const, variables
 
 Array = NDArray[np.float64]
+Point = tuple[float, Array, Array]  # t, y, yd
 
 
 def starts(shapes: tuple[Extents, ...]) -> NDArray[np.int32]:
@@ -39,24 +39,24 @@ class Oracle:
 
     def rows(self, block: str, t: float, y: Array, yd: Array) -> Array:
         """R of one block, every row family's place included."""
-        r = np.zeros(int(self.to[-1]))
+        r, point = np.zeros(int(self.to[-1])), (t, y, yd)
         for kernel in self._kernels(block):
             for summand in kernel.rows:
                 roots = (*summand.at, summand.expression)
-                *at, values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, t, y, yd))
+                *at, values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, point))
                 where = self._position(self.binding.row_shapes[summand.row], at)
                 np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), values)
         return r
 
     def magnitudes(self, block: str, t: float, y: Array, yd: Array) -> Array:
         """Sum of the magnitudes of the terms of each row of one block."""
-        r = np.zeros(int(self.to[-1]))
+        r, point = np.zeros(int(self.to[-1])), (t, y, yd)
         for kernel in self._kernels(block):
             for summand in kernel.rows:
                 node = summand.expression
                 terms = (node,) if node.op != "sum" else node.args
                 scales = (1.0,) if node.op != "sum" else node.data[1]
-                *at, = over(kernel.nest, (*summand.at, *terms), lambda n, a: self._leaf(n, a, t, y, yd))
+                (*at,) = over(kernel.nest, (*summand.at, *terms), lambda n, a: self._leaf(n, a, point))
                 where = self._position(self.binding.row_shapes[summand.row], at[: len(summand.at)])
                 for c, values in zip(scales, at[len(summand.at) :], strict=True):
                     np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), np.abs(c * values))
@@ -66,9 +66,7 @@ class Oracle:
         """(v, rows, columns) of dy (order 0) or dyd (order 1) in the order of the contract."""
         found: list[tuple[Array, Array, Array]] = []
         for kernel in self._kernels(block):
-            parts = [
-                self._entry(kernel, k, column, t, y, yd) for k, column in _columns(kernel, order)
-            ]
+            parts = [self._entry(kernel, k, column, (t, y, yd)) for k, column in _columns(kernel, order)]
             if parts:
                 found.append(tuple(np.stack(p, axis=1).ravel() for p in zip(*parts, strict=True)))  # type: ignore[arg-type]
         if not found:
@@ -76,12 +74,12 @@ class Oracle:
         v, rows, columns = (np.concatenate(p) for p in zip(*found, strict=True))
         return v, rows, columns
 
-    def _entry(self, kernel: Kernel, k: int, column: Node, t: float, y: Array, yd: Array) -> tuple[Array, Array, Array]:
+    def _entry(self, kernel: Kernel, k: int, column: Node, point: Point) -> tuple[Array, Array, Array]:
         summand = kernel.rows[k]
         family = self._families[column.data[0], column.data[1]]
         slope = derivative(summand.expression, column)
         roots = (*summand.at, *column.args, slope)
-        *at, values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, t, y, yd))
+        *at, values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, point))
         cut = len(summand.at)
         row = self.to[summand.row] + self._position(self.binding.row_shapes[summand.row], at[:cut])
         place = self.at[family] + self._position(self.binding.shapes[family], at[cut:])
@@ -97,7 +95,8 @@ class Oracle:
             return np.zeros(1, dtype=np.int64)
         return positions(box, [np.rint(a).astype(np.int64) for a in at])
 
-    def _leaf(self, node: Node, args: list[Value], t: float, y: Array, yd: Array) -> Value:
+    def _leaf(self, node: Node, args: list[Value], point: Point) -> Value:
+        t, y, yd = point
         if node.op == "time":
             return t
         if node.op == "var":

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.compiler.interpret import Value, evaluate, over
 from sysdyn.compiler.tables import evaluate as evaluate_table
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place
@@ -104,7 +103,9 @@ class Parameters:
             if not isinstance(key, str) and key[0] == name:
                 values[self._element(name, box, key[1:], place)] = value
         if parameter.whole and np.any(values != np.rint(values)):
-            raise ModelError([Diagnostic("E805", f"'{name}' = {float(np.ravel(values)[0]):g} is no whole number", place)])
+            raise ModelError(
+                [Diagnostic("E805", f"'{name}' = {float(np.ravel(values)[0]):g} is no whole number", place)]
+            )
         self.values[name] = values if parameter.shape else float(values)
 
     def _formula(self, parameter: Parameter, box: Extents) -> NDArray[np.float64]:

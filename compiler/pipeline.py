@@ -1,6 +1,6 @@
 """Network -> CompiledModel: the list of arrows, each timed.
 
-    energies -> integration -> lagrangian | hamiltonian -> program -> C or NumPy text
+energies -> integration -> lagrangian | hamiltonian -> program -> C or NumPy text
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from sysdyn.compiler.hamiltonian import hamiltonian
 from sysdyn.compiler.integration import integrate
 from sysdyn.compiler.lagrangian import lagrangian
 from sysdyn.compiler.program import Program
+from sysdyn.compiler.program_text import verify_program
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError
 from sysdyn.dsl.network import Network
 
@@ -69,7 +70,7 @@ class CompiledModel:
         return manifest.structure(self.form, self.program)
 
     def library(self) -> Path:
-        """The compiled library of the C text; `build.NoCompiler` where there is no compiler."""
+        """The compiled library of the C text; `build.NoCompilerError` where there is no compiler."""
         return build.build(self.text)
 
 
@@ -90,6 +91,7 @@ def compile_network(
         descriptor.verify_descriptor(form)
     with _timed("program", timings):
         program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))
+        verify_program(program)
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     return CompiledModel(network, model, form, program, backend, text, (*notes, *found), tuple(timings))

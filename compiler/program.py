@@ -1,7 +1,7 @@
 """DescriptorForm -> Program: single assignments after common-subexpression elimination, whole numbers as slots.
 
-A `Routine` is one function of the generated module: a loop nest and a body in which every value is assigned once, before
-its use.  Routines of scalar kernels are cut at about 50 outputs; what they share is computed again in each.
+A `Routine` is one function of the generated module: a loop nest and a body in which every value is assigned once,
+before its use.  Routines of scalar kernels are cut at about 50 outputs; what they share is computed again in each.
 The Jacobian entries of a kernel are those whose derivative is not zero by structure, in the order of its rows and of
 the unknowns' numbers.
 """
@@ -135,9 +135,7 @@ class Programmer:
         """Routines and pattern of one kernel."""
         loops = {f"#{k}": k for k in range(len(kernel.nest))}
         bounds = self.bounds(kernel)
-        places = tuple(
-            self.integers.reference(s.row, self.form.rows[s.row].owner, s.at, loops) for s in kernel.rows
-        )
+        places = tuple(self.integers.reference(s.row, self.form.rows[s.row].owner, s.at, loops) for s in kernel.rows)
         outputs: list[tuple[Reference | int, Node]] = [
             (place, s.expression) for place, s in zip(places, kernel.rows, strict=True)
         ]
@@ -240,7 +238,7 @@ class _Body:
             reference = self.programmer.reference(node, self.loops)
             return Assign(self._next(), "yd" if data[2] else "y", reference, ())
         if op == "param":
-            if args:
+            if args or data not in self.programmer.scalars:  # the constant of an integrated row lies among the arrays
                 return Assign(self._next(), "element", integers.element(data, args, self.loops), ())
             return Assign(self._next(), "p", self.programmer.scalars[data], ())
         if op == "index":
@@ -264,9 +262,7 @@ def program(form: DescriptorForm, scalars: tuple[str, ...]) -> Program:
     """The program of a form; scalars: names of the scalar parameters in the order of p."""
     programmer = Programmer(form, scalars)
     patterns = tuple((b.name, _patterns(programmer, b)) for b in form.blocks)
-    return Program(
-        tuple(programmer.routines), patterns, programmer.integers.slots, scalars, tuple(programmer.tables)
-    )
+    return Program(tuple(programmer.routines), patterns, programmer.integers.slots, scalars, tuple(programmer.tables))
 
 
 def _patterns(programmer: Programmer, block: Block) -> tuple[Pattern, ...]:

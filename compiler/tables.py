@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError
 from sysdyn.dsl.network import Table
 
@@ -133,7 +132,9 @@ def evaluate(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any
     distance = u - x[np.maximum(piece - 1, 0)]
     value = np.zeros_like(u)
     for power in range(order, 4):
-        value = value + rows[piece, power] * np.prod(np.arange(power - order + 1, power + 1)) * distance ** (power - order)
+        value = value + rows[piece, power] * np.prod(np.arange(power - order + 1, power + 1)) * distance ** (
+            power - order
+        )
     return value
 
 

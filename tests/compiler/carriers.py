@@ -5,10 +5,9 @@ import importlib.util
 import itertools
 
 import numpy as np
-
+from sysdyn.compiler.build import build
 from sysdyn.compiler.emit_c import emit_c
 from sysdyn.compiler.emit_numpy import emit_numpy
-from sysdyn.compiler.build import build
 from sysdyn.compiler.oracle import starts
 
 _serial = itertools.count()
@@ -25,9 +24,7 @@ def sizes(patterns, ix):
         ranges = [()]
         for first, last in pattern.loops:
             ranges = [
-                (*outer, i)
-                for outer in ranges
-                for i in range(_value(first, outer, ix), _value(last, outer, ix) + 1)
+                (*outer, i) for outer in ranges for i in range(_value(first, outer, ix), _value(last, outer, ix) + 1)
             ]
         count = len(ranges)
         yield count

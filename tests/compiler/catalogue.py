@@ -88,14 +88,14 @@ def network(entry, model, *, energy="T*"):
             Parameter(k, (), ONE, (x.const(float(v)),), (), PLACE) for k, v in entry["parameters"].items()
         ),
         tables=(),
-        coordinates=tuple(
-            Coordinate(f"x{k}", (), False, ONE, ONE, ONE, ONE, None, PLACE) for k in range(1, n + 1)
-        ),
+        coordinates=tuple(Coordinate(f"x{k}", (), False, ONE, ONE, ONE, ONE, None, PLACE) for k in range(1, n + 1)),
         unknowns=tuple(Unknown(name, (), ONE, PLACE) for name in model["implicit"]),
         states=tuple(State(name, (), ONE, PLACE) for name in model["s"]),
         energies=tuple(Energy(f, node(text), (), PLACE) for f, text in functions),
         works=tuple(Work(node(text), x.var(f"x{k}", "q"), (), PLACE) for k, text in enumerate(model["applied"], 1)),
-        constraints=tuple(Constraint(kind, f"{kind}{k}", (), node(text), (), ONE, PLACE) for kind, k, text in constraints),
+        constraints=tuple(
+            Constraint(kind, f"{kind}{k}", (), node(text), (), ONE, PLACE) for kind, k, text in constraints
+        ),
         dynamics=tuple(
             Dynamic(x.var(s, "s"), node(text), (), PLACE) for s, text in zip(model["s"], model["lam"], strict=True)
         ),

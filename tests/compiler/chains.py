@@ -2,7 +2,6 @@
 
 import numpy as np
 from catalogue import ONE, PLACE
-
 from sysdyn.dsl import expression as x
 from sysdyn.dsl.network import (
     Constraint,
@@ -32,7 +31,7 @@ def blank(**parts):
         "parameters tables coordinates unknowns states energies works constraints dynamics initials observations "
         "expectations statics goldens"
     )
-    empty = {n: () for n in names.split()}
+    empty = dict.fromkeys(names.split(), ())
     return Network(**{"model": "m", "place": PLACE, **empty, "scene": None, **parts})
 
 
@@ -62,7 +61,9 @@ def chain(n=10):
             (-1.0, x.mul(x.param("l"), x.param("l"))),
         ),
     )
-    first = x.sub(x.add(x.power(q("x", one), x.const(2)), x.power(q("y", one), x.const(2))), x.power(x.param("l"), x.const(2)))
+    first = x.sub(
+        x.add(x.power(q("x", one), x.const(2)), x.power(q("y", one), x.const(2))), x.power(x.param("l"), x.const(2))
+    )
     total = x.reduction("sum", "i", one, size, x.mul(mass, q("y", i)))
     return blank(
         parameters=(
@@ -90,19 +91,19 @@ def chain(n=10):
         observations=(
             Observation("tip", q("x", size), ONE, "tip", PLACE),
             Observation("height", x.div(total, x.param("k")), ONE, "height", PLACE),
-            Observation("norm", x.sqrt(x.reduction("sum", "i", one, size, x.power(q("y", i), x.const(2)))), ONE, "norm", PLACE),
+            Observation(
+                "norm", x.sqrt(x.reduction("sum", "i", one, size, x.power(q("y", i), x.const(2)))), ONE, "norm", PLACE
+            ),
             Observation("pull", x.var("link", "kappa", one), ONE, "pull", PLACE),
             Observation("tip.p", x.var("x", "p", size), ONE, "tip.p", PLACE),
         ),
-        expectations=(
-            Expectation("always", None, "<=", q("y", one), x.const(1), x.const(0.1), ONE, "text", PLACE),
-        ),
+        expectations=(Expectation("always", None, "<=", q("y", one), x.const(1), x.const(0.1), ONE, "text", PLACE),),
     )
 
 
-def reference(n, t, y, yd, k=3.0, l=0.2):  # noqa: E741
+def reference(n, y, yd, k=3.0, length=0.2):
     """Residual of the chain as written: dynamics + reactions, then phi (y: x y x' y' kappa)."""
-    x_, y_, vx, vy = (y[a * n : (a + 1) * n] for a in range(4))
+    x_, y_, vx, _ = (y[a * n : (a + 1) * n] for a in range(4))
     ax, ay = yd[2 * n : 3 * n], yd[3 * n : 4 * n]
     kappa = y[4 * n : 5 * n]
     m = 1 + np.arange(1, n + 1) / n
@@ -116,4 +117,4 @@ def reference(n, t, y, yd, k=3.0, l=0.2):  # noqa: E741
     ry += 2 * kappa * dy
     rx[:-1] -= 2 * (kappa * dx)[1:]
     ry[:-1] -= 2 * (kappa * dy)[1:]
-    return np.concatenate((rx, ry, dx**2 + dy**2 - l**2))
+    return np.concatenate((rx, ry, dx**2 + dy**2 - length**2))

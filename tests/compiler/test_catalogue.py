@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from carriers import CCarrier, NumpyCarrier
 from catalogue import BLOCKS, load, network, state
-
 from sysdyn.compiler.descriptor import BLOCKS as ALL_BLOCKS
 from sysdyn.compiler.descriptor import WITHOUT_ENTRIES
 from sysdyn.compiler.oracle import Oracle
@@ -13,8 +12,14 @@ from sysdyn.dsl import expression as x
 
 CATALOGUE, VALUES = load("catalogue.json"), load("descriptor_values.json")
 WITHOUT_VALUES = "redundant_pendulum|lagrangian|0"  # its multipliers are not determined
-IN_C = ("pendulum|lagrangian|0", "ebers_moll|lagrangian|0", "solenoid|hamiltonian|1", "lc_ladder|lagrangian|0",
-        "two_link_arm|hamiltonian|ODE in Lagrange coordinates (Ex 3.1)", "rectifier_motor_crank|hamiltonian|1")  # fmt: skip
+IN_C = (
+    "pendulum|lagrangian|0",
+    "ebers_moll|lagrangian|0",
+    "solenoid|hamiltonian|1",
+    "lc_ladder|lagrangian|0",
+    "two_link_arm|hamiltonian|ODE in Lagrange coordinates (Ex 3.1)",
+    "rectifier_motor_crank|hamiltonian|1",
+)
 
 
 def cases():
@@ -101,9 +106,7 @@ def stored_rate(form, oracle, t, y, yd):
     kernels = tuple(
         replace(
             kernel,
-            rows=tuple(
-                replace(s, expression=x.time_derivative(s.expression)) for s in kernel.rows if s.row in rows
-            ),
+            rows=tuple(replace(s, expression=x.time_derivative(s.expression)) for s in kernel.rows if s.row in rows),
         )
         for kernel in (block.kernels if block else ())
     )
