@@ -178,7 +178,7 @@ class Run(c.Structure):
         ("settle", _P),
         ("written", _I),
         ("observed", _I),
-        *[(name, _P) for name in "audit observe observe_rate observe_scale audit_at instant".split()],
+        *[(name, _P) for name in "audit observe observe_rate observe_scale audit_at instant instant_kind".split()],
         ("instants", _I),
         ("every_step", _I),
         ("sample_steps", _I),

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysdyn.runtime import core_library as lib
-from sysdyn.runtime.description import Floats
+from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.failures import RowLabel, SolverFailure
 from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.scales import magnitudes
@@ -29,6 +29,9 @@ CHUNK_STEPS = 1 << 20
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
+TRACE, STEP, COMPARED = 1, 2, 4
+"""Kinds of rows (their second column, a sum)."""
+
 Sink = Callable[[Floats], None]
 Progress = Callable[[float], None]
 
@@ -37,13 +40,15 @@ Progress = Callable[[float], None]
 class Request:
     """What an integration shall do.
 
-    t_end [s]; instants [s] ascending: where rows are wanted, every_step: at each accepted step too; rtol; atol:
+    t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
+    (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
     absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; magnitude [unknowns as
     written] known from an earlier run (else tracked); euler: fixed step [s] of the implicit Euler method.
     """
 
     t_end: float
     instants: Floats
+    instant_kinds: Ints | None = None
     every_step: bool = True
     sample_steps: bool = False
     rtol: float = 1e-6
@@ -93,6 +98,7 @@ class Integration:
 
     def __init__(self, system: System, start: ConsistentState, request: Request) -> None:
         self.system, self.start, self.request = system, start, request
+        self.cpu = 0.0
         self.y, self.yd = start.for_form(system)
         jy, jyd = system.jacobian(start.t, self.y, self.yd)
         self.roles: Roles = roles(system, jyd, request.index)
@@ -167,6 +173,11 @@ class Integration:
                 self._audit_at[order.index(name)] = system.form.at[k]
         self._instants = np.ascontiguousarray(request.instants, dtype=np.float64)
         self._rows = np.zeros((max(64, min(ROOM, 1 << 24)) if self.width < 4096 else 64, self.width))
+        kinds = request.instant_kinds
+        self._kinds = np.ascontiguousarray(
+            np.full(self._instants.size, TRACE) if kinds is None else kinds, dtype=np.int32
+        )
+        run.instant_kind = lib.pointer(self._kinds)
         run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps = int(request.sample_steps)
@@ -205,6 +216,10 @@ class Integration:
             change[self.roles.test < 0] = 0.0
         return self.system.name(int(np.argmax(change)))
 
+    def largest(self) -> Floats:
+        """Largest magnitude so far of each observed quantity and of the terms of its expression [observed]."""
+        return lib.reader(self.run_.contents.largest, max(self.observed, 1))[: self.observed].copy()
+
     def statistics(self) -> Statistics:
         """Counters so far; residuals and Jacobians of the settling at output instants not included."""
         bdf, core = self.bdf.contents, self.system.core
@@ -220,13 +235,13 @@ class Integration:
     def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
         """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
         request, bdf = self.request, self.bdf.contents
-        began, cpu = time.monotonic(), 0.0
+        began = time.monotonic()
         self.system.core.residual_evaluations = self.system.core.jacobian_evaluations = 0
         while True:
             left = CHUNK_STEPS if request.max_steps is None else request.max_steps - bdf.steps
             before = time.process_time()
             state = lib.core.sd_run_advance(self.run_, min(CHUNK_STEPS, max(left, 1)), CHUNK_SECONDS)
-            cpu += time.process_time() - before
+            self.cpu += time.process_time() - before
             self._drain(sink)
             self.system.failure.check()
             self.settler.system.failure.check()
@@ -240,13 +255,12 @@ class Integration:
                 raise self._failure("max_steps")
             if request.max_wall is not None and time.monotonic() - began > request.max_wall:
                 raise self._failure("max_wall")
-        largest = lib.reader(self.run_.contents.largest, max(self.observed, 1))[: self.observed].copy()
         return Finished(
             bdf.t,
             self.statistics(),
             self.magnitude[: self.system.form.written].copy(),
-            largest,
-            cpu,
+            self.largest(),
+            self.cpu,
             self.settler.core.contents.failures,
         )
 

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <time.h>
 
-#define POLL 32 /* steps between two looks at the clock */
+#define POLL 4 /* steps between two looks at the clock */
 
 sd_run *sd_run_new(sd_bdf *bdf, sd_settle *settle, int32_t written, int32_t extended, int32_t observed)
 {
@@ -118,6 +118,14 @@ static void emit(sd_run *run, double t, double kind, int at_step)
     run->rows_written++;
 }
 
+/* kind of the row at the end of a step, or at the start */
+static double kind_here(const sd_run *run, int asked)
+{
+    int32_t kind = asked ? run->instant_kind[run->next] : 0;
+    kind |= (run->every_step ? 1 : 0) | (run->sample_steps ? 2 : 0);
+    return (double)kind;
+}
+
 /* rows of the last step that are still to be written; 1: no room left */
 static int drain(sd_run *run)
 {
@@ -127,12 +135,12 @@ static int drain(sd_run *run)
             return 1;
         int asked = run->next < run->instants && run->instant[run->next] <= t;
         if (asked && run->instant[run->next] < t) {
-            emit(run, run->instant[run->next++], 1.0, 0);
+            double kind = (double)run->instant_kind[run->next];
+            emit(run, run->instant[run->next++], kind, 0);
             continue;
         }
-        double kind = (asked || run->every_step ? 1.0 : 0.0) + (run->sample_steps ? 2.0 : 0.0);
-        if (asked)
-            run->next++;
+        double kind = kind_here(run, asked);
+        run->next += asked;
         if (kind > 0.0)
             emit(run, t, kind, 1);
         run->pending = 0;
@@ -148,8 +156,8 @@ static int begin(sd_run *run)
         return 1;
     run->t_from = run->bdf->t;
     int asked = run->next < run->instants && run->instant[run->next] <= run->bdf->t;
+    emit(run, run->bdf->t, kind_here(run, asked), 1);
     run->next += asked;
-    emit(run, run->bdf->t, (asked || run->every_step ? 1.0 : 0.0) + (run->sample_steps ? 2.0 : 0.0), 1);
     audit(run, run->bdf->t, run->point, run->point_d, out);
     run->power_dissipated = out[2];
     run->power_supplied = out[3];

@@ -1,8 +1,8 @@
 /* One integration in chunks: steps, quadratures of the energy balance, values at the instants asked for.
  *
  * An output row is [t, kind, kinetic, potential, dissipated, supplied, energy, constraints,
- *                   observe [observed], observe_rate [observed]]   (SI units; kind 1: instant of the trace,
- * 2: accepted step, 3: both).  At the instants the dense output is moved onto the constraints and their hidden
+ *                   observe [observed], observe_rate [observed]]   (SI units; kind, a sum: 1 row of the
+ * trace, 2 accepted step, 4 instant at which runs are compared).  At the instants the dense output is moved onto the constraints and their hidden
  * derivatives (settle.h), so multipliers and accelerations are as exact as positions.
  * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt, the integrals by the 4-point
  * Gauss-Lobatto rule (exact to degree 5) on the dense output of each accepted step.
@@ -26,6 +26,7 @@ typedef struct sd_run {
     const sd_call *observe, *observe_rate, *observe_scale;   /* NULL where missing */
     const int32_t *audit_at;          /* [6] places of energy, kinetic, potential, dissipated, supplied, constraints */
     const double *instant;            /* [instants] ascending, within the span */
+    const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
     double *row;                      /* [room][SD_ROW_HEAD + 2 observed] */
     int32_t room;
