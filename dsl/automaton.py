@@ -12,7 +12,7 @@ from typing import Any
 
 from sysdyn.dsl import build_expressions, build_statements
 from sysdyn.dsl.lexing import Scanner
-from sysdyn.dsl.notes import Notes
+from sysdyn.dsl.notes import MAX_TERMS, Notes
 from sysdyn.dsl.source import SourceText, Span
 from sysdyn.dsl.syntax import Broken, Text, Word
 from sysdyn.dsl.table import FINAL, GOTOS, LOOKAHEADS, ROWS, RULES
@@ -21,6 +21,9 @@ Build = Callable[[list[Any], Span, Notes], Any]
 
 MAX_NESTING = 200
 """Deepest nesting of brackets, signs, exponents and conditionals together (E117)."""
+
+_MAX_PARTS = 2 * MAX_TERMS
+"""Terms and signs of a chain (E118); statements of a block and rows of a table are not counted."""
 
 _NESTING = frozenset({"(", "[", "{", "^", "not", "else"})
 _BODY = ("statement", "scene_statement", "action", "item", "role", "bundle_member")
@@ -69,6 +72,8 @@ class Automaton:
         self.starts = [0]
         self.ends = [0]
         self.depths = [0]
+        self.overflow = False
+        """Whether a chain has grown longer than is read."""
         self.damaged: set[int] = set()
         """Starts of statements whose head was mended so that their block could be read."""
 
@@ -148,6 +153,8 @@ class Automaton:
                     parts.extend(values[base + position])
                 else:
                     parts.append(values[base + position])
+            if build is None and len(parts) > _MAX_PARTS and "body" not in left and "row" not in left:
+                self.overflow = True
             del states[base:], values[base:], starts[base:], ends[base:], depths[base:]
         else:
             span = Span(ends[-1], ends[-1])

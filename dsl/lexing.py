@@ -30,7 +30,7 @@ _NUMBER = r"[0-9]++(?:\.[0-9]++)?+(?:[eE][+-]?[0-9]++)?+"
 _NAME = r"[^\W\d]\w*+"
 _FACTOR = rf"{_NAME}(?:\^-?[0-9]++)?+"
 _TOKEN = re.compile(
-    rf"[ \t]*+(?:({_NAME})|({_NUMBER})|([\r\n;])|(#[^\r\n]*+)|(\"[^\"\r\n]*+\")"
+    rf"[ \t]*+(?:({_NAME})|({_NUMBER})|(;|[\r\n][ \t\r\n]*+)|(#[^\r\n]*+)|(\"[^\"\r\n]*+\")"
     r"|(->|:=|==|!=|<=|>=|\.\.|[-+*/^=<>~:,.()\[\]{}'$]))"
 )
 _UNIT = re.compile(
@@ -40,13 +40,15 @@ _UNIT = re.compile(
 _GLUED = re.compile(rf"{_FACTOR}(?:[./]{_FACTOR})*+")
 _FUNCTION = re.compile(r"(?:T\*|V\*|T|V|D|G)(?![\w*])")
 _BLANK = re.compile(r"[ \t]*+")
-_OPENS = re.compile(
-    r"(?:param|node|port|branch|input|output|coord|cocoord|implicit|state|discrete|dynamic|let|law|energy|content"
-    r"|work|phi|psi|gamma|init|when|every|for|level|require|expect|time|set|trace|accuracy|formulation|solver"
-    r"|redundancy|limit|from|domain|bundle|unit|const|fn|table|component|model|scene)[ \t]++[-(\w]"
-    rf"|lossless[ \t]*+[\r\n]|{_NAME}[ \t]*+:|\}}"
+_WORDS = (
+    "param|node|port|branch|input|output|coord|cocoord|implicit|state|discrete|dynamic|let|law|energy|content"
+    "|work|phi|psi|gamma|init|when|every|for|level|require|expect|time|set|trace|accuracy|formulation|solver"
+    "|redundancy|limit|from|domain|bundle|unit|const|fn|table|component|model|scene"
 )
-"""How a statement begins, for the guess that a line which continues another was not meant to."""
+_STATEMENT = re.compile(rf"(?:{_WORDS})[ \t]++\w")
+_PERHAPS = re.compile(rf"(?:{_WORDS})[ \t]++[-(]|lossless[ \t]*+[\r\n]|{_NAME}[ \t]*+:|\}}")
+"""How a statement begins, for the guess that a line which continues another was not meant to:
+two words side by side are one for certain, the rest only where it is not indented further."""
 _CLOSING = {")": "(", "]": "[", "}": "{"}
 
 
@@ -67,6 +69,7 @@ class Scanner:
         "_doc_end",
         "_fresh",
         "_lines",
+        "_own_line",
         "brackets",
         "closed",
         "comments",
@@ -117,6 +120,7 @@ class Scanner:
         self._doc: list[str] = []
         self._doc_end = -1
         self._fresh = True
+        self._own_line = True
 
     def read(self, row: Container[str]) -> str:
         """The next terminal in a state that can take the terminals of `row`."""
@@ -131,12 +135,14 @@ class Scanner:
             start, end = match.span(group)  # type: ignore[arg-type]
             if group == 4:
                 self._comment(start, end)
+                self._own_line = False
             elif group != 3:
                 break
-            elif self._ends_statement(text[start]):
-                self.start, self.end = start, end
-                return self._newline()
             else:
+                self._own_line = text[start] != ";"
+                if self._ends_statement(text[start]):
+                    self.start, self.end = start, end
+                    return self._newline()
                 self._continue_line(end)
             self.end = end
             match = _TOKEN.match(text, end)
@@ -144,6 +150,7 @@ class Scanner:
             return self._fault_or_end()
         if self._fresh:
             self._begin(start)
+        self._own_line = False
         self.start, self.end = start, end
         word = text[start:end]
         if group == 1:
@@ -203,7 +210,9 @@ class Scanner:
         if self._fresh or self.suspect is not None:
             return
         first = _BLANK.match(self.text, end).end()  # type: ignore[union-attr]
-        if self.column(first) <= self.column(self.statement) and _OPENS.match(self.text, first):
+        if _STATEMENT.match(self.text, first) or (
+            self.column(first) <= self.column(self.statement) and _PERHAPS.match(self.text, first)
+        ):
             self.suspect = first
             self.dangling = Span(self.start, self.start + len(self.last))
 
@@ -241,9 +250,8 @@ class Scanner:
     def _comment(self, start: int, end: int) -> None:
         """Keep a comment; `##` lines directly above a statement are its documentation."""
         text = self.text[start:end]
-        own_line = self.first_on_line(start) == start
-        self.comments.append(Comment(text.rstrip(), Span(start, end), own_line))
-        if text.startswith("##") and own_line:
+        self.comments.append(Comment(text.rstrip(), Span(start, end), self._own_line))
+        if text.startswith("##") and self._own_line:
             if not self._follows(start):
                 self._doc = []
             self._doc.append(text[2:].strip())

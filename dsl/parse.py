@@ -48,6 +48,8 @@ def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
             recovery.recover(kind)
         elif automaton.depths[-1] > MAX_NESTING:
             recovery.too_deep()
+        elif automaton.overflow:
+            recovery.too_long()
     tree = File(source, automaton.values[-1], tuple(scanner.comments), Span(0, len(source.text)))
     return tree, automaton.notes.report.diagnostics
 

@@ -15,10 +15,17 @@ from sysdyn.dsl.automaton import MAX_NESTING, Automaton
 from sysdyn.dsl.complaints import Complaint
 from sysdyn.dsl.diagnostics import Related
 from sysdyn.dsl.lexing import RESERVED, Bracket
+from sysdyn.dsl.notes import MAX_TERMS
 from sysdyn.dsl.source import Span
+
+MAX_SKIPPED = 100_000
+"""Tokens that are skipped for one error before the rest of the text is left unread."""
 
 MAX_ERRORS = 100
 """After so many errors of syntax the rest of a text is not read: it is no model."""
+
+_MOST_BRACES = 10
+"""Open blocks that are named at the end of a text; more say nothing new."""
 
 _WORD = re.compile(r"[^\W\d]\w*+")
 _BLANK = re.compile(r"[ \t]*+")
@@ -96,15 +103,25 @@ class Recovery:
         self._error(("E117", message, "name a part of it: let x = ..."), self._token())
         self._give_up("<name>")
 
+    def too_long(self) -> None:
+        """E118: a chain of more terms than are read."""
+        self.automaton.overflow = False
+        message = f"an expression of more than {MAX_TERMS} terms"
+        self._error(("E118", message, "sum(i in 1..n: ...)"), self._token())
+        self._give_up("<name>")
+
     def recover(self, kind: str) -> None:
         """Report a terminal that does not fit and bring the automaton to where it can go on."""
         automaton = self.automaton
         if self.errors >= MAX_ERRORS:
-            self._stop()
+            self._stop(f"more than {MAX_ERRORS} errors of syntax: the rest of the file is not read")
             return
-        _, body = automaton.body()
-        if kind == "}" and body == "item" and automaton.accepts("<newline>"):
+        size, body = automaton.body()
+        first = size == len(automaton.states)
+        if kind == "}" and body == "item" and (first or automaton.accepts("<newline>")):
             self._error(("E112", "'}' closes nothing that is open", None), self._token())
+            if first:
+                self.scanner.restart(self.scanner.end, fresh=True)
             return
         if kind == "<end>" and automaton.accepts("}"):
             self._close_all()
@@ -240,7 +257,7 @@ class Recovery:
         if scanner.mismatched is not None and reported:
             reported[-1] = scanner.mismatched
             scanner.mismatched = None
-        for bracket in reported:
+        for bracket in reported[-_MOST_BRACES:]:
             self._not_closed(bracket)
         while self.automaton.body()[1] != "item" and self.automaton.advance("}"):
             pass
@@ -265,7 +282,7 @@ class Recovery:
         """Read to the end of the statement; True where a block was found whose head is mended."""
         scanner = self.scanner
         brackets = scanner.brackets
-        while True:
+        for _ in range(MAX_SKIPPED):
             if scanner.suspect is not None:
                 del brackets[base:]
                 scanner.restart(scanner.suspect, fresh=True)
@@ -283,6 +300,8 @@ class Recovery:
             if kind == "{" and len(brackets) == base + 1 and self._mend_head(start):
                 return True
             kind = scanner.read(())
+        self._stop("the end of this statement cannot be found: the rest of the file is not read")
+        return True
 
     def _leaves_block(self, base: int, body: str) -> bool:
         """Whether the '}' just read ends the block that the statement stands in; it is read again."""
@@ -322,10 +341,9 @@ class Recovery:
         automaton.cut(size)
         return False
 
-    def _stop(self) -> None:
+    def _stop(self, message: str) -> None:
         """Leave the rest of the text unread."""
         automaton, scanner = self.automaton, self.scanner
-        message = f"more than {MAX_ERRORS} errors of syntax: the rest of the file is not read"
         self._error(("E113", message, None), self._token())
         automaton.cut(1)
         scanner.brackets.clear()

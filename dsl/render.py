@@ -30,7 +30,7 @@ def render(diagnostic: Diagnostic, color: bool = False) -> str:
     for place, label, mark in places:
         line, column = place.start
         where = f"{printable(place.file)}:{line}:{column}"
-        lines.append(f"{' ' * gutter}{paint('-->', _BLUE)} {where}")
+        lines.append(f" {paint('-->', _BLUE)} {where}")
         tint = _COLORS[severity] if mark == "^" else _BLUE
         lines.extend(_snippet(place, printable(label), mark, gutter, (color, tint)))
     if diagnostic.help is not None:
