@@ -29,6 +29,9 @@ _MOST_BRACES = 10
 
 _WORD = re.compile(r"[^\W\d]\w*+")
 _BLANK = re.compile(r"[ \t]*+")
+_BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as", "->", "{", ":="})
+"""Terminals that stand in no bracket, but may stand behind one."""
+
 _SLIPS = RESERVED | {"=", "=="}
 _OUTERMOST = frozenset({"model", "component", "scene", "domain", "bundle", "from"})
 _HEADS = {
@@ -205,7 +208,8 @@ class Recovery:
         text = scanner.text[scanner.start : scanner.end]
         if scanner.suspect is not None or kind in ("<end>", "}") or text in (")", "]", ";"):
             return mine[-1]
-        return None
+        closing = ")" if mine[-1].sign == "(" else "]"
+        return mine[-1] if kind in _BEHIND and self.automaton.accepts(closing) else None
 
     def _not_closed(self, bracket: Bracket) -> None:
         """E112 with the place where indentation says that the bracket ends."""

@@ -1,0 +1,80 @@
+"""Every code that a diagnostic can have, with its page: `sysdyn explain CODE`.
+
+The pages are data (`codes.toml`): a title, the reason, and where a file can show it, a bad and a
+good one. A test proves that each bad file raises its code and no other, and that the good one does
+not. A code that is twice in the file is an error of TOML, so codes are unique.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+
+_SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
+_MOST_LINES, _MOST_COLUMNS = 40, 100
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """A code's page; `bad` and `good` are whole files, None where no single file shows it."""
+
+    code: str
+    title: str
+    why: str
+    bad: str | None
+    good: str | None
+
+    @property
+    def severity(self) -> str:
+        """`error`, `warning` or `note`."""
+        return _SEVERITIES[self.code[0]]
+
+
+@cache
+def codes() -> Mapping[str, Code]:
+    """All codes, in the order of their numbers."""
+    text = (Path(__file__).parent / "codes.toml").read_text(encoding="utf-8")
+    generated = _generated()
+    found = {}
+    for code, page in tomllib.loads(text).items():
+        bad, good = generated.get(code, (page.get("bad"), page.get("good")))
+        found[code] = Code(code, page["title"], page["why"], bad, good)
+    return MappingProxyType(found)
+
+
+def explain(code: str) -> str:
+    """The page of a code as text; raises KeyError where there is no such code."""
+    page = codes()[code.upper()]
+    parts = [f"{page.severity} {page.code}: {page.title}", _wrapped(page.why)]
+    if page.bad is not None and page.good is not None:
+        parts += ["Wrong:", _shown(page.bad), "Right:", _shown(page.good)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _generated() -> dict[str, tuple[str, str]]:
+    """Examples of the limits, too long to be kept."""
+    return {
+        "E116": (f"# {'a long line ' * 1000}\n", "# a short line\n"),
+        "E117": (f"const a = {'(' * 201}1{')' * 201}\n", "const a = ((1))\n"),
+        "E118": ("const a = 0" + " +\n  1" * 50_000 + "\n", "const a = sum(i in 1..50000: 1)\n"),
+    }
+
+
+def _wrapped(text: str, width: int = 96) -> str:
+    """Words in lines."""
+    import textwrap
+
+    return textwrap.fill(text, width)
+
+
+def _shown(text: str) -> str:
+    """An example, indented; very long ones are cut."""
+    lines = text.splitlines()
+    shown = [line if len(line) <= _MOST_COLUMNS else line[:_MOST_COLUMNS] + "..." for line in lines[:_MOST_LINES]]
+    if len(lines) > _MOST_LINES:
+        shown.append(f"... ({len(lines) - _MOST_LINES} more lines)")
+    return "\n".join(f"    {line}".rstrip() for line in shown)
