@@ -33,6 +33,11 @@ class Console:
         if not (self.quiet or self.as_json):
             print(message, file=sys.stderr)
 
+    def complain(self, message: str) -> None:
+        """A message that --quiet does not silence."""
+        if not self.as_json:
+            print(message, file=sys.stderr)
+
     def data(self, text: str) -> None:
         """Data that was asked for."""
         if not self.as_json:

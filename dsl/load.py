@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -9,13 +10,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sysdyn.dsl import checks, syntax
+from sysdyn.dsl import dimensions as dim
+from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.elaborate import Elaborator
 from sysdyn.dsl.files import FileScope
 from sysdyn.dsl.network import Network, Scene
 from sysdyn.dsl.parse import parse
+from sysdyn.dsl.resolve import Failed, Resolver
 from sysdyn.dsl.scenes import SceneReader
 from sysdyn.dsl.symbols import nearest
+from sysdyn.dsl.units import Dimension
 from sysdyn.dsl.values import Values
 
 _FRAMES = 20_000  # nesting is bounded by the parser (200 levels); chains of definitions by the file's size
@@ -136,6 +141,34 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         scene=scene,
         elements=tuple(reader.elements),
     )
+
+
+def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
+    """A constant expression of the command line in SI; a bare number is in SI units; None after reporting."""
+    source = SourceText(name, f"const value = {text}\n")
+    inner = Report()
+    file, problems = parse(source)
+    inner.extend(problems)
+    items = [i for i in file.items if isinstance(i, syntax.Const)]
+    if "\n" in text or len(items) != 1 or len(file.items) != 1:
+        report.extend(inner)
+        if not inner.failed:
+            report.error("E207", f"{name} {text[:40]}: one expression is wanted", source.place(0, 0))
+        return None
+    value = items[0].value
+    resolver = Resolver(report)
+    with _deep(), ex.fresh(), resolver.within(FileScope(document.file, Report()).scope, source):
+        try:
+            if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
+                return resolver.scalar(value).node.data  # type: ignore[no-any-return]
+            node = resolver.wanted(value, dimension, "E208", f"{name} is in {{}}, wants {dim.show(dimension)}")
+        except Failed:
+            return None
+        found = Values({}).number(node)
+    if not math.isfinite(found):
+        report.error("E207", f"{name} {text[:40]} is no finite constant", source.place(0, len(source.text)))
+        return None
+    return found
 
 
 def _set(reader: SceneReader, name: str, value: str, report: Report) -> None:

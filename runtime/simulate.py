@@ -39,7 +39,7 @@ Progress = Callable[[float, float | None], None]
 @dataclass(frozen=True, slots=True)
 class Options:
     """What `sysdyn simulate` asks for.  Times in s; every: interval of the trace (None: accepted steps); at: further
-    instants; accuracy relative to the largest value of each traced quantity, accuracy_on: (name, accuracy) of single
+    instants of the trace; sampled_at: instants of samples alone; accuracy relative to the largest value of each traced quantity, accuracy_on: (name, accuracy) of single
     ones (the others are then free if `accuracy` is None); rtol, atol: the solver's own, switch the control off;
     euler_step: of method "euler"; sample_steps: hand the sides of expects back at accepted steps too."""
 
@@ -48,6 +48,7 @@ class Options:
     t_end: float
     every: float | None = None
     at: tuple[float, ...] = ()
+    sampled_at: tuple[float, ...] = ()
     accuracy: float | None = 1e-4
     accuracy_on: tuple[tuple[str, float], ...] = ()
     rtol: float | None = None
@@ -70,12 +71,15 @@ class Options:
 class Samples:
     """All quantities of block observe at trace instants and (with sample_steps) accepted steps.
 
-    names [observed]; time [k]; kind [k] (TRACE, STEP, a sum); values [k, observed]."""
+    names [observed]; time [k]; kind [k] (TRACE, STEP, a sum); values [k, observed]; energy [k] (J) and constraints [k]
+    are the meters.  Where no quantity asks for samples there is the last row alone."""
 
     names: tuple[str, ...]
     time: Floats
     kind: Ints
     values: Floats
+    energy: Floats
+    constraints: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +152,9 @@ def instants(options: Options) -> tuple[Floats, Ints]:
     compared = np.unique(np.concatenate([thin, [t1]]))
     if compared.size < COMPARISONS // 2:
         compared = np.unique(np.concatenate([compared, np.linspace(t0, t1, COMPARISONS + 1)]))
-    every = np.unique(np.concatenate([wanted, compared]))
-    kinds = TRACE * np.isin(every, wanted) + COMPARED * np.isin(every, compared)
+    sampled = np.asarray(options.sampled_at, dtype=np.float64)
+    every = np.unique(np.concatenate([wanted, compared, sampled]))
+    kinds = TRACE * np.isin(every, wanted) + COMPARED * np.isin(every, compared) + STEP * np.isin(every, sampled)
     return every, kinds.astype(np.int32)
 
 
@@ -197,7 +202,11 @@ class _Runs:
         assert self.writer is not None
         self.writer.append(traced)
         self.rows.append(rows[(kind & COMPARED) > 0])
-        self.samples.append(rows[(kind & (TRACE | STEP)) > 0] if self._keeps else rows[:0])
+        taken = rows[(kind & (TRACE | STEP)) > 0]
+        if self._keeps:
+            self.samples.append(taken)
+        elif taken.size:
+            self.samples = [taken[-1:]]
 
     @property
     def _keeps(self) -> bool:
@@ -297,7 +306,7 @@ class _Runs:
         parts = self.samples if self.done is None else self.done[1]
         rows = np.concatenate(parts) if parts else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
         values = rows[:, lib.ROW_HEAD : lib.ROW_HEAD + len(self.names)]
-        return Samples(self.names, rows[:, 0], rows[:, 1].astype(np.int32), values)
+        return Samples(self.names, rows[:, 0], rows[:, 1].astype(np.int32), values, rows[:, 6], rows[:, 7])
 
 
 def _observed_names(description: Description) -> tuple[str, ...]:

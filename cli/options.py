@@ -1,0 +1,43 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+FORMULATIONS = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "auto"]
+INDICES = ["auto", "3", "2", "2v", "1", "0"]
+
+
+class Setting(click.ParamType):
+    """NAME=VALUE as a pair of texts."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
+        """Split at the first '='."""
+        if isinstance(value, tuple):
+            return value
+        name, found, text = str(value).partition("=")
+        if not found or not name.strip() or not text.strip():
+            self.fail(f"'{value}' is not NAME=VALUE", param, ctx)
+        return name.strip(), text.strip()
+
+
+def chosen(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options that choose the model, the scene and how it is compiled."""
+    for option in reversed(
+        [
+            click.option("--scene", metavar="NAME", help="The scene; needed where the file has several."),
+            click.option("--model", metavar="NAME", help="The model; needed where the file has several and no scene."),
+            click.option("--formulation", type=click.Choice(FORMULATIONS), help="Default: the scene's, else auto."),
+            click.option("--index", type=click.Choice(INDICES), help="Index form. Default: the scene's, else auto."),
+            click.option("--backend", type=click.Choice(["c", "numpy"]), default="c", show_default=True),
+            click.option("--set", "settings", type=Setting(), multiple=True, help="Parameter or input; repeatable."),
+            click.option("--level", "levels", type=Setting(), multiple=True, help="PATH=NAME; repeatable."),
+        ]
+    ):
+        function = option(function)
+    return function

@@ -1,0 +1,41 @@
+"""A progress line with the time left, on runs of over a second."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+
+class ProgressLine:
+    """Writes to standard error: over itself on a terminal, every ten seconds elsewhere."""
+
+    def __init__(self, mode: str) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._on = mode == "always" or (mode == "auto" and self._terminal)
+        self._began = time.monotonic()
+        self._last = 0.0
+        self._shown = False
+
+    def __call__(self, fraction: float, left: float | None) -> None:
+        """Fraction of the span done, seconds left (None: not known yet)."""
+        now = time.monotonic()
+        wait = 0.2 if self._terminal else 10.0 if self._shown else 0.0
+        if not self._on or now - self._began < 1.0 or now - self._last < wait:
+            return
+        self._last, self._shown = now, True
+        remaining = "" if left is None else f", {_duration(left)} left"
+        text = f"{100.0 * fraction:5.1f} %{remaining}"
+        sys.stderr.write(f"\r{text:<40}" if self._terminal else f"{text}\n")
+        sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self._shown and self._terminal:
+            sys.stderr.write("\r" + " " * 40 + "\r")
+            sys.stderr.flush()
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

@@ -1,0 +1,245 @@
+"""One simulation from a file to a trace: what `sysdyn simulate` and `sysdyn.api.simulate` have in common."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from sysdyn.cli import targets
+from sysdyn.cli.expectations import Claim, judge
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.prepare import Prepared, place_at, prepare
+from sysdyn.cli.starting import Started, start
+from sysdyn.cli.targets import Target
+from sysdyn.dsl import dimensions as dim
+from sysdyn.dsl import expression as ex
+from sysdyn.dsl import load
+from sysdyn.dsl.diagnostics import Report
+from sysdyn.dsl.network import Network, Scene
+from sysdyn.runtime.failures import SolverFailure
+from sysdyn.runtime.simulate import Options, Outcome, Progress, simulate
+from sysdyn.runtime.trace import Parameter
+
+ACCURACY = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """The options of `simulate` as given; None where the scene or the default decides.  Texts are expressions."""
+
+    file: str
+    scene: str | None = None
+    model: str | None = None
+    formulation: str | None = None
+    method: str | None = None
+    index: str | None = None
+    redundancy: str | None = None
+    accuracy: float | None = None
+    rtol: float | None = None
+    atol: float | None = None
+    until: str | None = None
+    at: str | None = None
+    settings: tuple[tuple[str, str], ...] = ()
+    levels: tuple[tuple[str, str], ...] = ()
+    backend: str = "c"
+    output: str | None = None
+    max_steps: int | None = None
+    max_wall: str | None = None
+    timings: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """What came of it.  exit: 0, 1 (an expectation failed), 3 (the solver stopped, `failure` says where)."""
+
+    target: Target
+    prepared: Prepared
+    started: Started
+    outcome: Outcome
+    claims: tuple[Claim, ...]
+    exit: int
+    failure: str | None = None
+
+
+def run(request: Request, report: Report, progress: Progress | None = None) -> Ran | None:
+    """Simulate; None where the report says why not.  UsageError, OSError and TraceError pass through."""
+    began = time.monotonic()
+    if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
+        raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
+    document = targets.read(request.file, report)
+    target = targets.one(document, request.file, request.model, request.scene, report)
+    if target is None:
+        return None
+    with ex.fresh():
+        network = load.network(target.document, target.model, target.scene, report, request.settings)
+        if network is None or not _possible(request, network, report):
+            return None
+        prepared = prepare(network, report, formulation=request.formulation, backend=request.backend)
+        if prepared is None:
+            return None
+        options = _options(request, target, prepared, report, began, progress)
+        if options is None:
+            return None
+        started = start(prepared, options.t_start, report)
+        if started is None or report.failed:
+            return None
+        return _ran(target, prepared, started, options, report)
+
+
+def _possible(request: Request, network: Network, report: Report) -> bool:
+    """What later issues build is refused by name."""
+    wanted = request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
+    for what, asked in (("redundancy " + wanted, wanted != "error"), ("--level", bool(request.levels))):
+        if asked:
+            report.note("N608", f"{what} is not supported yet (planned: levels, four formulations)", network.place)
+            return False
+    return True
+
+
+def _options(
+    request: Request, target: Target, prepared: Prepared, report: Report, began: float, progress: Progress | None
+) -> Options | None:
+    scene = prepared.network.scene or Scene("", prepared.network.place)
+    value = prepared.binding.evaluate
+
+    def instant(text: str, name: str) -> float | None:
+        return load.constant(target.document, text, dim.TIME, name, report)
+
+    t0 = value(scene.start) if scene.start is not None else 0.0
+    t1 = value(scene.end) if scene.end is not None else None
+    if request.until is not None:
+        t1 = instant(request.until, "--until")
+    elif t1 is None:
+        raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
+    at = [instant(text, "--at") for text in request.at.split(",")] if request.at else []
+    wall = instant(request.max_wall, "--max-wall") if request.max_wall else None
+    if t1 is None or None in at or report.failed:
+        return None
+    if not t1 > t0:
+        raise UsageError(f"the run ends at {t1:g} s, but it begins at {t0:g} s")
+    every = value(scene.every) if scene.every is not None else None
+    if every is not None and not every > 0.0:
+        raise UsageError(f"the interval of the trace is {every:g} s: it must be positive")
+    accuracy, on = _accuracy(request, scene, prepared)
+    solver = {name: value(node) for name, node in scene.solver_options}
+    steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), None)
+    claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
+    return Options(
+        output=request.output or _default_output(request.file, scene.name),
+        t_start=t0,
+        t_end=t1,
+        every=every,
+        at=tuple(t for t in at if t is not None),
+        sampled_at=tuple(t for t in claims if t0 <= t <= t1),
+        accuracy=accuracy,
+        accuracy_on=on,
+        rtol=request.rtol,
+        atol=request.atol,
+        method=request.method or scene.solver or "auto",
+        index=request.index or (f"{solver['index']:g}" if "index" in solver else "auto"),
+        euler_step=solver.get("step"),
+        max_steps=steps,
+        max_wall=wall,
+        sample_steps=any(e.moment == "always" for e in prepared.network.expectations),
+        timings=request.timings,
+        cpu_compile=prepared.cpu_compile_s,
+        wall_began=began,
+        progress=progress,
+        attributes=_attributes(target, prepared),
+        parameters=tuple(_parameters(prepared)),
+    )
+
+
+def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:
+    """Accuracy of all traced quantities, or of those that the scene names."""
+    if request.accuracy is not None:
+        if not 0.0 < request.accuracy < 1.0:
+            raise UsageError(f"--accuracy {request.accuracy:g}: it must be positive and less than 1")
+        return request.accuracy, ()
+    if scene.accuracy is None:
+        return ACCURACY, ()
+    wanted = prepared.binding.evaluate(scene.accuracy)
+    return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
+
+
+def _default_output(file: str, scene: str) -> str:
+    stem = "model" if file == "-" else Path(file).stem
+    return f"{stem}-{scene}.h5" if scene else f"{stem}.h5"
+
+
+def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
+    text = target.document.file.source.text
+    return {
+        "Conventions": "CF-1.11",
+        "title": target.name,
+        "source": f"sysdyn {_version()}",
+        "model": prepared.network.model,
+        "scene": prepared.network.scene.name if prepared.network.scene else "",
+        "formulation": prepared.formulation,
+        "model_sha256": hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest(),
+    }
+
+
+def _version() -> str:
+    try:
+        return metadata.version("sysdyn")
+    except metadata.PackageNotFoundError:  # run from a folder that is not installed
+        return "unknown"
+
+
+def _parameters(prepared: Prepared) -> Sequence[Parameter]:
+    found = []
+    for p in prepared.network.parameters:
+        found.append(Parameter(p.name, prepared.binding.values[p.name], ex_unit(p.unit.dimension)))
+    return found
+
+
+def ex_unit(dimension: Any) -> str:
+    """Parameters are kept in SI."""
+    from sysdyn.dsl.units import si_text
+
+    return si_text(dimension)
+
+
+def _ran(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
+    failure = None
+    try:
+        outcome = simulate(prepared.manifest, prepared.arrays, prepared.carrier, options)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    except SolverFailure as error:
+        failure = _failure(prepared, error)
+        if not isinstance(error.partial, Outcome):
+            raise UsageError(failure) from error
+        outcome = error.partial
+    claims = judge(prepared, outcome, report, finished=failure is None)
+    code = 3 if failure else 1 if report.failed else 0
+    return Ran(target, prepared, started, outcome, claims, code, failure)
+
+
+_CAUSES = {
+    "newton": "Newton's iteration does not converge",
+    "error_test": "the local error cannot be brought below the tolerance",
+    "singular": "the iteration matrix is singular",
+    "nonfinite": "an equation is not a number",
+    "step_too_small": "the step size fell below the resolution of time",
+    "max_steps": "the limit of steps is reached",
+    "max_wall": "the limit of wall time is reached",
+    "memory": "there is no memory left",
+}
+
+
+def _failure(prepared: Prepared, error: SolverFailure) -> str:
+    """The sentence of exit code 3: time, element, source line."""
+    text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {_CAUSES.get(error.cause, error.cause)}"
+    if error.row is not None:
+        place = place_at(prepared.network, error.row.file, error.row.line)
+        text += f", in {error.row.kind} {error.row.label}, {place.file}:{place.start[0]}"
+    if error.unknown is not None:
+        text += f", unknown {error.unknown}"
+    return text

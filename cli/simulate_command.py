@@ -1,0 +1,86 @@
+"""`sysdyn simulate`: text in, trace out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+import numpy as np
+
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.options import chosen
+from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.running import Ran, Request, run
+from sysdyn.cli.starting import described
+
+
+@with_console("simulate")
+@click.argument("file")
+@chosen
+@click.option("--method", type=click.Choice(["auto", "bdf", "radau", "dopri", "euler"]))
+@click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"]))
+@click.option("--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4.")
+@click.option("--rtol", type=float, metavar="R", help="The solver's own relative tolerance (no accuracy control).")
+@click.option("--atol", type=float, metavar="A", help="The solver's own absolute tolerance.")
+@click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
+@click.option("--at", metavar="T1,T2,...", help="Instants that the trace holds too.")
+@click.option("-o", "output", metavar="TRACE.h5", help="Default: <stem>-<scene>.h5 here.")
+@click.option("--max-steps", type=click.IntRange(min=1), metavar="N")
+@click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s.")
+@click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto")
+@click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
+def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
+    """Simulate a scene of FILE and write its trace."""
+    line = ProgressLine("never" if console.quiet else progress)
+    request = Request(timings=not no_timings, **options)
+    try:
+        ran = run(request, console.report, line)
+    finally:
+        line.clear()
+    if ran is None:
+        return console.finish(1)
+    console.report = type(console.report)(d for d in console.report if not d.code.startswith("N50"))
+    console.result = _result(ran)
+    for text in (*described(ran.started.state), *ran.outcome.warnings):
+        console.say(text)
+    if ran.failure:
+        console.complain(ran.failure)
+    console.say(_summary(ran))
+    return console.finish(ran.exit)
+
+
+def _summary(ran: Ran) -> str:
+    o = ran.outcome
+    s, t = o.statistics, o.timings
+    estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
+    form = {"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {}
+    lines = [
+        f"{ran.target.name}: {ran.prepared.formulation}, {o.method}, index {form.get(o.index, o.index)}, {ran.prepared.backend}",
+        f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
+        f"  energy balance {_last(o.samples.energy):.2e} J, constraints {_last(o.samples.constraints):.1e}",
+        f"  {o.trace}{'' if o.final else ' (not final)'}",
+    ]
+    return "\n".join(lines)
+
+
+def _last(values: Any) -> float:
+    return float(values[-1]) if np.size(values) else float("nan")
+
+
+def _result(ran: Ran) -> dict[str, Any]:
+    o = ran.outcome
+    return {
+        "trace": str(o.trace),
+        "final": o.final,
+        "reached": o.reached,
+        "formulation": ran.prepared.formulation,
+        "method": o.method,
+        "index": o.index,
+        "statistics": o.statistics,
+        "timings": o.timings,
+        "error_estimate": o.error_estimate,
+        "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
+        "moved": described(ran.started.state),
+        "warnings": list(o.warnings),
+        "failure": ran.failure,
+    }
