@@ -11,17 +11,12 @@ from numpy.typing import NDArray
 from sysdyn.compiler.binding import Binding
 from sysdyn.compiler.descriptor import DescriptorForm, Kernel
 from sysdyn.compiler.interpret import Value, over
-from sysdyn.compiler.parameters import Extents, extents, positions
+from sysdyn.compiler.parameters import Extents, positions
+from sysdyn.compiler.places import starts
 from sysdyn.dsl.expression import Node, derivative, is_const, variables
 
 Array = NDArray[np.float64]
 Point = tuple[float, Array, Array]  # t, y, yd
-
-
-def starts(shapes: tuple[Extents, ...]) -> NDArray[np.int32]:
-    """Where each family begins: at (or to), and the total at the end."""
-    sizes = [int(np.prod(extents(box), dtype=np.int64)) for box in shapes]
-    return np.concatenate(([0], np.cumsum(sizes))).astype(np.int32)
 
 
 class Oracle:

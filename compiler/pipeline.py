@@ -17,6 +17,7 @@ from sysdyn.compiler import build, descriptor, energies, manifest
 from sysdyn.compiler import program as program_
 from sysdyn.compiler.binding import Binding, Overrides
 from sysdyn.compiler.checks import check_energies
+from sysdyn.compiler.counts import check_counts
 from sysdyn.compiler.descriptor import DescriptorForm
 from sysdyn.compiler.emit_c import emit_c
 from sysdyn.compiler.emit_numpy import emit_numpy
@@ -58,8 +59,15 @@ class CompiledModel:
     timings: tuple[Timing, ...]
 
     def bind(self, overrides: Overrides | None = None) -> Binding:
-        """The numbers for one set of parameter values; never recompiles."""
-        return binding_.bind(self.network, self.form, self.program, overrides)
+        """The numbers for one set of parameter values; never recompiles.  ModelError where they make no model."""
+        binding = binding_.bind(self.network, self.form, self.program, overrides)
+        scene = self.network.scene
+        found = check_counts(self.form, self.program, binding)
+        if scene is not None and scene.redundancy in ("drop", "minimum_norm"):
+            found = tuple(d for d in found if d.code != "E517")
+        if found:
+            raise ModelError(found)
+        return binding
 
     def manifest(self, binding: Binding, index: int | None = None) -> dict[str, Any]:
         """The object of manifest.json."""

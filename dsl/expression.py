@@ -16,12 +16,14 @@ No pass recurses: nodes are visited in the order of `topological`, so depth cost
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 _interned: dict[tuple[Any, ...], Node] = {}
+_numbers = itertools.count()  # never given twice: nodes of two `fresh` blocks may meet in one expression
 
 
 class Node:
@@ -39,7 +41,7 @@ class Node:
         self.op = op
         self.data = data
         self.args = args
-        self.number = len(_interned)
+        self.number = next(_numbers)
         self.variables = None
 
     def __repr__(self) -> str:

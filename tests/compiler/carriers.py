@@ -8,7 +8,7 @@ import numpy as np
 from sysdyn.compiler.build import build
 from sysdyn.compiler.emit_c import emit_c
 from sysdyn.compiler.emit_numpy import emit_numpy
-from sysdyn.compiler.oracle import starts
+from sysdyn.compiler.places import starts
 
 _serial = itertools.count()
 

@@ -1,0 +1,163 @@
+"""Arrays stay arrays: one text for every length, the residual of an unrolled reference, large sizes at once."""
+
+import time
+
+import numpy as np
+import pytest
+from carriers import CCarrier, NumpyCarrier
+from catalogue import ONE, PLACE
+from chains import blank, chain, coordinate, parameter, reference
+from sysdyn.compiler.descriptor import BLOCKS, WITHOUT_ENTRIES
+from sysdyn.compiler.manifest import structure
+from sysdyn.compiler.oracle import Oracle
+from sysdyn.compiler.pipeline import compile_network
+from sysdyn.dsl import expression as x
+from sysdyn.dsl.network import Energy, Loop, Observation
+
+
+def compiled(n, formulation="lagrangian", backend="c"):
+    with x.fresh():
+        return compile_network(chain(n), formulation, backend)
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_text_and_structure_do_not_depend_on_the_length(formulation, backend):
+    short, long = compiled(10, formulation, backend), compiled(100_000, formulation, backend)
+    assert short.text == long.text
+    assert structure(short.form, short.program) == structure(long.form, long.program)
+
+
+def point(oracle, seed=1):
+    random = np.random.default_rng(seed)
+    return 0.3, random.uniform(0.2, 1, oracle.at[-1]), random.uniform(0.2, 1, oracle.at[-1])
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_carriers_agree_with_the_oracle(formulation, tmp_path):
+    model = compiled(7, formulation)
+    binding = model.bind()
+    oracle = Oracle(model.form, binding)
+    t, y, yd = point(oracle)
+    carriers = (
+        CCarrier(model.program, model.form, binding),
+        NumpyCarrier(model.program, model.form, binding, tmp_path),
+    )
+    for block in BLOCKS:
+        for carrier in carriers:
+            np.testing.assert_allclose(
+                carrier.rows(block, t, y, yd), oracle.rows(block, t, y, yd), rtol=1e-12, atol=1e-13
+            )
+            for order, part in enumerate(("dy", "dyd") if block not in WITHOUT_ENTRIES else ()):
+                v, _, _ = oracle.entries(block, order, t, y, yd)
+                np.testing.assert_allclose(carrier.entries(block, part, t, y, yd), v, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("n", [1, 2, 10, 1000])
+def test_residual_is_that_of_the_unrolled_chain(n, tmp_path):
+    model = compiled(n)
+    binding = model.bind()
+    carriers = (
+        CCarrier(model.program, model.form, binding),
+        NumpyCarrier(model.program, model.form, binding, tmp_path),
+    )
+    for carrier in carriers:
+        t, y, yd = point(carrier)
+        r = sum(carrier.rows(block, t, y, yd) for block in ("dynamics", "phi_reaction", "phi"))
+        np.testing.assert_allclose(r[: 3 * n], reference(n, y, yd), rtol=1e-12, atol=1e-12)
+
+
+def test_compiling_and_binding_a_long_chain_is_quick():
+    started = time.process_time()
+    compiled(100_000).bind()
+    assert time.process_time() - started < 2.0  # 20 ms when alone
+
+
+def test_binding_of_the_chain():
+    model = compiled(4)
+    binding = model.bind({("m", 2): 7.0})
+    shapes = dict(zip((f.name for f in model.form.families), binding.shapes, strict=True))
+    assert shapes["x"] == shapes["link.multiplier"] == ((1, 4),)
+    np.testing.assert_allclose(binding.values["m"], [1.25, 7.0, 1.75, 2.0])
+    pinned = {s.label: s for s in binding.initial}
+    np.testing.assert_allclose(pinned["x"].values, [0.2, 0.4, 0.6, 0.8])
+    assert pinned["x"].fixed
+    assert list(pinned["y"].positions) == [3]
+    assert not pinned["y"].fixed
+    rows = {r.block: s for r, s in zip(model.form.rows, binding.row_shapes, strict=True)}
+    assert rows["initial"] == ((2, 4),)
+
+
+def test_observations_read_arrays():
+    model = compiled(5)
+    oracle = Oracle(model.form, model.bind())
+    t, y, yd = point(oracle)
+    seen = dict(zip((r.label for r in model.form.rows), oracle.rows("observe", t, y, yd)[oracle.to[:-1]], strict=True))
+    m = 1 + np.arange(1, 6) / 5
+    assert seen["tip"] == y[4]
+    assert seen["height"] == pytest.approx(m @ y[5:10] / 3.0)
+    assert seen["norm"] == pytest.approx(np.linalg.norm(y[5:10]))
+    assert seen["tip.p"] == pytest.approx(m[4] * y[14])
+    rates = {r.label: r.rate for r in model.form.rows}
+    assert rates["tip.p"]
+    assert not rates["pull"]
+
+
+def plane(n, m):
+    """A grid of potentials x[1..n, 1..m] with a triangular double sum."""
+    i, j = x.index("i"), x.index("j")
+    one, rows, columns = x.const(1), x.param("n"), x.param("m")
+
+    def q(a, b):
+        return x.var("u", "q", a, b)
+
+    step = x.power(x.sub(q(i, j), q(x.sub(i, one), j)), x.const(2))
+    below = x.reduction("sum", "j", one, i, x.mul(x.param("c", i, j), x.call("sin", q(i, j))))
+    coupling = x.power(x.reduction("sum", "i", one, rows, q(i, one)), x.const(2))
+    loops = (Loop("i", x.const(2), rows), Loop("j", one, columns))
+    shape = ((one, rows), (one, columns))
+    total = x.call(
+        "ln", x.reduction("sum", "i", one, rows, x.reduction("sum", "j", one, columns, x.call("exp", q(i, j))))
+    )
+    return blank(
+        parameters=(
+            parameter("n", float(n), whole=True),
+            parameter("m", float(m), whole=True),
+            parameter("c", x.add(i, x.mul(x.const(10), j)), shape, ("i", "j")),
+        ),
+        coordinates=(coordinate("u", shape),),
+        energies=(
+            Energy("V", step, loops, PLACE),
+            Energy("V", x.reduction("sum", "i", one, rows, below), (), PLACE),
+            Energy("V", coupling, (), PLACE),
+        ),
+        observations=(Observation("total", total, ONE, "total", PLACE),),
+    )
+
+
+def test_two_indices_triangles_and_products_of_sums(tmp_path):
+    n, m = 4, 5
+    with x.fresh():
+        model = compile_network(plane(n, m))
+        binding = model.bind()
+        oracle = Oracle(model.form, binding)
+        t, y, yd = point(oracle)
+        u = y[: n * m].reshape(n, m)
+        force = np.zeros((n, m))
+        force[1:] += 2 * np.diff(u, axis=0)
+        force[:-1] -= 2 * np.diff(u, axis=0)
+        i, j = np.mgrid[1 : n + 1, 1 : m + 1]
+        force += np.where(j <= i, (i + 10 * j) * np.cos(u), 0.0)
+        force[:, 0] += 2 * u[:, 0].sum()
+        carriers = [CCarrier(model.program, model.form, binding)]
+        carriers.append(NumpyCarrier(model.program, model.form, binding, tmp_path))
+        for carrier in (oracle, *carriers):
+            np.testing.assert_allclose(carrier.rows("dynamics", t, y, yd)[: n * m].reshape(n, m), force, rtol=1e-13)
+            total = carrier.rows("observe", t, y, yd)[n * m]
+            assert total == pytest.approx(np.log(np.exp(u).sum()), rel=1e-14)
+        v, r, c = oracle.entries("dynamics", 0, t, y, yd)
+        for carrier in carriers:
+            np.testing.assert_allclose(carrier.entries("dynamics", "dy", t, y, yd), v, rtol=1e-13)
+        jacobian = np.zeros((n * m, n * m))
+        np.add.at(jacobian, (r.astype(int), c.astype(int)), v)
+        np.testing.assert_allclose(jacobian, jacobian.T, rtol=1e-13)
