@@ -25,7 +25,7 @@ from sysdyn.runtime.system import System
 
 Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s")
-_WEIGHT = {"written": 1.0, "unwritten": 0.3, "following": 1e-3}
+_WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 EXACT = 1e-9
 
@@ -168,10 +168,12 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, f
 
 
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """Positions, then first derivatives: a good place from which to solve for everything."""
+    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held."""
     kinds = np.concatenate([starter.kinds, np.full(starter.rates.size, "rate")])
     for groups, moving in (
         (("phi",), ("q",)),
+        (("phi_rate", "psi"), ("f",)),
+        (("momentum",), ("p",)),
         (("phi", "phi_rate", "psi", "momentum"), ("q", "f", "p")),
     ):
         rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
@@ -184,9 +186,12 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> Solution:
-    """Everything at once from the staged point, then from perturbed ones."""
+    """What follows from the staged state; where nothing does, everything at once, then from perturbed points."""
     every = np.ones(starter.settled.rows, dtype=bool)
     x = _stages(starter, t, guess.copy(), guess, free)
+    best = solve(_problem(starter, t, x, guess, every, free & starter.following(t, x)), x)
+    if best.residual < EXACT:
+        return best
     problem = _problem(starter, t, x, guess, every, free)
     best = solve(problem, x)
     random = np.random.default_rng(20)
