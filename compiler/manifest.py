@@ -28,7 +28,7 @@ def structure(form: DescriptorForm, program: Program) -> dict[str, Any]:
 
 def _family(family: Unknowns) -> dict[str, Any]:
     plain = {"name": family.name, "kind": family.kind, "owner": family.owner, "unit": family.unit}
-    return {**plain, "nominal": 1.0, **_where(family.place)}
+    return {**plain, "nominal": None, **_where(family.place)}
 
 
 def _row(row: Equations) -> dict[str, Any]:

@@ -101,6 +101,8 @@ class Integration:
         self.cpu = 0.0
         self.y, self.yd = start.for_form(system)
         jy, jyd = system.jacobian(start.t, self.y, self.yd)
+        # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
+        self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, jyd, request.index)
         self.magnitude = self._magnitudes()
         self._linear(jy, jyd)
