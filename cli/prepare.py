@@ -38,7 +38,11 @@ class Prepared:
     @property
     def arrays(self) -> dict[str, Any]:
         """The binding as the contract's plain arrays."""
-        b = self.binding
+        return self.arrays_of(self.binding)
+
+    @staticmethod
+    def arrays_of(b: Binding) -> dict[str, Any]:
+        """Another binding of the same model as plain arrays."""
         return {
             "p": b.p,
             "ix": b.ix,
