@@ -142,13 +142,13 @@ def _offsets(
     form: DescriptorForm, owners: dict[str, Extents], starts: tuple[Start, ...], parameters: Parameters
 ) -> dict[str, NDArray[np.float64]]:
     """Constants of integrated constraints: B q0 at the initial displacements (0 where none is written)."""
-    held: dict[str, NDArray[np.float64]] = {}
+    held: dict[tuple[str, str], NDArray[np.float64]] = {}
     for k, family in enumerate(form.families):
         if family.kind in ("q", "p"):
-            held[family.owner] = np.zeros(extents(owners[family.owner]))
+            held[family.owner, family.kind] = np.zeros(extents(owners[family.owner]))
             for start in starts:
                 if start.family == k:
-                    held[family.owner].flat[start.positions] = start.values
+                    held[family.owner, family.kind].flat[start.positions] = start.values
     found: dict[str, NDArray[np.float64]] = {}
 
     def lookup(node: Node, args: list[Value]) -> Value:
@@ -157,7 +157,7 @@ def _offsets(
         if node.op == "var":
             box = owners[node.data[0]]
             whole = [np.rint(a).astype(np.int64) for a in args]
-            return held[node.data[0]].flat[positions(box, whole) if box else 0]
+            return held[node.data[:2]].flat[positions(box, whole) if box else 0]
         return parameters.lookup(node, args)
 
     for offset in form.offsets:

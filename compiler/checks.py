@@ -5,12 +5,14 @@ Purely syntactic rules are the front end's; those that count array elements are 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 
 from sysdyn.compiler.energies import EnergyModel, tangible
+from sysdyn.compiler.integers import Integers
 from sysdyn.compiler.momenta import given, inertial, undefined
-from sysdyn.dsl.diagnostics import Diagnostic, Place, Related
-from sysdyn.dsl.expression import Node, variables
+from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place, Related
+from sysdyn.dsl.expression import Node, topological, variables
 from sysdyn.dsl.network import Network
 
 
@@ -21,6 +23,7 @@ def check_energies(model: EnergyModel, network: Network) -> tuple[Diagnostic, ..
         *_assertions(model, network),
         *_undetermined(model),
         *_missing_momenta(model),
+        *_indices(model),
     )
 
 
@@ -66,14 +69,32 @@ def _undetermined(model: EnergyModel) -> Iterator[Diagnostic]:
 def _missing_momenta(model: EnergyModel) -> Iterator[Diagnostic]:
     """E606: x.p is read, and no kinetic store moves with x."""
     carriers = given(model) | inertial(model)
-    asked: list[tuple[Node, Place]] = [(q.expression, q.place) for q in model.quantities]
-    asked += [(i.target, i.place) for i in model.initials]
-    asked += [(t.expression, t.place) for row in model.rows for t in row.terms]
-    asked += [(w.effort, w.place) for w in model.works]
-    for expression, place in asked:
+    for expression, place in _written(model):
         for name in dict.fromkeys(undefined(model, carriers, expression)):
             message = f"{name} has no momentum variable: T* has no second derivative in {name}'"
             yield Diagnostic("E606", message, place, "dT*/df is zero there")
+
+
+def _indices(model: EnergyModel) -> Iterator[Diagnostic]:
+    """E806: an index that is not i + c; each once."""
+    seen: set[Node] = set()
+    energies = ((t.expression, t.place) for name in model.functions for t in model.function(name))
+    for expression, place in (*energies, *_written(model)):
+        for node in topological([expression]):
+            for at in node.args if node.op in ("var", "param") and node not in seen else ():
+                try:
+                    Integers().index(at, defaultdict(int))
+                except ModelError as error:
+                    yield Diagnostic("E806", error.diagnostics[0].message, place, "a table over the index")
+            seen.add(node)
+
+
+def _written(model: EnergyModel) -> list[tuple[Node, Place]]:
+    """Everything but the energies that a statement says, with its place."""
+    asked = [(q.expression, q.place) for q in model.quantities]
+    asked += [(i.target, i.place) for i in model.initials]
+    asked += [(t.expression, t.place) for row in model.rows for t in row.terms]
+    return asked + [(w.effort, w.place) for w in model.works]
 
 
 def _of_rows(model: EnergyModel, kinds: tuple[str, ...]) -> list[Node]:

@@ -1,0 +1,148 @@
+"""What the generated text may depend on: nothing of the user's names, of the process, of an earlier model."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from carriers import CCarrier
+from catalogue import PLACE, load, network
+from chains import chain
+from sysdyn.compiler import build as build_
+from sysdyn.compiler.emit_c import emit_c
+from sysdyn.compiler.emit_numpy import emit_numpy
+from sysdyn.compiler.pipeline import compile_network
+from sysdyn.dsl import expression as x
+
+HERE = Path(__file__).parent
+HOSTILE = ('x; system("ls")', "*/ #include </etc/passwd>", "größe_ß", "a" * 10_000, "int", "\\", "% s", "x\ny")
+
+SCRIPT = """
+import hashlib, sys
+sys.path.insert(0, sys.argv[1])
+from catalogue import load, network
+from chains import chain
+from sysdyn.compiler.pipeline import compile_network
+from sysdyn.compiler.manifest import structure
+from sysdyn.dsl import expression as x
+entries = load("catalogue.json")
+total = hashlib.sha256()
+for backend in ("c", "numpy"):
+    primal = [k for k in sorted(entries) if entries[k]["models"][0]["form"] == "lagrangian"]
+    for net in (lambda: chain(5), *((lambda k=k: network(entries[k], entries[k]["models"][0])) for k in primal)):
+        with x.fresh():
+            model = compile_network(net(), "hamiltonian", backend)
+            total.update(model.text.encode())
+            total.update(repr(structure(model.form, model.program)).encode())
+print(total.hexdigest())
+"""
+
+
+def test_two_processes_print_the_same():
+    prints = set()
+    for seed in ("0", "1", "424242"):
+        run = subprocess.run(
+            [sys.executable, "-c", SCRIPT, str(HERE)],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+        )
+        prints.add(run.stdout)
+    assert len(prints) == 1
+
+
+def test_an_earlier_model_changes_nothing():
+    entries = load("catalogue.json")
+
+    def text(key):
+        with x.fresh():
+            return compile_network(network(entries[key], entries[key]["models"][0])).text
+
+    first = text("solenoid")
+    text("two_link_arm")
+    assert text("solenoid") == first
+
+
+def renamed(net, change):
+    """Every name of a scalar network replaced."""
+
+    def node(n):
+        swap = {}
+        for part in x.topological([n]):
+            if part.op == "param":
+                swap[part] = x.param(change(part.data))
+            elif part.op == "var":
+                family, kind, order = part.data
+                swap[part] = x.var(change(family), kind, order=order)
+        return x.substitute(n, swap)
+
+    def value(v):
+        if isinstance(v, x.Node):
+            return node(v)
+        if isinstance(v, tuple):
+            return tuple(value(i) for i in v)
+        if hasattr(v, "__slots__") and type(v).__module__.endswith("network"):
+            fields = {f: value(getattr(v, f)) for f in v.__slots__}
+            if "name" in fields:
+                fields["name"] = change(fields["name"])
+            return type(v)(**fields)
+        return v
+
+    return value(replace(net, model="m"))
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("emit", [emit_c, emit_numpy])
+def test_no_name_of_the_user_reaches_the_text(emit, name):
+    entry = load("catalogue.json")["rectifier_motor_crank"]
+    with x.fresh():
+        plain = compile_network(renamed(network(entry, entry["models"][0]), lambda n: n + "_"))
+    with x.fresh():
+        other = compile_network(renamed(network(entry, entry["models"][0]), lambda n: n + name))
+    assert emit(plain.program, plain.form) == emit(other.program, other.form)
+
+
+def test_observations_by_name_do_not_either():
+    with x.fresh():
+        net = chain(3)
+        hostile = replace(
+            net, observations=tuple(replace(o, name=f"*/{k}", text="*/") for k, o in enumerate(net.observations))
+        )
+        assert compile_network(net).text == compile_network(hostile).text
+
+
+def test_text_is_ascii_and_numbers_survive():
+    with x.fresh():
+        model = compile_network(chain(3))
+        assert model.text.isascii()
+        assert "0.2*" in model.text
+        assert str(PLACE.start[0]) in model.text
+
+
+def test_two_names_of_one_length_do_not_matter(tmp_path, monkeypatch):
+    monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
+    with x.fresh():
+        model = compile_network(chain(3))
+        path = model.library()
+        assert path == model.library()
+        assert path.parent == tmp_path / "cache"
+        assert (tmp_path / "cache").stat().st_mode & 0o777 == 0o700
+        assert [p.name for p in path.parent.iterdir()] == [path.name]
+        assert CCarrier(model.program, model.form, model.bind()).library.sd_dynamics_rows
+
+
+def test_no_compiler_is_its_own_error(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler-anywhere")
+    with pytest.raises(build_.NoCompilerError):
+        build_.build("int x;")
+
+
+def test_a_refused_text_says_what_the_compiler_said(tmp_path, monkeypatch):
+    monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path))
+    with pytest.raises(build_.BuildError) as error:
+        build_.build("this is no C")
+    assert "error" in error.value.output
+    assert not list(tmp_path.glob("*.so"))
