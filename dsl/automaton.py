@@ -129,6 +129,9 @@ class Automaton:
             number = scanner.text[start : unit.start].rstrip()
             return self.notes.quantity(number, Span(start, end), unit)
         if kind == "<number>":
+            if scanner.unit is not None and scanner.unit[1] == end:
+                # a unit grown to a number where no quantity may stand (E114 has been said)
+                text = scanner.text[start : scanner.unit[0]]
             return self.notes.number(text, Span(start, end))
         if kind == "<text>":
             return Text(text[1:-1], Span(start, end))

@@ -254,6 +254,11 @@ def relation(v: Values, span: Span, notes: Notes) -> Any:
     return v[0]
 
 
+def comparison(v: Values, span: Span, notes: Notes) -> Any:
+    """`== | != | <= | >= | < | >`."""
+    return v[0]
+
+
 def guard_while(v: Values, span: Span, notes: Notes) -> s.Guard:
     """`while expr`."""
     return s.Guard("while", v[0], span)

@@ -224,7 +224,7 @@ def _hint(kind: str, text: str, before: str, accepted: Collection[str]) -> str |
         return "a number has no leading '+'"
     if text == "." and "<number>" in accepted:
         return "a number begins with a digit: 0.5"
-    if kind == "<quantity>" and "<number>" in accepted:
+    if kind == "<name>" and before.isdigit() and set(accepted) <= {",", ")"}:
         return "bare numbers here: their units stand in the head of the table"
     if text in ("<", ">", "<=", ">=", "==", "!=") and "and" in accepted:
         return "comparisons do not chain: a < b and b < c"

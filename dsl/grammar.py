@@ -29,7 +29,6 @@ _REGULAR = {
     "_NL": "<newline>",
     "$END": "<end>",
 }
-_COMPARE = ("==", "!=", "<=", ">=", "<", ">")
 
 
 def build_lark() -> Any:
@@ -74,8 +73,6 @@ def _kinds(terminal: Any) -> tuple[str, ...]:
     """What the author writes for a terminal of lark."""
     if terminal.name in _REGULAR:
         return (_REGULAR[terminal.name],)
-    if terminal.name == "COMPARE":
-        return _COMPARE
     words = _CLASS_OF_WORDS.fullmatch(terminal.pattern.value)
     if words is not None:
         return tuple(words.group(1).split("|"))

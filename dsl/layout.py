@@ -24,7 +24,8 @@ def fill(pieces: Sequence[str], indent: int) -> list[str]:
     lines: list[str] = []
     start = position = 0
     width = indent
-    good = poor = None
+    good: int | None = None
+    poor: int | None = None
     depth = 0
     while position < len(pieces):
         piece = pieces[position]
@@ -67,7 +68,8 @@ def _depth(pieces: Sequence[str], depth: int) -> int:
 
 def _breaks(pieces: Sequence[str], start: int, end: int, depth: int) -> tuple[int | None, int | None]:
     """The last good and the last poor break after pieces start..end - 1."""
-    good = poor = None
+    good: int | None = None
+    poor: int | None = None
     for position in range(start, end):
         depth += _opened(pieces[position])
         rank = _rank(pieces[position], depth)

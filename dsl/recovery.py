@@ -165,6 +165,9 @@ class Recovery:
             if after.startswith("->") or (complaint[0] == "E113" and after[:1] in ("=", ",") and self._indented(start)):
                 complaint = complaints.connection()
             self._error(complaint, Span(start, start + len(word)))
+        elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
+            message = f"'{word}' begins a statement here and cannot be the label of an element"
+            self._error(("E113", message, f"{word}_: ..."), Span(start, start + len(word)))
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
             before = scanner.text[: scanner.start].rstrip()[-1:]

@@ -26,7 +26,8 @@ def first_difference(left: Any, right: Any) -> tuple[Any, Any] | None:
                 return one, other
             stack.extend(zip(one, other, strict=True))
         elif is_dataclass(one):
-            stack.extend((getattr(one, name), getattr(other, name)) for name in _contents(type(one)))
+            kind: type[Any] = type(one)
+            stack.extend((getattr(one, name), getattr(other, name)) for name in _contents(kind))
         elif one != other:
             return one, other
     return None
