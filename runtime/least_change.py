@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,18 @@ from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
 
 Mask = NDArray[np.bool_]
-DENSE = 500
+SINGULAR_VALUES = 120
 """Unknowns up to which singular values are used."""
+DENSE = 400
+"""Unknowns up to which matrices are full (no SciPy)."""
+EPS = 1e-13
+"""Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
 _ITERATIONS = 60
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
+_PROXIMAL = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,31 +82,44 @@ class _Linear:
         i, j, v = self.entries
         aim = -r
         np.add.at(aim, i, v * u[j])
-        if max(self.shape) <= DENSE:
-            a = np.zeros(self.shape)
-            np.add.at(a, (i, j), v)
-            # rows of equal size: a row of small coefficients must not pass for a redundant one
-            size = np.sqrt((a * a).sum(axis=1))
-            size = np.where(size > 0.0, size, 1.0)
-            return np.linalg.lstsq(a / size[:, None], aim / size, rcond=RANK)[0]
-        return self._sparse(aim, u)
-
-    def _sparse(self, aim: Floats, u: Floats) -> Floats:
-        from scipy.sparse import csc_array, eye_array, block_array
-        from scipy.sparse.linalg import splu
-
-        i, j, v = self.entries
+        # rows of equal size: a row of small coefficients must not pass for a redundant one
         size = np.zeros(self.shape[0])
         np.add.at(size, i, v * v)
         size = np.where(size > 0.0, np.sqrt(size), 1.0)
-        a = csc_array((v / size[i], (i, j)), shape=self.shape)
-        rows, unknowns = self.shape
-        matrix = block_array([[eye_array(unknowns), a.T], [a, -1e-12 * eye_array(rows)]], format="csc")
-        lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1)
-        right = np.concatenate([np.zeros(unknowns), aim / size])
-        found = lu.solve(right)
-        found += lu.solve(right - matrix @ found)
-        return np.asarray(found[:unknowns])
+        v, aim = v / size[i], aim / size
+        if max(self.shape) <= SINGULAR_VALUES:
+            a = np.zeros(self.shape)
+            np.add.at(a, (i, j), v)
+            return np.linalg.lstsq(a, aim, rcond=RANK)[0]
+        return _saddle_point(self.shape, (i, j, v), aim)
+
+
+def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    """The u of least norm with A u = aim from [I A^T; A -eps], dense up to DENSE unknowns."""
+    rows, unknowns = shape
+    i, j, v = entries
+    here = np.arange(unknowns), unknowns + np.arange(rows)
+    places = np.concatenate([here[0], j, unknowns + i, here[1]]), np.concatenate([here[0], unknowns + i, j, here[1]])
+    values = np.concatenate([np.ones(unknowns), v, v, np.full(rows, -EPS)])
+    apply: Callable[[Floats], Floats]
+    back: Callable[[Floats], Floats]
+    if max(shape) <= DENSE:
+        full = np.zeros((unknowns + rows, unknowns + rows))
+        np.add.at(full, places, values)
+        inverse = np.linalg.inv(full)
+        apply, back = full.dot, inverse.dot
+    else:
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        matrix = csc_array((values, places), shape=(unknowns + rows, unknowns + rows))
+        apply, back = matrix.dot, splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1).solve
+    found = np.zeros(unknowns + rows)
+    for _ in range(_PROXIMAL):
+        # eps acts on the change of the multipliers only, so that it leaves no trace in the solution
+        right = np.concatenate([np.zeros(unknowns), aim - EPS * found[unknowns:]])
+        found = found + back(right - apply(found))
+    return found[:unknowns]
 
 
 def solve(problem: Problem, x: Floats) -> Solution:

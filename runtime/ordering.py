@@ -11,7 +11,7 @@ DENSE = 50
 """Largest dense matrix (SD_DENSE of core/linear.h)."""
 
 
-def column_order(pattern: Pattern, values: Floats, method: str = "COLAMD") -> Ints | None:
+def column_order(pattern: Pattern, values: Floats) -> Ints | None:
     """Elimination order [unknowns] of a square matrix, None where it is small enough for the dense LU.
 
     values [entries] of a typical matrix.  Where they are singular, seeded random values on the same pattern serve:
@@ -29,7 +29,7 @@ def column_order(pattern: Pattern, values: Floats, method: str = "COLAMD") -> In
             continue
         matrix = csc_array((attempt, pattern.row, pattern.column), shape=shape)
         try:
-            found = splu(matrix, permc_spec=method, diag_pivot_thresh=0.1)
+            found = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1)
         except RuntimeError:
             continue
         return np.argsort(found.perm_c).astype(np.int32)

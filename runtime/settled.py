@@ -96,7 +96,7 @@ class Settler:
         return values
 
     def _allocate(self) -> None:
-        order = column_order(self.pattern, self._typical(), "MMD_AT_PLUS_A")
+        order = column_order(self.pattern, self._typical())
         self._order = order
         self.linear = lib.core.sd_linear_new(
             self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))

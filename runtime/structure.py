@@ -162,7 +162,7 @@ def _sparse_rank(which: NDArray[np.int64], place: NDArray[np.int64], value: Floa
     eps = 1e-13
     c = csc_array((value, (which, place)), shape=(rows, columns))
     matrix = block_array([[eye_array(columns), c.T], [c, -eps * eye_array(rows)]], format="csc")
-    lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01)
+    lu = splu(matrix, permc_spec="COLAMD")
     return rows - int((np.abs(lu.U.diagonal()) < 1e3 * eps).sum())
 
 
