@@ -1,7 +1,7 @@
 """The LALR(1) automaton: tokens in, syntax tree out, in one loop without recursion.
 
-The tables come from `table.py`. A reduction calls the rule's function in `build_expressions` or
-`build_statements`; rules that only hand on their child cost no call, lists grow in place. What is
+The tables come from `table.py`. A reduction calls the rule's function in `build_expressions`,
+`build_statements` or `build_scenes`; rules that only hand on their child cost no call, lists grow in place. What is
 to be done about a token that does not fit is decided in `recovery`.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from sysdyn.dsl import build_expressions, build_statements
+from sysdyn.dsl import build_expressions, build_scenes, build_statements
 from sysdyn.dsl.lexing import Scanner
 from sysdyn.dsl.notes import MAX_TERMS, Notes
 from sysdyn.dsl.source import SourceText, Span
@@ -32,12 +32,28 @@ _BLOCKS_OF_STATEMENTS = ("for_", "when", "every", "level", "scene")
 
 def _rows() -> tuple[dict[str, int], ...]:
     """For each state the action on each terminal: a state to shift to, or -1 - rule."""
-    return tuple({terminal: action for action, number in row for terminal in LOOKAHEADS[number]} for row in ROWS)
+    sets = {str(number): line.split() for number, line in enumerate(LOOKAHEADS.splitlines())}
+    rows = []
+    for line in ROWS.splitlines():
+        row: dict[str, int] = {}
+        for entry in line.split():
+            action, _, number = entry.partition(":")
+            row.update(dict.fromkeys(sets[number], int(action)))
+        rows.append(row)
+    return tuple(rows)
+
+
+def _gotos() -> tuple[dict[str, int], ...]:
+    """For each state the next state behind each left side."""
+    return tuple(
+        {left: int(state) for left, _, state in (entry.rpartition(":") for entry in line.split())}
+        for line in GOTOS.splitlines()
+    )
 
 
 def _build(name: str) -> Build:
     """The function of a rule: named as the rule, with `_` behind a name that Python has."""
-    for module in (build_expressions, build_statements):
+    for module in (build_expressions, build_statements, build_scenes):
         found = getattr(module, name, None) or getattr(module, name + "_", None)
         if found is not None:
             function: Build = found
@@ -47,15 +63,19 @@ def _build(name: str) -> Build:
 
 def _actions() -> tuple[tuple[str, int, Build | None, bool, tuple[tuple[int, bool], ...]], ...]:
     """For each rule: left side, length, function (None: a list), whether it hands on, children."""
-    functions: dict[str, Build | None] = {"[]": None, "": None}
-    for _, _, name, _ in RULES:
+    functions: dict[str, Build | None] = {"[]": None, "=": None}
+    actions = []
+    for line in RULES.splitlines():
+        left, length, name, *children = line.split()
         if name not in functions:
             functions[name] = _build(name)
-    return tuple((left, length, functions[name], name == "", children) for left, length, name, children in RULES)
+        places = tuple((-1 if item == "-" else int(item.rstrip("*")), item.endswith("*")) for item in children)
+        actions.append((left, int(length), functions[name], name == "=", places))
+    return tuple(actions)
 
 
 _TABLE_ROWS = _rows()
-_TABLE_GOTOS = tuple(dict(row) for row in GOTOS)
+_TABLE_GOTOS = _gotos()
 _TABLE_RULES = _actions()
 
 

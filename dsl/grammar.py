@@ -2,8 +2,8 @@
 
 lark builds the LALR(1) automaton (strict: no conflict is resolved silently); this module renumbers
 it in the order of a walk from the start state, so that equal grammars give equal tables, and writes
-it as Python literals. Reading a model then needs neither lark nor a cache: the tables load with the
-package. Measured: 0.24 s to build with lark, 75 ms to import lark, 3 ms to load the tables.
+it as lines of text. Reading a model then needs neither lark nor a cache: the tables load with the
+package. Measured: 0.24 s to build with lark, 75 ms to import lark, 5 ms to load the tables.
 
 Run `python -m sysdyn.dsl.grammar` after a change of `sd.lark`; a test compares the two files.
 
@@ -107,74 +107,64 @@ def _numbered(by_action: dict[int, set[str]], lookaheads: dict[tuple[str, ...], 
     return tuple((action, lookaheads.setdefault(sets[action], len(lookaheads))) for action in sorted(sets))
 
 
-def _rule(rule: Any) -> tuple[str, int, str, tuple[tuple[int, bool], ...]]:
-    """Left side, length, name of the function, and the children: position (-1: None) and whether
-    a list to be spliced in. The name is '' for a rule that hands on its one child, '[]' for a list.
+def _rule(rule: Any) -> str:
+    """Left side, length, name of the function, children: positions, `*` for a list to be spliced
+    in, `-` for an absent part. The name is `=` for a rule that hands on its one child, `[]` for a list.
     """
     options = rule.options
     missing = options.empty_indices or (False,) * len(rule.expansion)
-    children: list[tuple[int, bool]] = []
+    children: list[str] = []
     position = 0
     for absent in missing:
         if absent:
-            children.append((-1, False))
+            children.append("-")
             continue
         symbol = rule.expansion[position]
         if options.keep_all_tokens or not (symbol.is_term and symbol.filter_out):
-            children.append((position, not symbol.is_term and symbol.name.startswith("_")))
+            spliced = not symbol.is_term and symbol.name.startswith("_")
+            children.append(f"{position}{'*' if spliced else ''}")
         position += 1
     name = rule.alias or rule.origin.name
     if rule.alias is None and rule.origin.name.startswith("_"):
         name = "[]"
     elif rule.alias is None and options.expand1 and len(children) == 1:
-        name = ""
-    return rule.origin.name, len(rule.expansion), name, tuple(children)
+        name = "="
+    return " ".join((rule.origin.name, str(len(rule.expansion)), name, *children))
 
 
 def _print(states: list[Any], gotos: list[Any], rules: list[Any], lookaheads: dict[Any, int], final: int) -> str:
     """The module's text."""
+    rows = [" ".join(f"{action}:{number}" for action, number in row) for row in states]
+    moves = [" ".join(f"{left}:{target}" for left, target in row) for row in gotos]
     lines = [
-        '"""Tables of the parser, generated from `sd.lark` by `grammar.py`: do not edit."""',
+        '"""Tables of the parser, generated from `sd.lark` by `grammar.py`: do not edit.',
+        "",
+        "Texts, not tuples, because a text costs nothing to compile; `automaton` decodes them.",
+        '"""',
         "",
         "# ruff: noqa: E501",
-        "",
-        "from __future__ import annotations",
         "",
         f"FINAL = {final}",
         '"""The state that has read a whole file."""',
         "",
-        *_block("LOOKAHEADS", "tuple[tuple[str, ...], ...]", lookaheads),
-        '"""Sets of terminals."""',
+        *_block("LOOKAHEADS", [" ".join(terminals) for terminals in lookaheads]),
+        '"""Sets of terminals, one a line."""',
         "",
-        *_block("ROWS", "tuple[tuple[tuple[int, int], ...], ...]", states),
-        '"""For each state (action, lookahead set): shift to a state, or -1 - rule to reduce."""',
+        *_block("ROWS", rows),
+        '"""For each state action:set, where the action is a state to shift to, or -1 - rule to reduce."""',
         "",
-        *_block("GOTOS", "tuple[tuple[tuple[str, int], ...], ...]", gotos),
-        '"""For each state (left side, next state)."""',
+        *_block("GOTOS", moves),
+        '"""For each state left side:state."""',
         "",
-        *_block(
-            "RULES",
-            "tuple[tuple[str, int, str, tuple[tuple[int, bool], ...]], ...]",
-            [_rule(rule) for rule in rules],
-        ),
+        *_block("RULES", [_rule(rule) for rule in rules]),
         '"""Left side, length, function, children: see `grammar._rule`."""',
     ]
     return "\n".join(lines) + "\n"
 
 
-def _block(name: str, kind: str, rows: Iterable[Any]) -> list[str]:
-    """An annotated tuple, one row a line, in double quotes."""
-    return [f"{name}: {kind} = (", *(f"    {_literal(row)}," for row in rows), ")"]
-
-
-def _literal(value: Any) -> str:
-    """A nested tuple of strings, numbers and booleans as Python text in double quotes."""
-    if isinstance(value, tuple):
-        items = ", ".join(_literal(item) for item in value)
-        return f"({items},)" if len(value) == 1 else f"({items})"
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    return repr(value)
+def _block(name: str, rows: Iterable[str]) -> list[str]:
+    """A constant of lines."""
+    return [f'{name} = """\\', *rows, '"""']
 
 
 if __name__ == "__main__":

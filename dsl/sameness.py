@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from functools import cache
 from typing import Any
 
 _PLACES = frozenset({"span", "source", "comments"})
@@ -33,7 +32,11 @@ def first_difference(left: Any, right: Any) -> tuple[Any, Any] | None:
     return None
 
 
-@cache
+_CONTENTS: dict[type[Any], tuple[str, ...]] = {}
+
+
 def _contents(kind: type[Any]) -> tuple[str, ...]:
     """The fields of a node that are not places."""
-    return tuple(field.name for field in fields(kind) if field.name not in _PLACES)
+    if kind not in _CONTENTS:
+        _CONTENTS[kind] = tuple(field.name for field in fields(kind) if field.name not in _PLACES)
+    return _CONTENTS[kind]

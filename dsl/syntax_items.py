@@ -7,7 +7,8 @@ from typing import Literal
 
 from sysdyn.dsl.source import SourceText, Span
 from sysdyn.dsl.syntax_expressions import Dotted, Expr, Number, Unit, Word
-from sysdyn.dsl.syntax_statements import Broken, SceneStatement, Statement
+from sysdyn.dsl.syntax_scenes import SceneStatement
+from sysdyn.dsl.syntax_statements import Broken, Statement
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Statements of components, models and scenes."""
+"""Statements of components and models."""
 
 from __future__ import annotations
 
@@ -68,16 +68,6 @@ class Single:
     """Connection `node`, short for `node -> ground`."""
 
     node: Expr
-    span: Span
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TraceItem:
-    """`expr [in unit] [as alias]`."""
-
-    expr: Expr
-    unit: Unit | None
-    alias: Word | None
     span: Span
 
 
@@ -383,94 +373,6 @@ class Instance:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Time:
-    """`time a to b`."""
-
-    start: Expr
-    stop: Expr
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Set:
-    """`set ref = expr`."""
-
-    target: Expr
-    value: Expr
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SceneLevel:
-    """`level ref = name`."""
-
-    target: Expr
-    level: Word
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Trace:
-    """`trace expr, ... [every dt]`."""
-
-    items: tuple[TraceItem, ...]
-    every: Expr | None
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Accuracy:
-    """`accuracy r [on a, b]`."""
-
-    value: Expr
-    on: tuple[Expr, ...]
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Formulation:
-    """`formulation lagrangian`."""
-
-    name: Word
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Solver:
-    """`solver bdf(order = 5)`."""
-
-    name: Word
-    args: tuple[Arg, ...] | None
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Redundancy:
-    """`redundancy drop`."""
-
-    name: Word
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Limit:
-    """`limit steps n`."""
-
-    name: Word
-    value: Expr
-    span: Span
-    doc: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Broken:
     """A statement that could not be read; `names` are the names in it, so that later stages can spare
     the author errors that only follow from this one.
@@ -509,21 +411,5 @@ Statement = (
     | Golden
     | Lossless
     | Instance
-    | Broken
-)
-SceneStatement = (
-    Time
-    | Set
-    | SceneLevel
-    | Trace
-    | Accuracy
-    | Formulation
-    | Solver
-    | Redundancy
-    | Limit
-    | Init
-    | When
-    | Expect
-    | Golden
     | Broken
 )

@@ -211,16 +211,17 @@ def test_a_second_sign_is_no_comment():
 def test_every_word_of_a_body_is_known_to_the_messages():
     from sysdyn.dsl.table import GOTOS, LOOKAHEADS, ROWS
 
+    sets = [line.split() for line in LOOKAHEADS.splitlines()]
     bodies = {
         "item": complaints.ITEM_WORDS,
         "role": complaints.DOMAIN_WORDS,
         "statement": complaints.MODEL_WORDS,
         "scene_statement": complaints.SCENE_WORDS,
     }
-    for row, goto in zip(ROWS, GOTOS, strict=True):
+    for row, goto in zip(ROWS.splitlines(), GOTOS.splitlines(), strict=True):
         for left, words in bodies.items():
-            if left in dict(goto):
-                terminals = {terminal for _, number in row for terminal in LOOKAHEADS[number]}
+            if f" {left}:" in f" {goto}":
+                terminals = {word for entry in row.split() for word in sets[int(entry.split(":")[1])]}
                 assert {terminal for terminal in terminals if terminal.isalpha()} == words
 
 
