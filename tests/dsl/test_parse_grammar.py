@@ -45,6 +45,7 @@ class Newlines:
 
 @pytest.fixture(scope="module")
 def lark():
+    pytest.importorskip("interegular")
     from lark import Lark
 
     text = (Path(table.__file__).parent / "sd.lark").read_text(encoding="utf-8")
