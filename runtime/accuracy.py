@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import SolverFailure
 
@@ -72,7 +71,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
 def _shrink(power: float, step: float) -> float:
     """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger."""
     ratio = 10.0 ** (-power * step)
-    return SAFETY * ratio / (1.0 - ratio)
+    return float(SAFETY * ratio / (1.0 - ratio))
 
 
 def control(run: Run, target: Floats) -> Achieved:

@@ -16,8 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from sysdyn.runtime.core_library import ROWS
+from sysdyn.runtime.core_library import ROWS, reader
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.failures import ContractError
 
@@ -145,7 +144,9 @@ class ModuleCarrier:
         )
 
 
-def _callback(function: Callable[..., None], tables: Tables, inputs: int, outputs: int, failure: Failure) -> Any:
+def _callback(
+    function: Callable[..., None], tables: Tables, inputs: int, outputs: int, failure: Failure
+) -> Any:
     """A C function pointer to function(p, ix, at, to, t, y, yd, out)."""
     views: dict[tuple[int, int], Floats] = {}
 
@@ -154,7 +155,7 @@ def _callback(function: Callable[..., None], tables: Tables, inputs: int, output
         if found is None:
             if len(views) > _VIEWS:
                 views.clear()
-            found = np.frombuffer((c.c_double * number).from_address(address), dtype=np.float64)
+            found = reader(address, number)
             views[address, number] = found
         return found
 
@@ -162,7 +163,14 @@ def _callback(function: Callable[..., None], tables: Tables, inputs: int, output
         try:
             with np.errstate(all="ignore"):
                 function(
-                    tables.p, tables.ix, tables.at, tables.to, t, view(y, inputs), view(yd, inputs), view(out, outputs)
+                    tables.p,
+                    tables.ix,
+                    tables.at,
+                    tables.to,
+                    t,
+                    view(y, inputs),
+                    view(yd, inputs),
+                    view(out, outputs),
                 )
         except BaseException as exception:
             failure.note(exception)

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from sysdyn.runtime import _core
+from sysdyn.runtime import _core  # type: ignore[attr-defined]
 
 MAX_ORDER = 5
 ROW_HEAD = 8
@@ -133,7 +132,21 @@ class Bdf(c.Structure):
         *[
             (name, _P)
             for name in (
-                "y yd ee weight newton_weight delta predicted predicted_d scale jy jyd g memory".split()
+                [
+                    "y",
+                    "yd",
+                    "ee",
+                    "weight",
+                    "newton_weight",
+                    "delta",
+                    "predicted",
+                    "predicted_d",
+                    "scale",
+                    "jy",
+                    "jyd",
+                    "g",
+                    "memory",
+                ]
             )
         ],
         ("error_next", _D),
@@ -156,12 +169,25 @@ class Settle(c.Structure):
         ("unknowns", _I),
         ("rates", _I),
         ("rows", _I),
-        *[(name, _P) for name in "rate slot_y slot_y_t slot_yd slot_yd_t slot_x slot_r weight scale".split()],
+        *[
+            (name, _P)
+            for name in [
+                "rate",
+                "slot_y",
+                "slot_y_t",
+                "slot_yd",
+                "slot_yd_t",
+                "slot_x",
+                "slot_r",
+                "weight",
+                "scale",
+            ]
+        ],
         ("constraint", _P),
         ("k_q", _P),
         ("k_f", _P),
         ("kinematics", _I),
-        *[(name, _P) for name in "jy jyd matrix row_scale r x x0 step memory".split()],
+        *[(name, _P) for name in ["jy", "jyd", "matrix", "row_scale", "r", "x", "x0", "step", "memory"]],
         ("ready", _I),
         ("residual", _D),
         ("constraints", _D),
@@ -178,7 +204,18 @@ class Run(c.Structure):
         ("settle", _P),
         ("written", _I),
         ("observed", _I),
-        *[(name, _P) for name in "audit observe observe_rate observe_scale audit_at instant instant_kind".split()],
+        *[
+            (name, _P)
+            for name in [
+                "audit",
+                "observe",
+                "observe_rate",
+                "observe_scale",
+                "audit_at",
+                "instant",
+                "instant_kind",
+            ]
+        ],
         ("instants", _I),
         ("every_step", _I),
         ("sample_steps", _I),
@@ -188,9 +225,9 @@ class Run(c.Structure):
         ("next", _I),
         ("pending", _I),
         ("started", _I),
-        *[(name, _D) for name in "stored dissipated supplied step_dissipated step_supplied".split()],
-        *[(name, _D) for name in "t_from power_dissipated power_supplied".split()],
-        *[(name, _P) for name in "point point_d aux aux_d values largest memory".split()],
+        *[(name, _D) for name in ["stored", "dissipated", "supplied", "step_dissipated", "step_supplied"]],
+        *[(name, _D) for name in ["t_from", "power_dissipated", "power_supplied"]],
+        *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "memory"]],
         ("rows_written", _L),
         ("first_energy", _D),
     ]
@@ -203,7 +240,7 @@ def pointer(array: NDArray[Any] | None) -> int | None:
 
 def reader(address: int, number: int) -> NDArray[np.float64]:
     """The core's doubles at an address as an array (a view)."""
-    return np.frombuffer((c.c_double * number).from_address(address), dtype=np.float64)
+    return np.ctypeslib.as_array((c.c_double * number).from_address(address))
 
 
 def _load() -> Any:

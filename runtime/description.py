@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime.failures import ContractError, RowLabel
 
 Floats = NDArray[np.float64]
@@ -209,7 +208,10 @@ def _initial(value: Mapping[str, Any], names: Mapping[str, int]) -> Initial:
         values=np.atleast_1d(np.asarray(value["values"], dtype=np.float64)),
         fixed=bool(value["fixed"]),
         label=RowLabel(
-            str(value.get("label") or family), "init", str(value.get("file") or ""), int(value.get("line") or 0)
+            str(value.get("label") or family),
+            "init",
+            str(value.get("file") or ""),
+            int(value.get("line") or 0),
         ),
     )
 

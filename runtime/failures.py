@@ -31,7 +31,7 @@ class TraceError(Exception):
     """The trace cannot be written or read."""
 
 
-class SolverFailure(Exception):
+class SolverFailure(Exception):  # noqa: N818 (a name of the house)
     """The integration stopped at `time` [s] with step `step` [s].
 
     cause: newton, error_test, singular, nonfinite, step_too_small, max_steps, max_wall, memory.
@@ -49,7 +49,7 @@ class SolverFailure(Exception):
         super().__init__(f"{cause} at t = {time:.17g} s, step {step:.3g} s{place}")
 
 
-class InconsistentStart(Exception):
+class InconsistentStart(Exception):  # noqa: N818
     """No consistent state exists at t0, or none was found.
 
     kind: "fixed" fixed initial values contradict each other or the rows; "gamma" an effort constraint has no

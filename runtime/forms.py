@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from sysdyn.runtime.description import BASE, Description, Ints, RowFamily, element
 from sysdyn.runtime.failures import ContractError, RowLabel
 
@@ -115,7 +114,7 @@ def unknown_name(description: Description, form: Form, place: int) -> str:
 
 
 def _layout(description: Description) -> tuple[Ints, list[str], int]:
-    """at (audit families behind the others), kind of each unknown, number with the audit families."""
+    """At (audit families behind the others), kind of each unknown, number with the audit families."""
     at = np.zeros(len(description.families), dtype=np.int32)
     kinds: list[str] = []
     for k, family in enumerate(description.families):
@@ -175,7 +174,9 @@ def plan(description: Description, name: str) -> Form:
     calls: list[Planned] = []
     stabilised = name == "2" and "phi" in description.blocks
     for block, group in FORMS[name]:
-        if block not in description.blocks or (group in ("kinematics", "phi_rate") and name == "2" and not stabilised):
+        if block not in description.blocks or (
+            group in ("kinematics", "phi_rate") and name == "2" and not stabilised
+        ):
             continue
         if group != "kinematics" and group not in tables:
             tables[group] = np.full(len(description.rows), NOWHERE, dtype=np.int32)

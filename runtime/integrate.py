@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
 from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.failures import RowLabel, SolverFailure
@@ -132,7 +131,11 @@ class Integration:
         span = max(self.request.t_end - self.start.t, 1e-300)
         n = form.written
         return Settler(
-            self.system.another("settled"), (form.k_q, form.k_f), self.magnitude[:n], 1e-2 * span, self.roles.state[:n]
+            self.system.another("settled"),
+            (form.k_q, form.k_f),
+            self.magnitude[:n],
+            1e-2 * span,
+            self.roles.state[:n],
         )
 
     def _stepper(self) -> None:
@@ -203,7 +206,11 @@ class Integration:
         if cause in ("newton", "step_too_small", "error_test") and linear.smallest < 1e-13:
             # Newton failed because the matrix is singular to round-off: say so, with the place
             return SolverFailure(
-                "singular", bdf.t, bdf.h, self.system.name(linear.bad_column), self.system.row_label(linear.bad_row)
+                "singular",
+                bdf.t,
+                bdf.h,
+                self.system.name(linear.bad_column),
+                self.system.row_label(linear.bad_row),
             )
         if cause in ("error_test", "step_too_small", "newton"):
             unknown = self._worst()

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime.description import Floats
 
 Mask = NDArray[np.bool_]
@@ -90,7 +89,7 @@ class _Linear:
         if max(self.shape) <= SINGULAR_VALUES:
             a = np.zeros(self.shape)
             np.add.at(a, (i, j), v)
-            return np.linalg.lstsq(a, aim, rcond=RANK)[0]
+            return np.asarray(np.linalg.lstsq(a, aim, rcond=RANK)[0], dtype=np.float64)
         return _saddle_point(self.shape, (i, j, v), aim)
 
 
@@ -99,7 +98,10 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
     rows, unknowns = shape
     i, j, v = entries
     here = np.arange(unknowns), unknowns + np.arange(rows)
-    places = np.concatenate([here[0], j, unknowns + i, here[1]]), np.concatenate([here[0], unknowns + i, j, here[1]])
+    places = (
+        np.concatenate([here[0], j, unknowns + i, here[1]]),
+        np.concatenate([here[0], unknowns + i, j, here[1]]),
+    )
     values = np.concatenate([np.ones(unknowns), v, v, np.full(rows, -EPS)])
     apply: Callable[[Floats], Floats]
     back: Callable[[Floats], Floats]

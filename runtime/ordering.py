@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.patterns import Pattern
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime.description import Ints, Kernel, Reference, Shape
 from sysdyn.runtime.failures import ContractError
 
@@ -56,7 +55,9 @@ def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: i
     """Row-major position in its family in each iteration [number]."""
     position = np.zeros(number, dtype=np.int64)
     if len(reference.indices) != len(shape):
-        raise ContractError(f"a reference with {len(reference.indices)} indices into a family with {len(shape)}")
+        raise ContractError(
+            f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
+        )
     for (loop, slot, constant), (first, last) in zip(reference.indices, shape, strict=True):
         value = np.full(number, constant + (int(ix[slot]) if slot >= 0 else 0), dtype=np.int64)
         if loop >= 0:

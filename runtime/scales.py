@@ -10,7 +10,6 @@ While a run tracks magnitudes they grow with max |y|; a second run starts with t
 from __future__ import annotations
 
 import numpy as np
-
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.system import System
 
@@ -58,7 +57,7 @@ def propagate(
 def _groups(system: System, values: Floats) -> Floats:
     """Largest value among the unknowns of the same kind and unit."""
     families = system.description.families
-    keys = {}
+    keys: dict[tuple[str, str], int] = {}
     number = np.empty(len(families) + 1, dtype=np.int64)
     for k, family in enumerate(families):
         number[k] = keys.setdefault((family.kind, family.unit), len(keys))

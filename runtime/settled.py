@@ -9,7 +9,6 @@ import ctypes as c
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.ordering import column_order
@@ -38,7 +37,12 @@ class Settler:
     """
 
     def __init__(
-        self, settled: System, kinematics: tuple[Ints, Ints], magnitude: Floats, time_scale: float, state: NDArray[np.bool_]
+        self,
+        settled: System,
+        kinematics: tuple[Ints, Ints],
+        magnitude: Floats,
+        time_scale: float,
+        state: NDArray[np.bool_],
     ) -> None:
         self.system = settled
         self.rates = rates_of(settled)
@@ -99,7 +103,8 @@ class Settler:
         order = column_order(self.pattern, self._typical())
         self._order = order
         self.linear = lib.core.sd_linear_new(
-            self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))
+            self.pattern.unknowns,
+            *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order)),
         )
         if not self.linear:
             raise MemoryError

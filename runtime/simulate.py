@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -17,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.accuracy import Achieved, Sampled, control
 from sysdyn.runtime.carrier import Carrier
@@ -38,10 +36,13 @@ Progress = Callable[[float, float | None], None]
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What `sysdyn simulate` asks for.  Times in s; every: interval of the trace (None: accepted steps); at: further
-    instants of the trace; sampled_at: instants of samples alone; accuracy relative to the largest value of each traced quantity, accuracy_on: (name, accuracy) of single
-    ones (the others are then free if `accuracy` is None); rtol, atol: the solver's own, switch the control off;
-    euler_step: of method "euler"; sample_steps: hand the sides of expects back at accepted steps too."""
+    """What `sysdyn simulate` asks for.  Times in s.
+
+    every: interval of the trace (None: accepted steps); at: further instants of the trace; sampled_at: instants of
+    samples alone; accuracy relative to the largest value of each traced quantity, accuracy_on: (name, accuracy) of
+    single ones (the others are then free if `accuracy` is None); rtol, atol: the solver's own, switch the control
+    off; euler_step: of method "euler"; sample_steps: hand the sides of expects back at accepted steps too.
+    """
 
     output: str | Path
     t_start: float
@@ -72,7 +73,8 @@ class Samples:
     """All quantities of block observe at trace instants and (with sample_steps) accepted steps.
 
     names [observed]; time [k]; kind [k] (TRACE, STEP, a sum); values [k, observed]; energy [k] (J) and constraints [k]
-    are the meters.  Where no quantity asks for samples there is the last row alone."""
+    are the meters.  Where no quantity asks for samples there is the last row alone.
+    """
 
     names: tuple[str, ...]
     time: Floats
@@ -85,7 +87,8 @@ class Samples:
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What a simulation did.  statistics and timings as the trace holds them; reached [s]; error_estimate relative
-    (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0)."""
+    (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0).
+    """
 
     trace: Path
     final: bool
@@ -125,7 +128,7 @@ def choose_index(wanted: str, facts: Structure) -> tuple[str, int, tuple[str, ..
 
 
 def choose_method(options: Options) -> str:
-    """bdf or euler.  Raises ValueError for others."""
+    """Bdf or euler.  Raises ValueError for others."""
     if options.method in ("auto", "bdf"):
         return "bdf"
     if options.method == "euler":
@@ -154,14 +157,18 @@ def instants(options: Options) -> tuple[Floats, Ints]:
         compared = np.unique(np.concatenate([compared, np.linspace(t0, t1, COMPARISONS + 1)]))
     sampled = np.asarray(options.sampled_at, dtype=np.float64)
     every = np.unique(np.concatenate([wanted, compared, sampled]))
-    kinds = TRACE * np.isin(every, wanted) + COMPARED * np.isin(every, compared) + STEP * np.isin(every, sampled)
+    kinds = (
+        TRACE * np.isin(every, wanted) + COMPARED * np.isin(every, compared) + STEP * np.isin(every, sampled)
+    )
     return every, kinds.astype(np.int32)
 
 
 class _Runs:
     """The runs of one simulation: each writes a trace; the last finished one stands at the path."""
 
-    def __init__(self, system: System, start: ConsistentState, options: Options, index: int, method: str) -> None:
+    def __init__(
+        self, system: System, start: ConsistentState, options: Options, index: int, method: str
+    ) -> None:
         self.system, self.start, self.options, self.index, self.method = system, start, options, index, method
         self.columns: tuple[Column, ...] = columns_of(system.description)
         self.names = _observed_names(system.description)
@@ -226,7 +233,11 @@ class _Runs:
         self.number += 1
         first = self.done is None
         target = self.path if first else self.path.with_name(f".{self.path.name}.part")
-        attributes = {**self.options.attributes, "rtol": float(rtol), "atol": float(atol or 0.0)}
+        attributes: dict[str, str | float | int] = {
+            **self.options.attributes,
+            "rtol": float(rtol),
+            "atol": float(atol or 0.0),
+        }
         self.rows, self.samples = [], []
         self.run_began = wall = time.monotonic()
         self.writer = TraceWriter(target, self.columns, len(self.names), attributes, self.options.parameters)
@@ -257,7 +268,7 @@ class _Runs:
             return
         self.writer.discard()
         with contextlib.suppress(OSError):
-            os.unlink(self.writer.path)
+            self.writer.path.unlink()
 
     def _take(self, first: bool) -> None:
         """The finished run's file takes the path (the writer keeps writing its last attributes to it)."""
@@ -265,14 +276,14 @@ class _Runs:
         if not first:
             assert self.done is not None
             self.done[2].discard()
-            os.replace(self.writer.path, self.path)
+            self.writer.path.replace(self.path)
 
     def nominal(self, largest: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""
         return {column.name: float(largest[column.place]) for column in self.columns}
 
     def last_attributes(self, error_estimate: float | None) -> dict[str, str]:
-        """statistics and timings as JSON."""
+        """Statistics and timings as JSON."""
         found = {"statistics": json.dumps(self.statistics_object(error_estimate))}
         if self.options.timings:
             found["timings"] = json.dumps(self.timings())
@@ -366,7 +377,9 @@ def simulate(
     options = replace(options, attributes={**options.attributes, "method": method, "index": name})
     runs = _Runs(system, start, options, index, method)
 
-    def outcome(final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None) -> Outcome:
+    def outcome(
+        final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None
+    ) -> Outcome:
         estimate = achieved.error_estimate if achieved is not None else None
         return Outcome(
             runs.path,

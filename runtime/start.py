@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.least_change import Problem, Solution, solve
@@ -72,7 +71,11 @@ def _given(system: System) -> _Given:
         for place, value in zip(places[fixed[places]], item.values[fixed[places]], strict=True):
             if item.fixed and abs(guess[place] - value) > 1e-12 * max(abs(value), abs(guess[place])):
                 raise InconsistentStart(
-                    "fixed", abs(guess[place] - value), (), (label[int(place)], item.label), (system.name(int(place)),)
+                    "fixed",
+                    abs(guess[place] - value),
+                    (),
+                    (label[int(place)], item.label),
+                    (system.name(int(place)),),
                 )
         guess[places] = item.values
         fixed[places] |= item.fixed
@@ -126,7 +129,7 @@ class Starter:
 
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia."""
-        jy, jyd = self.system.jacobian(t, *self.expand(x))
+        jyd = self.system.jacobian(t, *self.expand(x))[1]
         carries = self.system.differential(jyd)[: self.n] & np.isin(self.kinds, STATE)
         carries |= self.given.written & np.isin(self.kinds, STATE)
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
@@ -147,7 +150,7 @@ class Starter:
         return np.where(found > 1e-280, found, 1.0)
 
 
-def _problem(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask) -> Problem:
+def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
     """The equations `rows` in the unknowns `free`, the others as in x."""
     follows = starter.following(t, x)
     weight = np.full(x.size, _WEIGHT["unwritten"])
@@ -179,7 +182,7 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
         if not rows.any() or not may.any():
             continue
-        found = solve(_problem(starter, t, x, guess, rows, may), x)
+        found = solve(_problem(starter, t, x, guess, rows=rows, free=may), x)
         if found.residual < EXACT:
             x = found.x
     return x
@@ -189,10 +192,10 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> Solution:
     """What follows from the staged state; where nothing does, everything at once, then from perturbed points."""
     every = np.ones(starter.settled.rows, dtype=bool)
     x = _stages(starter, t, guess.copy(), guess, free)
-    best = solve(_problem(starter, t, x, guess, every, free & starter.following(t, x)), x)
+    best = solve(_problem(starter, t, x, guess, rows=every, free=free & starter.following(t, x)), x)
     if best.residual < EXACT:
         return best
-    problem = _problem(starter, t, x, guess, every, free)
+    problem = _problem(starter, t, x, guess, rows=every, free=free)
     best = solve(problem, x)
     random = np.random.default_rng(20)
     for amplitude in _AMPLITUDES:
@@ -222,7 +225,11 @@ def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
 def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[str, float, float, str], ...]:
     given = starter.given
     change = np.abs(x[: starter.n] - given.guess)
-    places = np.flatnonzero(given.written & ~given.fixed & (change > 1e-9 * np.maximum(np.abs(given.guess), 1e-3 * scale[: starter.n])))
+    places = np.flatnonzero(
+        given.written
+        & ~given.fixed
+        & (change > 1e-9 * np.maximum(np.abs(given.guess), 1e-3 * scale[: starter.n]))
+    )
     return tuple(
         (starter.system.name(int(k)), float(given.guess[k]), float(x[k]), _asked(starter, t, x, int(k)))
         for k in places[:100]

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel
 from sysdyn.runtime.start import ConsistentState
@@ -154,8 +153,10 @@ def _rank(system: System, jy: Floats, kinds: tuple[str, ...]) -> tuple[int, Floa
     return rank, null, multipliers
 
 
-def _sparse_rank(which: NDArray[np.int64], place: NDArray[np.int64], value: Floats, rows: int, columns: int) -> int:
-    """rows - (pivots of the order of eps in the factors of [I C^T; C -eps])."""
+def _sparse_rank(
+    which: NDArray[np.int64], place: NDArray[np.int64], value: Floats, rows: int, columns: int
+) -> int:
+    """Rows - (pivots of the order of eps in the factors of [I C^T; C -eps])."""
     from scipy.sparse import block_array, csc_array, eye_array
     from scipy.sparse.linalg import splu
 
@@ -206,4 +207,6 @@ def structure(system: System, state: ConsistentState) -> Structure:
         dependent = [
             (_label(system, int(multipliers[k])), float(null[k])) for k in np.flatnonzero(np.abs(null) > 1e-8)
         ]
-    return Structure(index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, m1 + m2 - rank, tuple(dependent))
+    return Structure(
+        index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, m1 + m2 - rank, tuple(dependent)
+    )

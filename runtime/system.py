@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.carrier import Carrier, Extent, Failure, Tables
 from sysdyn.runtime.description import BASE, Description, Floats, Ints, describe
@@ -66,7 +65,10 @@ class System:
     def _places(self, call: Planned) -> tuple[Places, Places]:
         """Where the entries of one call stand: dy, dyd."""
         kernels = self.description.blocks[call.block]
-        shapes = ([row.shape for row in self.description.rows], [item.shape for item in self.description.families])
+        shapes = (
+            [row.shape for row in self.description.rows],
+            [item.shape for item in self.description.families],
+        )
         dy, dyd = (
             places(kernels, which, self.description.ix, shapes, (call.to, call.at)) for which in ("dy", "dyd")
         )
@@ -84,7 +86,9 @@ class System:
         entries = max([part.row.size for part in parts] + [1])
         calls = (lib.Call * max(len(form.calls), 1))()
         for k, call in enumerate(form.calls):
-            calls[k] = self.call(call.block, call.at, call.to, form.rows, slots[2 * k + 2], slots[2 * k + 3])
+            calls[k] = self.call(
+                call.block, call.at, call.to, form.rows, dy=slots[2 * k + 2], dyd=slots[2 * k + 3]
+            )
         self._scratch = np.zeros(entries)
         self._keep += [calls, slots]
         self.core = lib.System(
@@ -106,7 +110,7 @@ class System:
         )
 
     def call(
-        self, block: str, at: Ints, to: Ints, rows: int, dy: Ints | None = None, dyd: Ints | None = None
+        self, block: str, at: Ints, to: Ints, rows: int, *, dy: Ints | None = None, dyd: Ints | None = None
     ) -> lib.Call:
         """The core's structure for one block with its tables; slots of its entries or None."""
         tables = Tables(self.description.p, self.description.ix, at, to)
@@ -144,7 +148,7 @@ class System:
     # --- evaluation -----------------------------------------------------------------------------------------
 
     def _buffer(self, x: Floats) -> Floats:
-        """x with room for the audit families behind."""
+        """X with room for the audit families behind."""
         buffer = np.zeros(self.form.extended)
         buffer[: len(x)] = x
         return buffer
@@ -192,7 +196,9 @@ class System:
 
     def audit(self, t: float, y: Floats, yd: Floats) -> Floats:
         """[kinetic energy, potential energy (J), power dissipated, power supplied (W)]."""
-        values = self._evaluate("audit", t, self._buffer(y[: self.form.written]), self._buffer(yd[: self.form.written]))
+        values = self._evaluate(
+            "audit", t, self._buffer(y[: self.form.written]), self._buffer(yd[: self.form.written])
+        )
         return np.concatenate([values, np.zeros(4)])[:4]
 
     # --- facts about the unknowns ---------------------------------------------------------------------------

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from sysdyn.runtime.description import Description, Floats, element
 from sysdyn.runtime.failures import TraceError
 
@@ -124,13 +123,20 @@ class TraceWriter:
                     data.attrs["derivative"] = _text(path)
                     self._sets.append((rate, 8 + self._observed + column.place))
             for path, unit, name, place in (
-                ("/audit/energy", "J", "balance of stored, dissipated and supplied energy since the start", 6),
+                (
+                    "/audit/energy",
+                    "J",
+                    "balance of stored, dissipated and supplied energy since the start",
+                    6,
+                ),
                 ("/audit/constraints", "1", "norm of the scaled constraint equations", 7),
             ):
                 self._sets.append((self._data(path, unit, name, self._time), place))
             for parameter in parameters:
                 data = self._file.create_dataset(
-                    f"/parameters/{parameter.name.replace('/', chr(0x2215))}", data=parameter.value, track_times=False
+                    f"/parameters/{parameter.name.replace('/', chr(0x2215))}",
+                    data=parameter.value,
+                    track_times=False,
                 )
                 data.attrs["units"] = _text(parameter.unit)
             self._file.flush()
@@ -140,7 +146,13 @@ class TraceWriter:
 
     def _data(self, name: str, unit: str, long_name: str, scale: Any) -> Any:
         data = self._file.create_dataset(
-            name, shape=(0,), maxshape=(None,), chunks=(BLOCK,), dtype="f8", fillvalue=np.nan, track_times=False
+            name,
+            shape=(0,),
+            maxshape=(None,),
+            chunks=(BLOCK,),
+            dtype="f8",
+            fillvalue=np.nan,
+            track_times=False,
         )
         data.attrs["units"] = _text(unit)
         data.attrs["long_name"] = _text(long_name)
@@ -282,9 +294,13 @@ class Trace:
             data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
             if "time" not in data:
                 raise ValueError("no data set 'time': not a trace")
-            group = {f"{key}.{name}": item for key in ("audit",) for name, item in source.get(key, {}).items()}
+            group = {
+                f"{key}.{name}": item for key in ("audit",) for name, item in source.get(key, {}).items()
+            }
             rates = dict(source.get("derivatives", {}).items())
-            length = min(item.shape[0] for item in (*data.values(), *group.values(), *rates.values()) if item.ndim == 1)
+            length = min(
+                item.shape[0] for item in (*data.values(), *group.values(), *rates.values()) if item.ndim == 1
+            )
             quantities = {}
             for name, item in (*data.items(), *group.items()):
                 if name == "time" or item.ndim != 1:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.system import System
 

@@ -1,3 +1,4 @@
+# ruff: noqa: PLR0917, E731, RUF100
 """A hanging chain of n links (point masses in a plane) as an array model: the NumPy backend and the same in C.
 
 Masses m at (x_i, y_i), links of length a: phi_i = |r_i - r_(i-1)|^2 - a^2, r_0 = 0.  p = m, g, a; ix = 1, 2, n.
@@ -56,10 +57,26 @@ def structure():
         "observe": [{"loops": [], "rows": [[7, []], [8, []]], "dy": [], "dyd": []}],
         "observe_rate": [{"loops": [], "rows": [[7, []], [8, []]], "dy": [], "dyd": []}],
     }
-    kinds = [("q_x", "q", "x"), ("q_y", "q", "y"), ("f_x", "f", "x"), ("f_y", "f", "y"), ("kappa", "kappa", "link")]
-    kinds += [("audit." + n, "audit", n) for n in "energy kinetic potential dissipated supplied constraints".split()]
+    kinds = [
+        ("q_x", "q", "x"),
+        ("q_y", "q", "y"),
+        ("f_x", "f", "x"),
+        ("f_y", "f", "y"),
+        ("kappa", "kappa", "link"),
+    ]
+    kinds += [
+        ("audit." + n, "audit", n)
+        for n in ["energy", "kinetic", "potential", "dissipated", "supplied", "constraints"]
+    ]
     row = lambda block, label, **more: {  # noqa: E731
-        "block": block, "label": label, "owner": label, "kind": block, "file": "chain.sd", "line": 1, "unit": "1", **more
+        "block": block,
+        "label": label,
+        "owner": label,
+        "kind": block,
+        "file": "chain.sd",
+        "line": 1,
+        "unit": "1",
+        **more,
     }
     return {
         "families": [{"name": n, "kind": k, "owner": o, "unit": "1", "nominal": None} for n, k, o in kinds],
@@ -79,7 +96,13 @@ def binding(n, m=0.1, g=9.81, a=None, angle=0.3):
     a = 1.0 / n if a is None else a
     i = np.arange(1, n + 1)
     initial = lambda family, values, fixed=True: {  # noqa: E731
-        "family": family, "positions": np.arange(n), "values": values, "fixed": fixed, "label": family, "file": "", "line": 0
+        "family": family,
+        "positions": np.arange(n),
+        "values": values,
+        "fixed": fixed,
+        "label": family,
+        "file": "",
+        "line": 0,
     }
     return {
         "p": np.array([m, g, a]),

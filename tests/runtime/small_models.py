@@ -1,3 +1,4 @@
+# ruff: noqa: PLR0917, E731, RUF100
 """Compiled models made by hand (by sympy) for the runtime's tests: an oracle that knows no compiler.
 
 `small(...)` writes down energies and constraints as the book does and hands back manifest, binding and module.
@@ -24,7 +25,14 @@ class _Builder:
 
     def add_rows(self, block, labels, owners, **extra):
         for k, (label, owner) in enumerate(zip(labels, owners, strict=True)):
-            row = {"block": block, "label": label, "owner": owner, "kind": block, "file": "m.sd", "line": k + 1}
+            row = {
+                "block": block,
+                "label": label,
+                "owner": owner,
+                "kind": block,
+                "file": "m.sd",
+                "line": k + 1,
+            }
             self.rows.append({**row, "unit": "1", **{key: value[k] for key, value in extra.items()}})
 
     def add_block(self, name, base, expressions):
@@ -136,7 +144,9 @@ def small(
         b.add_block("phi_acceleration", "phi", [rate(rate(x)) for x in phis])
     if psi:
         b.add_rows("psi", list(psi), list(psi))
-        reaction = [sum(b.y[f"mu_{k}"] * sp.diff(x, f[n]) for k, x in zip(psi, psis, strict=True)) for n in names]
+        reaction = [
+            sum(b.y[f"mu_{k}"] * sp.diff(x, f[n]) for k, x in zip(psi, psis, strict=True)) for n in names
+        ]
         b.add_block("psi_reaction", "dynamics", [sp.sympify(x) for x in reaction])
         b.add_block("psi", "psi", psis)
         b.add_block("psi_rate", "psi", [rate(x) for x in psis])
@@ -152,18 +162,29 @@ def small(
     dissipated = sum(f[n] * sp.diff(con, f[n]) for n in names)
     supplied = read(source_power) if source_power is not None else sum(works[n] * f[n] for n in names)
     b.add_block("audit", "audit", [stored, pot, dissipated, supplied])
-    audits = [("audit." + n, "audit", n) for n in "energy kinetic potential dissipated supplied constraints".split()]
+    audits = [
+        ("audit." + n, "audit", n)
+        for n in ["energy", "kinetic", "potential", "dissipated", "supplied", "constraints"]
+    ]
     observe = observe if observe is not None else {n: n for n in b.y}
     expressions = [read(x) for x in observe.values()]
-    known = [all(s.name[0] in "qfspe" for s in x.free_symbols - {T}) and not (
-        x.free_symbols & set(b.yd.values())) for x in expressions]
-    b.add_rows("observe", list(observe), list(observe), name=list(observe), stored=[True] * len(observe), rate=known)
+    known = [
+        all(s.name[0] in "qfspe" for s in x.free_symbols - {T}) and not (x.free_symbols & set(b.yd.values()))
+        for x in expressions
+    ]
+    b.add_rows(
+        "observe", list(observe), list(observe), name=list(observe), stored=[True] * len(observe), rate=known
+    )
     b.add_block("observe", "observe", expressions)
     b.add_block(
-        "observe_rate", "observe", [rate(x) if ok else sp.Integer(0) for x, ok in zip(expressions, known, strict=True)]
+        "observe_rate",
+        "observe",
+        [rate(x) if ok else sp.Integer(0) for x, ok in zip(expressions, known, strict=True)],
     )
     b.add_block(
-        "observe_scale", "observe", [sum((sp.Abs(a) for a in sp.Add.make_args(x)), sp.Integer(0)) for x in expressions]
+        "observe_scale",
+        "observe",
+        [sum((sp.Abs(a) for a in sp.Add.make_args(x)), sp.Integer(0)) for x in expressions],
     )
     manifest = {
         "model": "small",
@@ -233,7 +254,7 @@ def dc_motor(form="lagrangian"):
         work={"c": "12 - e_1", "a": "e_2"},
         implicit=("1", "2"),
         gamma={"back": "e_1 - 0.25*f_a", "torque": "e_2 - 0.25*f_c"},
-        initial={n: (0, True) for n in ("q_c", "q_a", "f_c", "f_a")},
+        initial=dict.fromkeys(("q_c", "q_a", "f_c", "f_a"), (0, True)),
         form=form,
     )
 
