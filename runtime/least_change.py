@@ -8,7 +8,7 @@ with halving of the step while the rows grow or are not finite.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -126,6 +126,11 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
 
 def solve(problem: Problem, x: Floats) -> Solution:
     """From x towards the solution nearest to problem.guess; the best point met."""
+    with np.errstate(all="ignore"):  # what overflows is seen as not finite
+        return _solve(problem, x)
+
+
+def _solve(problem: Problem, x: Floats) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
     stale = 0
@@ -161,3 +166,37 @@ def solve(problem: Problem, x: Floats) -> Solution:
             break
         x = tried
     return best
+
+
+def least_residual(problem: Problem, x: Floats) -> Floats:
+    """Where the rows cannot vanish: the x near which they are least (Levenberg-Marquardt, rows scaled once, dense)."""
+    with np.errstate(all="ignore"):
+        problem = replace(problem, weight=np.ones_like(problem.weight))
+        linear = _Linear(problem, x)
+        scale, damping = linear.row_scale, 1e-3
+
+        def measure(z: Floats) -> Floats:
+            return (problem.residual(z) * scale)[problem.use]
+
+        r = measure(x)
+        for _ in range(_ITERATIONS):
+            linear = _Linear(problem, x)
+            i, j, v = linear.entries
+            a = np.zeros(linear.shape)
+            np.add.at(a, (i, j), v / linear.row_scale[problem.use][i] * scale[problem.use][i])
+            for _ in range(2 * _HALVINGS):
+                full = np.vstack([a, np.sqrt(damping) * np.eye(a.shape[1])])
+                step = np.linalg.lstsq(full, np.concatenate([-r, np.zeros(a.shape[1])]), rcond=None)[0]
+                tried = x.copy()
+                tried[problem.free] += step * linear.unit[problem.free]
+                now = measure(tried)
+                if np.isfinite(now).all() and now @ now < r @ r:
+                    break
+                damping *= 8.0
+            else:
+                return x
+            gain = 1.0 - (now @ now) / (r @ r)
+            x, r, damping = tried, now, damping / 4.0
+            if gain < 1e-12:
+                break
+    return x

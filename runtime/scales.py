@@ -54,7 +54,7 @@ def propagate(
     return found
 
 
-def _groups(system: System, values: Floats) -> Floats:
+def group_maximum(system: System, values: Floats) -> Floats:
     """Largest value among the unknowns of the same kind and unit."""
     families = system.description.families
     keys: dict[tuple[str, str], int] = {}
@@ -73,7 +73,7 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     span = max(t_end - t0, 0.0) or 1.0
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
     known = np.abs(y) + np.where(state, SPAN * span * np.abs(yd), 0.0)
-    known = np.maximum(known, GROUP * _groups(system, known))
+    known = np.maximum(known, GROUP * group_maximum(system, known))
     known = np.where(np.isfinite(known), known, 0.0)
     found = np.where(system.nominal > 0.0, system.nominal, known)
     jy, jyd = system.jacobian(t0, y, yd)
@@ -84,6 +84,6 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     # what follows from the state is balanced against it, so that round-off of a start does not pass for a magnitude
     balanced = propagate(np.where(state, found, 0.0), pattern.row, pattern.columns_of(), size, excited)
     found = np.where(found > NOISE * balanced, found, balanced)
-    found = np.where(found == 0.0, _groups(system, found), found)
+    found = np.where(found == 0.0, group_maximum(system, found), found)
     tiny = np.finfo(np.float64).tiny * 1e30
     return np.where(found > tiny, found, 1.0)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.least_change import Problem, Solution, solve
-from sysdyn.runtime.scales import propagate
+from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve
+from sysdyn.runtime.scales import group_maximum, propagate
 from sysdyn.runtime.settled import rates_of
 from sysdyn.runtime.system import System
 
@@ -156,6 +156,9 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
     weight = np.full(x.size, _WEIGHT["unwritten"])
     weight[: starter.n][starter.given.written] = _WEIGHT["written"]
     weight[follows] = _WEIGHT["following"]
+    # unknowns of one kind and unit are moved by one measure, whatever their values
+    scale = starter.scale(t, x)
+    weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),
@@ -165,7 +168,7 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
         use=rows,
         free=free,
         guess=guess,
-        scale=starter.scale(t, x),
+        scale=scale,
         weight=weight,
     )
 
@@ -236,15 +239,28 @@ def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[
     )
 
 
+def _row_scale(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
+    """One over the size of the terms of each row [rows]."""
+    size = np.zeros(starter.settled.rows)
+    np.add.at(size, starter.rows, np.abs(starter.jacobian(t, x)) * np.maximum(scale, np.abs(x))[starter.columns])
+    return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
+
+
 def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
     """Why there is no consistent state: rows in the way, and the fixed values that would have to move."""
     if not np.isfinite(best.residual):
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
-    raw = np.abs(starter.residual(t, best.x))
-    order = np.argsort(-best.scaled)
-    worst = [int(row) for row in order[:5] if best.scaled[row] > 0.1 * best.scaled[order[0]]]
+    x, scaled = best.x, best.scaled
+    if x.size <= DENSE:
+        every = np.ones(starter.settled.rows, dtype=bool)
+        problem = _problem(starter, t, guess, guess, rows=every, free=free)
+        x = least_residual(problem, x)
+        scaled = np.abs(starter.residual(t, x)) * _row_scale(starter, t, x, problem.scale)
+    raw = np.abs(starter.residual(t, x))
+    order = np.argsort(-scaled)
+    worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]
     rows = tuple(dict.fromkeys(starter.settled.row_label(row) for row in worst))
     freed = _attempt(starter, t, guess, np.ones_like(free))
     candidates: tuple[RowLabel, ...] = ()

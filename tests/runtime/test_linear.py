@@ -1,0 +1,95 @@
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, random_array
+from sysdyn.runtime import core_library as lib
+from sysdyn.runtime.ordering import column_order
+from sysdyn.runtime.patterns import Pattern
+
+
+class Solver:
+    """The core's linear solver on one pattern; keeps the arrays alive."""
+
+    def __init__(self, matrix, sparse=None):
+        matrix = csc_array(matrix)
+        matrix.sort_indices()
+        n = matrix.shape[0]
+        self.pattern = Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
+        self.order = column_order(self.pattern, matrix.data)
+        if sparse:
+            self.order = np.arange(n, dtype=np.int32)
+        pointers = [lib.pointer(item) for item in (self.pattern.column, self.pattern.row, self.order)]
+        self.linear = lib.core.sd_linear_new(n, *pointers)
+
+    def __del__(self):
+        lib.core.sd_linear_free(self.linear)
+
+    def factor(self, values, scale=None):
+        values = np.ascontiguousarray(values)
+        return lib.core.sd_linear_factor(self.linear, lib.pointer(values), lib.pointer(scale))
+
+    def solve(self, b):
+        x = np.array(b, dtype=float)
+        lib.core.sd_linear_solve(self.linear, lib.pointer(x))
+        return x
+
+
+def random_matrix(n, seed, density=0.05):
+    rng = np.random.default_rng(seed)
+    matrix = csc_array(random_array((n, n), density=density, rng=rng))
+    matrix = csc_array(matrix + csc_array((rng.normal(size=n), (rng.permutation(n), np.arange(n))), shape=(n, n)))
+    matrix.sort_indices()
+    return matrix
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 30, 50, 51, 120, 400])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_agrees_with_numpy(n, seed):
+    matrix = random_matrix(n, seed, min(1.0, 4.0 / n))
+    solver = Solver(matrix)
+    assert (solver.order is None) == (n <= 50)
+    assert solver.factor(matrix.data) == 0
+    b = np.random.default_rng(seed).normal(size=n)
+    x = solver.solve(b)
+    full = matrix.toarray()
+    assert np.abs(full @ x - b).max() < 1e-11 * (1 + np.abs(full).max() * np.abs(x).max())
+
+
+def test_refactorises_on_the_pattern_and_pivots_anew_when_a_pivot_dies():
+    n = 80
+    matrix = random_matrix(n, 5)
+    solver = Solver(matrix)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        values = matrix.data * rng.uniform(0.9, 1.1, matrix.data.size)
+        assert solver.factor(values) == 0
+    assert solver.linear.contents.pivotings == 1
+    # all large entries become small and the reverse: the old pivots are unhealthy
+    values = 1e-6 / matrix.data
+    assert solver.factor(values) == 0
+    assert solver.linear.contents.pivotings >= 2
+    b = rng.normal(size=n)
+    exact = np.linalg.solve(csc_array((values, matrix.indices, matrix.indptr), shape=(n, n)).toarray(), b)
+    assert np.allclose(solver.solve(b), exact, rtol=1e-8)
+
+
+@pytest.mark.parametrize("n", [12, 80])
+def test_scales_of_twelve_decades(n):
+    rng = np.random.default_rng(3)
+    matrix = random_matrix(n, 9, 0.1)
+    row, column = 10.0 ** rng.uniform(-12, 12, n), 10.0 ** rng.uniform(-12, 12, n)
+    values = matrix.data * row[matrix.indices] * np.repeat(column, np.diff(matrix.indptr))
+    solver = Solver(matrix)
+    assert solver.factor(values, 1.0 / column) == 0
+    x = rng.normal(size=n)
+    assert np.allclose(solver.solve(row * (matrix @ x)) * column, x, rtol=1e-8)
+
+
+@pytest.mark.parametrize("n", [5, 70])
+def test_singular_matrix_names_its_place(n):
+    matrix = csc_array(np.eye(n) + np.eye(n, k=1))
+    matrix.data = matrix.data.copy()
+    solver = Solver(matrix)
+    values = matrix.data.copy()
+    values[matrix.indptr[3] : matrix.indptr[4]] = 0.0
+    assert solver.factor(values) == 1
+    assert solver.linear.contents.bad_column == 3

@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+import small_models as models
+from sysdyn.runtime.carrier import load
+from sysdyn.runtime.start import consistent_start
+from sysdyn.runtime.structure import _growth_index, pencil_index, structure
+from sysdyn.runtime.system import System
+
+# differential index of the seed's catalogue (seed/README.md, sections 3 and 4)
+CASES = {
+    "pendulum": (models.pendulum, 3, 1),
+    "pendulum hamiltonian": (lambda: models.pendulum("hamiltonian"), 3, 1),
+    "lead_filter": (models.lead_filter, 2, 2),
+    "mass_spring": (models.mass_spring, 0, 1),
+    "mass_spring hamiltonian": (lambda: models.mass_spring("hamiltonian"), 1, 1),
+    "dc_motor": (models.dc_motor, 1, 2),
+    "slider_crank": (models.slider_crank, 3, 1),
+    "slider_crank, pin without mass": (lambda: models.slider_crank(0.0), 2, 1),
+    "slider_crank, slider without mass": (lambda: models.slider_crank(1.0, 0.0), 3, 1),
+    "pendulum_spring": (models.pendulum_spring, 2, 2),
+    "pendulum_spring, collar with mass": (lambda: models.pendulum_spring(1.0), 3, 2),
+    "fluid_tank": (models.fluid_tank, 2, 1),
+    "diode": (models.diode_circuit, 2, 2),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_index_and_freedom(name):
+    make, index, dof = CASES[name]
+    manifest, binding, module = make()
+    system = System(manifest, binding, load(module))
+    state = consistent_start(system, 0.0)
+    facts = structure(system, state)
+    assert facts.index == index
+    assert facts.dof == dof
+    assert facts.redundant == 0
+    assert facts.undetermined == ()
+    # the method for large models agrees
+    assert _growth_index(system, *system.jacobian(0.0, state.y, state.yd)) == index
+
+
+def test_redundant_rows_are_named_with_coefficients():
+    manifest, binding, module = models.small(
+        "x y",
+        "f_x**2 + f_y**2",
+        phi={"one": "q_x**2 + q_y**2 - 1", "two": "q_x**2/2 + q_y**2/2 - 1/2"},
+        initial={"q_x": (0.6, True), "q_y": (0.8, False)},
+    )
+    system = System(manifest, binding, load(module))
+    facts = structure(system, consistent_start(system, 0.0))
+    assert (facts.rank, facts.redundant, facts.dof, facts.index) == (1, 1, 1, None)
+    assert {label.label for label, _ in facts.dependent} == {"one", "two"}
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5])
+def test_pencil_of_known_index(size):
+    # a nilpotent block of that size beside an ordinary differential equation, mixed by random bases
+    rng = np.random.default_rng(size)
+    n = size + 3
+    e, b = np.eye(n), np.eye(n)
+    e[:size, :size] = np.eye(size, k=1)
+    b[size:, size:] = rng.normal(size=(3, 3))
+    left, right = rng.normal(size=(n, n)), rng.normal(size=(n, n))
+    assert pencil_index(left @ e @ right, left @ b @ right) == size

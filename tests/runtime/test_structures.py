@@ -1,0 +1,29 @@
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from sysdyn.runtime import core_library as lib
+
+CORE = Path(__file__).parents[2] / "runtime" / "core"
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+def test_ctypes_structures_have_the_compilers_layout(tmp_path):
+    pairs = [("Frame", "sd_frame"), ("Call", "sd_call"), ("System", "sd_system"), ("Linear", "sd_linear")]
+    pairs += [("Bdf", "sd_bdf"), ("Settle", "sd_settle"), ("Run", "sd_run")]
+    lines = ['#include "run.h"', "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
+    for name, tag in pairs:
+        lines.append(f'printf("%zu\\n", sizeof({tag}));')
+        lines += [f'printf("%zu\\n", offsetof({tag}, {field[0]}));' for field in getattr(lib, name)._fields_]
+    source = tmp_path / "sizes.c"
+    source.write_text("\n".join([*lines, "return 0; }"]))
+    subprocess.run(["gcc", f"-I{CORE}", str(source), "-o", str(tmp_path / "sizes")], check=True)
+    found = subprocess.run([str(tmp_path / "sizes")], check=True, capture_output=True, text=True).stdout.split()
+    expected = []
+    for name, _ in pairs:
+        structure = getattr(lib, name)
+        expected.append(ctypes.sizeof(structure))
+        expected += [getattr(structure, field[0]).offset for field in structure._fields_]
+    assert [int(item) for item in found] == expected
