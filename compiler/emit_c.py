@@ -49,8 +49,8 @@ def _routine(k: int, routine: Routine, form: DescriptorForm) -> str:
     body = writer.body(routine.body, "    " * (len(routine.loops) + 1))
     lines = [f"/* {_comment(routine, form)} */"]
     out = "r" if routine.part == "rows" else "v"
-    kind = "void" if out == "r" else "double *"
-    lines.append(f"static {kind} f{k}({_ARGUMENTS.format(out=out)})\n{{")
+    kind = "SD_APART void " if out == "r" else "SD_APART double *"
+    lines.append(f"static {kind}f{k}({_ARGUMENTS.format(out=out)})\n{{")
     unused = [n for n in ("p", "ix", "at", "to", "t", "y", "yd") if n not in writer.used]
     lines += [f"    {''.join(f'(void){n}; ' for n in unused).strip()}"] if unused else []
     lines += writer.bases

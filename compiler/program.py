@@ -13,12 +13,13 @@ from typing import Any
 
 from sysdyn.compiler.descriptor import WITHOUT_ENTRIES, Block, DescriptorForm, Kernel
 from sysdyn.compiler.integers import Index, Integers, Reference, Slot
-from sysdyn.dsl.expression import Node, derivative, is_const, topological, variables
+from sysdyn.dsl.expression import Node, derivative, is_const, linear, topological, variables
 
 Operand = int | float  # the number of an assignment, or a constant
 
 ROWS_A_ROUTINE = 50  # gcc -O2: 1000 equations 12.1 s in one function, 1.85 s in functions of 50 (FACTS.md)
 ENTRIES_A_ROUTINE = 150  # about three entries a row
+TERMS_A_PIECE = 50  # terms of one row: each about as long as a row of its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,11 +137,10 @@ class Programmer:
         loops = {f"#{k}": k for k in range(len(kernel.nest))}
         bounds = self.bounds(kernel)
         places = tuple(self.integers.reference(s.row, self.form.rows[s.row].owner, s.at, loops) for s in kernel.rows)
-        outputs: list[tuple[Reference | int, Node]] = [
-            (place, s.expression) for place, s in zip(places, kernel.rows, strict=True)
-        ]
         rows = [s.row for s in kernel.rows]
-        self._cut((block, "rows", number), bounds, outputs, rows, 0)
+        pieces = [(k, piece) for k, s in enumerate(kernel.rows) for piece in _pieces(s.expression)]
+        stores: list[tuple[Reference | int, Node]] = [(places[k], piece) for k, piece in pieces]
+        self._cut((block, "rows", number), bounds, stores, [rows[k] for k, _ in pieces], 0)
         found: dict[str, tuple[tuple[Reference, Reference], ...]] = {"dy": (), "dyd": ()}
         for part, order in (("dy", 0), ("dyd", 1)):
             entries = [] if block in WITHOUT_ENTRIES else _entries(kernel, order)
@@ -164,6 +164,16 @@ class Programmer:
             body = _Body(self, len(bounds)).run(piece)
             touched = tuple(dict.fromkeys(rows[start : start + size]))
             self.routines.append(Routine(*what, bounds, body, entries, touched))
+
+
+def _pieces(root: Node) -> list[Node]:
+    """A row of very many terms in pieces, each added for itself: no function grows with the number of terms."""
+    if root.op != "sum" or len(root.args) <= TERMS_A_PIECE:
+        return [root]
+    constant, coefficients = root.data
+    parts = list(zip(coefficients, root.args, strict=True))
+    cuts = range(0, len(parts), TERMS_A_PIECE)
+    return [linear(0.0 if k else constant, parts[k : k + TERMS_A_PIECE]) for k in cuts]
 
 
 def _entries(kernel: Kernel, order: int) -> list[_Entry]:

@@ -47,9 +47,12 @@ def counter(depth: int) -> Node:
 
 def canonical_reductions(root: Node) -> Node:
     """Rename the loop variables of all reductions below root by their height: `#r1` innermost."""
+    nodes = topological([root])
+    if all(node.op != "reduce" for node in nodes):
+        return root
     done: dict[Node, Node] = {}
     height: dict[Node, int] = {}
-    for node in topological([root]):
+    for node in nodes:
         args = tuple(done[a] for a in node.args)
         level = max((height[a] for a in node.args), default=0)
         if node.op == "reduce":

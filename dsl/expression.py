@@ -394,6 +394,8 @@ def substitute(root: Node, change: Mapping[Node, Node]) -> Node:
 
 def variables(root: Node) -> frozenset[Node]:
     """The unknowns (var nodes) that occur; time counts as one."""
+    if root.variables is not None:
+        return root.variables
     for node in topological([root]):
         if node.variables is None:
             own = frozenset((node,)) if node.op in ("var", "time") else frozenset()
