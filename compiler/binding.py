@@ -7,6 +7,7 @@ touches the compiled text.  Received: a network, its program and descriptor form
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,10 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.descriptor import DescriptorForm
+from sysdyn.compiler.energies import EnergyModel
 from sysdyn.compiler.integers import Slot
 from sysdyn.compiler.interpret import Value, evaluate, over
-from sysdyn.compiler.parameters import Extents, Override, Parameters, extents, positions, whole_number
+from sysdyn.compiler.parameters import LARGEST, Extents, Override, Parameters, extents, positions, whole_number
 from sysdyn.compiler.program import Program
+from sysdyn.compiler.ranges import Ranges
 from sysdyn.compiler.tables import numbers
 from sysdyn.compiler.terms import Nest
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place
@@ -64,10 +67,17 @@ class Binding:
         return float(evaluate([node], self.parameters.lookup)[0])
 
 
-def bind(network: Network, form: DescriptorForm, program: Program, overrides: Overrides | None = None) -> Binding:
+def bind(
+    network: Network,
+    model: EnergyModel,
+    form: DescriptorForm,
+    program: Program,
+    overrides: Overrides | None = None,
+) -> Binding:
     """All numbers for one set of parameter values."""
     parameters = Parameters(network, overrides or {})
     owners = _owners(form, parameters)
+    _refuse_outside(model, owners, parameters, network.place)
     starts = _starts(form, owners, parameters)
     offsets = _offsets(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)
@@ -84,6 +94,16 @@ def bind(network: Network, form: DescriptorForm, program: Program, overrides: Ov
         dict(parameters.values),
         parameters,
     )
+
+
+def _refuse_outside(model: EnergyModel, owners: dict[str, Extents], parameters: Parameters, place: Place) -> None:
+    """ModelError E805 where an index lies outside its family, or there are more unknowns than the contract counts."""
+    found = tuple(Ranges(owners, parameters).check(model))
+    if found:
+        raise ModelError(found)
+    total = sum(math.prod(extents(box)) for box in owners.values())
+    if total > LARGEST:
+        raise ModelError([Diagnostic("E805", f"{total} elements are more than {LARGEST}", place)])
 
 
 def _owners(form: DescriptorForm, parameters: Parameters) -> dict[str, Extents]:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from sysdyn.compiler.mirror import PRIMAL, Mirror
-from sysdyn.compiler.terms import Nest, Term, canonical, counter, local_variables, refuse_nested, split
+from sysdyn.compiler.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
 from sysdyn.dsl.diagnostics import Place
 from sysdyn.dsl.expression import Node, derivative, substitute, topological, var
 from sysdyn.dsl.network import Loop, Network, Shape
@@ -155,7 +155,7 @@ def _functions(network: Network) -> dict[str, tuple[Term, ...]]:
     found: dict[str, list[Term]] = {}
     for energy in network.energies:
         pieces = _terms(energy.expression, energy.loops, energy.place)
-        refuse_nested(pieces, f"a state function {energy.function}")
+        pieces = without_nested(pieces, f"a state function {energy.function}")
         found.setdefault(energy.function, []).extend(pieces)
     return {name: tuple(pieces) for name, pieces in found.items()}
 
@@ -164,13 +164,11 @@ def _works(network: Network) -> Iterator[Virtual]:
     """One summand of the effort times one summand of the displacement each, under both nests."""
     for work in network.works:
         nest, (effort, on) = canonical(work.loops, flows(work.effort), flows(work.on))
-        for outer in split(effort, nest, work.place):
-            for inner in split(on, nest, work.place):
+        for outer in without_nested(split(effort, nest, work.place), "an effort"):
+            for inner in without_nested(split(on, nest, work.place), "the displacement of a work"):
                 own = inner.loops[len(nest) :]
                 added, moved = _moved(own, len(nest), len(outer.loops))
-                piece = substitute(inner.expression, moved)
-                refuse_nested((Term(piece, (), work.place),), "the displacement of a work")
-                yield Virtual(outer.expression, piece, (*outer.loops, *added), work.place)
+                yield Virtual(outer.expression, substitute(inner.expression, moved), (*outer.loops, *added), work.place)
 
 
 def _moved(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:
@@ -186,16 +184,14 @@ def _moved(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:
 def _constraints(network: Network) -> Iterator[Row]:
     for c in network.constraints:
         nest, (expression, *at) = canonical(c.loops, flows(c.expression), *c.at)
-        pieces = split(expression, nest, c.place)
-        refuse_nested(pieces, f"{c.kind} '{c.name}'")
+        pieces = without_nested(split(expression, nest, c.place), f"{c.kind} '{c.name}'")
         yield Row(c.kind, c.name, tuple(at), pieces, nest, c.place)
 
 
 def _dynamics(network: Network) -> Iterator[Row]:
     for d in network.dynamics:
         nest, (expression, state) = canonical(d.loops, flows(d.expression), d.state)
-        pieces = split(expression, nest, d.place)
-        refuse_nested(pieces, f"the dynamic of '{state.data[0]}'")
+        pieces = without_nested(split(expression, nest, d.place), f"the dynamic of '{state.data[0]}'")
         yield Row("lambda", state.data[0], state.args, pieces, nest, d.place)
 
 

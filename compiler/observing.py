@@ -13,7 +13,7 @@ from sysdyn.compiler.assembly import Assembly
 from sysdyn.compiler.descriptor import Equations, Pin, Unknowns
 from sysdyn.compiler.energies import EnergyModel, Target
 from sysdyn.compiler.momenta import resolve
-from sysdyn.compiler.terms import Term, counter, local_variables, refuse_nested, split
+from sysdyn.compiler.terms import counter, local_variables, split, without_nested
 from sysdyn.dsl.expression import Node, call, sub, time_derivative, variables
 
 
@@ -82,7 +82,5 @@ def add_initials(
         assembly.family(family)
         at = tuple(counter(k) for k in range(len(target.nest)))
         residual = resolve(model, carriers, sub(target.target, target.value))
-        found: tuple[Term, ...] = split(residual, target.nest, target.place)
-        refuse_nested(found, "an initial condition")
-        for term in found:
+        for term in without_nested(split(residual, target.nest, target.place), "an initial condition"):
             assembly.add("initial", equation.owner, at, term.loops, term.expression)

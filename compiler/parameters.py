@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from sysdyn.dsl.expression import Node, const, to_text, topological
 from sysdyn.dsl.network import Loop, Network, Parameter, Shape
 
 Extents = tuple[tuple[int, int], ...]  # (first, last) of each index
+LARGEST = 2**27  # elements of an array: 1 GiB
 Override = str | tuple[Any, ...]
 
 
@@ -85,6 +87,9 @@ class Parameters:
     def _bind(self, parameter: Parameter, overrides: Mapping[Override, Any]) -> None:
         name, place = parameter.name, parameter.place
         box = self.extents(parameter.shape, place)
+        if math.prod(extents(box)) > LARGEST:
+            text = f"'{name}' has {math.prod(extents(box))} elements, more than {LARGEST}"
+            raise ModelError([Diagnostic("E805", text, place)])
         if parameter.shape:
             self.boxes[name] = box
         if name in overrides:

@@ -60,7 +60,7 @@ class CompiledModel:
 
     def bind(self, overrides: Overrides | None = None) -> Binding:
         """The numbers for one set of parameter values; never recompiles.  ModelError where they make no model."""
-        binding = binding_.bind(self.network, self.form, self.program, overrides)
+        binding = binding_.bind(self.network, self.energies, self.form, self.program, overrides)
         scene = self.network.scene
         found = check_counts(self.form, self.program, binding)
         if scene is not None and scene.redundancy in ("drop", "minimum_norm"):

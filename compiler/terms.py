@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place
 from sysdyn.dsl.expression import (
     Node,
+    add,
+    call,
     const,
     index,
     linear,
@@ -29,6 +31,7 @@ from sysdyn.dsl.expression import (
 from sysdyn.dsl.network import Loop
 
 Nest = tuple[Loop, ...]
+LARGEST_LITERAL = 64  # elements of a sum that is written out: more is an array, and wants a loop
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,12 +130,47 @@ def terms(expression: Node, loops: Sequence[Loop], place: Place) -> tuple[Term, 
     return split(root, nest, place)
 
 
-def refuse_nested(found: Iterable[Term], what: str) -> None:
-    """ModelError N608 where a sum over a range stands inside a nonlinear expression that must be differentiated."""
+def without_nested(found: Iterable[Term], what: str) -> tuple[Term, ...]:
+    """The terms with every sum inside a nonlinear expression written out, for they will be differentiated.
+
+    Only ranges of literal bounds can be: of others the text would depend on a size (ModelError N608).
+    """
+    result: list[Term] = []
     for term in found:
         if has_reduction(term.expression):
-            text = f"a sum over a range inside a nonlinear expression is not supported yet in {what}"
-            raise ModelError([Diagnostic("N608", text, term.place)])
+            result += split(_written_out(term, what), term.loops, term.place)
+        else:
+            result.append(term)
+    return tuple(result)
+
+
+def _written_out(term: Term, what: str) -> Node:
+    done: dict[Node, Node] = {}
+    for node in topological([term.expression]):
+        args = tuple(done[a] for a in node.args)
+        if node.op == "reduce":
+            done[node] = _elements(node, args, term.place, what)
+        else:
+            done[node] = rebuild(node, args)
+    return done[term.expression]
+
+
+def _elements(node: Node, args: tuple[Node, ...], place: Place, what: str) -> Node:
+    operator, name = node.data
+    first, last, body = args
+    if first.op != "const" or last.op != "const" or last.data - first.data >= LARGEST_LITERAL:
+        text = f"a {operator} over a range inside a nonlinear expression is not supported yet in {what}"
+        raise ModelError([Diagnostic("N608", text, place, "literal bounds are written out")])
+    parts = [substitute(body, {index(name): const(k)}) for k in range(int(first.data), int(last.data) + 1)]
+    match operator:
+        case "sum":
+            return add(*parts)
+        case "prod":
+            return mul(*parts)
+        case _:
+            if not parts:
+                raise ModelError([Diagnostic("N608", f"the {operator} over an empty range", place)])
+            return call(operator, *parts) if len(parts) > 1 else parts[0]
 
 
 def local_variables(root: Node, kinds: str | Sequence[str], order: int | None = 0) -> list[Node]:

@@ -192,3 +192,24 @@ def test_manifest():
         "structure",
     }
     assert len(json.dumps(model.manifest(model.bind({"n": 100_000}))["unknowns"])) < 1000
+
+
+def test_indices_outside_their_family_are_e805_before_anything_reads_them():
+    i, one, n = x.index("i"), x.const(1), x.param("n")
+    stretch = x.power(x.sub(x.var("x", "q", i), x.var("x", "q", x.sub(i, one))), x.const(2))
+    net = chain(4)
+    wrong = Energy("V", stretch, (Loop("i", one, n),), PLACE)
+    with pytest.raises(ModelError) as error:
+        compile_network(replace(net, energies=(*net.energies, wrong))).bind()
+    assert [(d.code, d.message) for d in error.value.diagnostics] == [("E805", "x: index 0 outside 1..4")]
+    norm = x.sqrt(x.reduction("sum", "i", one, x.add(n, one), x.power(x.var("y", "q", i), x.const(2))))
+    seen = replace(net.observations[0], expression=norm)
+    with pytest.raises(ModelError) as error:
+        compile_network(replace(net, observations=(seen,))).bind()
+    assert [d.message for d in error.value.diagnostics] == ["y: index 5 outside 1..4"]
+
+
+def test_arrays_beyond_all_memory_are_refused():
+    with pytest.raises(ModelError) as error:
+        compile_network(chain(4)).bind({"n": 1e9})
+    assert codes(error) == ["E805"]

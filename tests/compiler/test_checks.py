@@ -151,12 +151,14 @@ def test_e806_an_index_that_is_not_affine():
     assert findings(net) == [("E806", "index #0^2 is not affine: i + c with whole c is meant")]
 
 
-def test_n608_a_sum_inside_a_nonlinear_energy():
-    i, one, n = x.index("i"), x.const(1), x.param("n")
+@pytest.mark.parametrize(("literal", "codes"), [(False, ["N608"]), (True, [])])
+def test_n608_a_sum_inside_a_nonlinear_energy(literal, codes):
+    i, one = x.index("i"), x.const(1)
+    n = x.const(4) if literal else x.param("n")
     root = x.sqrt(x.reduction("sum", "i", one, n, square(q("a", i))))
     net = simple(
         parameters=(parameter("n", 4.0, whole=True),),
         coordinates=(coordinate("a", ((one, n),)),),
         energies=(Energy("V", root, (), PLACE),),
     )
-    assert [c for c, _ in findings(net)] == ["N608"]
+    assert [c for c, _ in findings(net)] == codes
