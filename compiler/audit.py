@@ -11,7 +11,6 @@ from __future__ import annotations
 from sysdyn.compiler.assembly import Assembly
 from sysdyn.compiler.descriptor import Equations
 from sysdyn.compiler.energies import EnergyModel
-from sysdyn.compiler.momenta import resolve
 from sysdyn.compiler.terms import Nest, local_variables
 from sysdyn.dsl.expression import (
     Node,
@@ -29,13 +28,13 @@ from sysdyn.dsl.expression import (
 )
 
 
-def add_audit(assembly: Assembly, model: EnergyModel, carriers: frozenset[str]) -> None:
+def add_audit(assembly: Assembly, model: EnergyModel) -> None:
     """Rows kinetic, potential (J), dissipated, supplied (W)."""
     for name, unit in (("kinetic", "J"), ("potential", "J"), ("dissipated", "W"), ("supplied", "W")):
         assembly.family(Equations("audit", name, name, "audit", unit, None))
 
     def into(row: str, nest: Nest, expression: Node) -> None:
-        assembly.add("audit", row, (), nest, resolve(model, carriers, expression))
+        assembly.add("audit", row, (), nest, expression)
 
     m = model.mirror
     for term in model.function(m.coenergy):

@@ -15,7 +15,7 @@ from sysdyn.compiler.assembly import Assembly
 from sysdyn.compiler.audit import add_audit
 from sysdyn.compiler.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.energies import EnergyModel, Family, Row
-from sysdyn.compiler.momenta import given, inertial, resolve
+from sysdyn.compiler.momenta import given, inertial, resolved
 from sysdyn.compiler.observing import add_initials, add_observations, observed, pins_and_equations
 from sysdyn.compiler.terms import Nest, counter, local_variables
 from sysdyn.dsl.diagnostics import Place
@@ -27,6 +27,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     """The descriptor form; `legendre`: every inertial coordinate carries its momentum as an unknown."""
     stores = given(model)
     carriers = stores | inertial(model) if legendre else stores
+    model = resolved(model, frozenset(carriers))
     form = _Lowering(model, stores, frozenset(carriers))
     form.declare()
     form.kinetic()
@@ -34,7 +35,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     form.works()
     form.constraints()
     add_observations(form.assembly, model, form.carriers)
-    add_audit(form.assembly, model, form.carriers)
+    add_audit(form.assembly, model)
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
     owners = (*model.coordinates, *model.unknowns, *model.states)
@@ -156,21 +157,20 @@ class _Lowering:
                 for node in local_variables(term.expression, kind):
                     slope = derivative(term.expression, node)
                     value = slope if sign > 0 else neg(slope)
-                    self.assembly.add("dynamics", node.data[0], node.args, term.loops, self._known(value))
+                    self.assembly.add("dynamics", node.data[0], node.args, term.loops, value)
 
     def works(self) -> None:
         """-Q_j = -E du/dq_j."""
         for work in self.model.works:
-            effort = self._known(work.effort)
             for node in local_variables(work.on, self.model.mirror.coordinate):
-                force = mul(effort, derivative(work.on, node))
+                force = mul(work.effort, derivative(work.on, node))
                 self.assembly.add("dynamics", node.data[0], node.args, work.loops, neg(force))
 
     def constraints(self) -> None:
         """Phi, Psi with their reactions, Gamma, Lambda, and the total time derivatives of all."""
         for row in self.model.rows:
             for term in row.terms:
-                expression = self._known(term.expression)
+                expression = term.expression
                 if row.kind == "lambda":
                     self.assembly.add("lambda", row.name, row.at, term.loops, neg(expression))
                     continue
@@ -197,6 +197,3 @@ class _Lowering:
         self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
         if row.kind == "phi":
             self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))
-
-    def _known(self, expression: Node) -> Node:
-        return resolve(self.model, self.carriers, expression)

@@ -7,9 +7,10 @@ structurally nonzero second derivative by its flow.  Elsewhere its momentum is t
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
-from sysdyn.compiler.energies import EnergyModel
-from sysdyn.compiler.terms import Term, local_variables
+from sysdyn.compiler.energies import EnergyModel, Virtual
+from sysdyn.compiler.terms import Term, local_variables, split, without_nested
 from sysdyn.dsl.expression import (
     Node,
     add,
@@ -21,10 +22,8 @@ from sysdyn.dsl.expression import (
     index,
     is_const,
     reduction,
-    sub,
     substitute,
     time_derivative,
-    topological,
 )
 
 
@@ -59,24 +58,15 @@ def momentum(model: EnergyModel, node: Node) -> Node:
 
 def _at(term: Term, rate: Node, at: tuple[Node, ...]) -> Node:
     """The slope of a term by `rate`, summed over the iterations in which `rate` stands at the indices `at`."""
-    body = derivative(term.expression, rate)
-    change: dict[Node, Node] = {}
-    tests: list[Node] = []
-    for own, wanted in zip(rate.args, at, strict=True):
-        counters = [n for n in topological([own]) if n.op == "index" and n not in change]
-        if counters:
-            change[counters[0]] = add(counters[0], sub(wanted, own))
-        elif own is not wanted:
-            tests.append(compare("==", own, wanted))
+    change = {index(loop.index): index(f"#rm{loop.index}") for loop in term.loops}
+    slope = substitute(derivative(term.expression, rate), change)
+    pairs = [(substitute(own, change), wanted) for own, wanted in zip(rate.args, at, strict=True)]
+    tests = [compare("==", own, wanted) for own, wanted in pairs if own is not wanted]
+    result = conditional(both(*tests), slope, const(0.0)) if tests else slope
     for loop in reversed(term.loops):
-        name = index(loop.index)
-        if name in change:
-            tests += [compare("<=", loop.first, name), compare("<=", name, loop.last)]
-        else:
-            body = reduction("sum", f"#rm{len(change)}{loop.index}", loop.first, loop.last, body)
-            body = substitute(body, {name: index(f"#rm{len(change)}{loop.index}")})
-    result = conditional(both(*tests), body, const(0.0)) if tests else body
-    return substitute(result, change)
+        first, last = (substitute(bound, change) for bound in (loop.first, loop.last))
+        result = reduction("sum", f"#rm{loop.index}", first, last, result)
+    return result
 
 
 def resolve(model: EnergyModel, carriers: frozenset[str], root: Node) -> Node:
@@ -87,6 +77,25 @@ def resolve(model: EnergyModel, carriers: frozenset[str], root: Node) -> Node:
             value = momentum(model, node)
             change[node] = time_derivative(value) if node.data[2] else value
     return substitute(root, change) if change else root
+
+
+def resolved(model: EnergyModel, carriers: frozenset[str]) -> EnergyModel:
+    """The model with momenta that are no unknowns replaced in works and rows, whose terms are split again."""
+
+    def terms(found: tuple[Term, ...], what: str) -> tuple[Term, ...]:
+        result: list[Term] = []
+        for term in found:
+            expression = resolve(model, carriers, term.expression)
+            same = expression is term.expression
+            result += (term,) if same else without_nested(split(expression, term.loops, term.place), what)
+        return tuple(result)
+
+    works: list[Virtual] = []
+    for work in model.works:
+        for term in terms((Term(work.effort, work.loops, work.place),), "an effort"):
+            works.append(replace(work, effort=term.expression, loops=term.loops))
+    rows = tuple(replace(row, terms=terms(row.terms, f"{row.kind} '{row.name}'")) for row in model.rows)
+    return replace(model, works=tuple(works), rows=rows)
 
 
 def undefined(model: EnergyModel, carriers: frozenset[str], root: Node) -> Iterator[str]:
