@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.compiler.coverage import bind_covers
 from sysdyn.compiler.descriptor import DescriptorForm
 from sysdyn.compiler.energies import EnergyModel
 from sysdyn.compiler.integers import Slot
@@ -78,6 +79,7 @@ def bind(
     parameters = Parameters(network, overrides or {})
     owners = _owners(form, parameters)
     _refuse_outside(model, owners, parameters, network.place)
+    bind_covers(form.covers, owners, parameters)
     starts = _starts(form, owners, parameters)
     offsets = _offsets(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)

@@ -109,6 +109,7 @@ class DescriptorForm:
     offsets: tuple[Offset, ...]
     shapes: tuple[tuple[str, Shape], ...]  # of coordinates, unknowns, states and `initial` rows, by owner
     hulls: tuple[tuple[str, tuple[tuple[tuple[Node, ...], Nest, Place], ...]], ...]  # where each label is declared
+    covers: tuple[tuple[str, tuple[tuple[Nest, Node], ...]], ...] = ()  # families that momenta cover in part
 
     def block(self, name: str) -> Block | None:
         """The block of that name; None where it has no rows."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from sysdyn.compiler.assembly import Assembly
 from sysdyn.compiler.audit import add_audit
+from sysdyn.compiler.coverage import Cover, cover, inside, outside
 from sysdyn.compiler.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.energies import EnergyModel, Family, Row
 from sysdyn.compiler.momenta import given, inertial, resolved
@@ -54,6 +55,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
         model.offsets,
         tuple(shapes),
         tuple((name, tuple(places)) for name, places in hulls.items()),
+        tuple(form.covers),
     )
 
 
@@ -71,6 +73,7 @@ class _Lowering:
         self.stores = stores
         self.carriers = carriers
         self.assembly = Assembly()
+        self.covers: list[Cover] = []
         self.families = self._families()
 
     def _families(self) -> list[Unknowns]:
@@ -125,14 +128,8 @@ class _Lowering:
         """Momenta: M f' + ... of coordinates without, p' and the momentum row of those with one."""
         add, mirror = self.assembly.add, self.model.mirror
         for family in self.model.coordinates:
-            if family.name not in self.carriers:
-                continue
-            nest, at = whole(family)
-            add("dynamics", family.name, at, nest, var(family.name, mirror.conjugate, *at, order=1))
-            held = var(family.name, mirror.conjugate, *at)
-            if family.name in self.stores:
-                held = neg(var(family.name, mirror.rate, *at))
-            self._momentum(family.name, at, nest, held)
+            if family.name in self.carriers:
+                self._carrier(family)
         for term in self.model.function(mirror.coenergy):
             for rate in local_variables(term.expression, mirror.rate):
                 slope = derivative(term.expression, rate)
@@ -143,6 +140,24 @@ class _Lowering:
         for term in self.model.function(mirror.energy):
             for p in local_variables(term.expression, mirror.conjugate):
                 self._momentum(p.data[0], p.args, term.loops, derivative(term.expression, p))
+
+    def _carrier(self, family: Family) -> None:
+        """P' of the elements that a store moves with, and the momentum row of all: p, or -f where T is given."""
+        m, name = self.model.mirror, family.name
+        given = name in self.stores
+        nest, at = whole(family)
+        moved, partly = nest, cover(self.model, family, given=given)
+        if partly is not None:
+            self.covers.append(partly)
+            moved = inside(name)
+        self.assembly.add("dynamics", name, at, moved, var(name, m.conjugate, *at, order=1))
+        held = var(name, m.conjugate, *at)
+        if not given:
+            self._momentum(name, at, nest, held)
+            return
+        self._momentum(name, at, moved, neg(var(name, m.rate, *at)))
+        for rest in outside(family) if partly is not None else ():
+            self._momentum(name, at, rest, held)
 
     def _momentum(self, owner: str, at: tuple[Node, ...], nest: Nest, expression: Node) -> None:
         self.assembly.add("momentum", owner, at, nest, expression)

@@ -38,6 +38,7 @@ class Parameters:
     def __init__(self, network: Network, overrides: Mapping[Override, Any]) -> None:
         self.values: dict[str, Any] = {}
         self.boxes: dict[str, Extents] = {}
+        self.hidden: dict[str, float] = {}  # numbers that the compiler itself asks for
         self.start = 0.0
         self._network = network
         self._tables = {t.name: t for t in network.tables}
@@ -146,6 +147,8 @@ class Parameters:
     def lookup(self, node: Node, args: list[Value]) -> Value:
         """The value of a leaf that parameters determine."""
         if node.op == "param":
+            if node.data in self.hidden:
+                return self.hidden[node.data]
             values = self.values[node.data]
             return values if not node.args else self._gather(node.data, values, args)
         if node.op == "table":

@@ -161,3 +161,39 @@ def test_two_indices_triangles_and_products_of_sums(tmp_path):
         jacobian = np.zeros((n * m, n * m))
         np.add.at(jacobian, (r.astype(int), c.astype(int)), v)
         np.testing.assert_allclose(jacobian, jacobian.T, rtol=1e-13)
+
+
+@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("first", [1, 2, 6])
+def test_momenta_cover_the_elements_that_have_a_mass(first, given, tmp_path):
+    """Rows of massless elements hold no p'; where T is given, their momentum row is p = 0."""
+    with x.fresh():
+        i, n = x.index("i"), x.param("n")
+        one = x.const(1)
+        kind, function = ("p", "T") if given else ("f", "T*")
+        kinetic = x.mul(x.const(2), x.power(x.var("u", kind, i), x.const(2)))
+        net = blank(
+            parameters=(parameter("n", 5.0, whole=True), parameter("a", float(first), whole=True)),
+            coordinates=(coordinate("u", ((one, n),)),),
+            energies=(
+                Energy(function, kinetic, (Loop("i", x.param("a"), n),), PLACE),
+                Energy("D", x.power(x.var("u", "f", i), x.const(2)), (Loop("i", one, n),), PLACE),
+            ),
+        )
+        model = compile_network(net, "hamiltonian")
+        binding = model.bind()
+        oracle = Oracle(model.form, binding)
+        t, y, yd = point(oracle)
+        places = {(f.owner, f.kind): oracle.at[k] for k, f in enumerate(model.form.families)}
+        f, p = (y[places["u", k] : places["u", k] + 5] for k in "fp")
+        rate = yd[places["u", "p"] : places["u", "p"] + 5]
+        heavy = np.arange(1, 6) >= first
+        rows = {r.block: oracle.to[k] for k, r in enumerate(model.form.rows)}
+        carriers = [oracle, CCarrier(model.program, model.form, binding)]
+        carriers.append(NumpyCarrier(model.program, model.form, binding, tmp_path))
+        for carrier in carriers:
+            dynamics = carrier.rows("dynamics", t, y, yd)[rows["dynamics"] :][:5]
+            np.testing.assert_allclose(dynamics, np.where(heavy, rate, 0) + 2 * f)
+            momentum = carrier.rows("momentum", t, y, yd)[rows["momentum"] :][:5]
+            expected = np.where(heavy, 4 * p - f, p) if given else np.where(heavy, p - 4 * f, p)
+            np.testing.assert_allclose(momentum, expected)
