@@ -28,6 +28,9 @@ CHUNK_STEPS = 1 << 20
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
+LONGEST = 0.05
+"""Longest step as part of the span: short events of sources are met, and the dense output stays honest."""
+
 TRACE, STEP, COMPARED = 1, 2, 4
 """Kinds of rows (their second column, a sum)."""
 
@@ -42,7 +45,8 @@ class Request:
     t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
     (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
     absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; magnitude [unknowns as
-    written] known from an earlier run (else tracked); euler: fixed step [s] of the implicit Euler method.
+    written] known from an earlier run (else tracked); fixed_step [s]: no error test (with max_order 1 the
+    implicit Euler method); h_max [s]: longest step, None: LONGEST of the span.
     """
 
     t_end: float
@@ -57,7 +61,7 @@ class Request:
     magnitude: Floats | None = None
     index: int = 3
     max_order: int = lib.MAX_ORDER
-    euler: float | None = None
+    fixed_step: float | None = None
     h_max: float | None = None
 
 
@@ -110,7 +114,7 @@ class Integration:
         self._driver()
 
     def _magnitudes(self) -> Floats:
-        found = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd)
+        found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd)
         if self.request.magnitude is not None:
             known = self.request.magnitude
             found[: known.size] = np.where(known > 0.0, known, found[: known.size])
@@ -128,14 +132,10 @@ class Integration:
 
     def _settler(self) -> Settler:
         form = self.system.form
-        span = max(self.request.t_end - self.start.t, 1e-300)
         n = form.written
+        kinematics = (form.k_q, form.k_f)
         return Settler(
-            self.system.another("settled"),
-            (form.k_q, form.k_f),
-            self.magnitude[:n],
-            1e-2 * span,
-            self.roles.state[:n],
+            self.system.another("settled"), kinematics, self.magnitude[:n], self._time, self.roles.state[:n]
         )
 
     def _stepper(self) -> None:
@@ -145,10 +145,10 @@ class Integration:
             raise MemoryError
         self._atol = None if request.atol is None else np.full(self.system.unknowns, request.atol)
         bdf = self.bdf.contents
-        bdf.max_order = 1 if request.euler else request.max_order
+        bdf.max_order = request.max_order
         bdf.rtol, bdf.t_end = request.rtol, request.t_end
-        bdf.h_max = request.h_max or np.inf
-        bdf.fixed_h = request.euler or 0.0
+        bdf.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
+        bdf.fixed_h = request.fixed_step or 0.0
         bdf.atol = lib.pointer(self._atol)
         bdf.magnitude = lib.pointer(self.magnitude)
         bdf.test, bdf.power = lib.pointer(self.roles.test), lib.pointer(self.roles.power)

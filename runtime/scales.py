@@ -1,7 +1,8 @@
 """Magnitudes of the unknowns: what relative tolerances and scaled matrices refer to.
 
-A magnitude is the nominal value of the manifest where it names one.  Else the largest of |y| at the start, a
-thousandth of the largest |y| among unknowns of the same kind and unit, and |y'| over a hundredth of the span.
+A magnitude is the nominal value of the manifest where it names one.  Else the larger of |y| at the start and a
+thousandth of the largest |y| among unknowns of the same kind and unit; where all of these are zero, |y'| times the
+time scale of the start (never the span alone: a long run would call everything small).
 Unknowns that are zero with all of that take the magnitude that balances the rows they stand in: the other terms
 of the row, and how far the row itself moves with t over the span (sources that start at zero).
 While a run tracks magnitudes they grow with max |y|; a second run starts with the maxima of the first.
@@ -21,14 +22,31 @@ _SAMPLES = 16
 _SWEEPS = 8
 
 
-def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> Floats:
-    """How far each row moves with t alone over the span [rows]."""
+def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
+    """How far each row moves with t alone over the span [rows]; shortest time in which one does so [s]."""
     base = system.residual(t0, y, yd)
-    most = np.zeros(system.rows)
-    for k in range(1, _SAMPLES + 1):
-        now = system.residual(t0 + (t_end - t0) * (k - 0.382) / _SAMPLES, y, yd)
-        most = np.fmax(most, np.where(np.isfinite(now), np.abs(now - base), 0.0))
-    return most
+    span = t_end - t0
+    moves = []
+    for part in (1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)):
+        moved = np.abs(system.residual(t0 + span * part, y, yd) - base)
+        moves.append(np.where(np.isfinite(moved), moved, 0.0))
+    most, early = np.max(moves, axis=0, initial=0.0), moves[0]
+    quick = early > NOISE * most
+    return most, float((1e-6 * span * most[quick] / early[quick]).min(initial=np.inf))
+
+
+def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: float) -> float:
+    """Shortest of: a hundredth of the span, y / y', sqrt(q / f'), the time scale of what moves with t (s)."""
+    found = min(SPAN * span, excited)
+    state = np.isin(system.kinds, ("q", "f", "p", "s"))
+    size, rate = group_maximum(system, np.abs(y))[state], np.abs(yd)[state]
+    found = min(
+        found, float((size[(size > 0) & (rate > 0)] / rate[(size > 0) & (rate > 0)]).min(initial=np.inf))
+    )
+    form = system.form
+    size, rate = group_maximum(system, np.abs(y))[form.k_q], np.abs(yd)[form.k_f]
+    both = (size > 0) & (rate > 0)
+    return min(found, float(np.sqrt(size[both] / rate[both]).min(initial=np.inf)))
 
 
 def propagate(
@@ -68,22 +86,25 @@ def group_maximum(system: System, values: Floats) -> Floats:
     return largest[group]
 
 
-def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> Floats:
-    """Magnitude of each unknown [unknowns], all positive."""
+def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
+    """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s]."""
     span = max(t_end - t0, 0.0) or 1.0
+    y, yd = (np.where(np.isfinite(item), item, 0.0) for item in (y, yd))
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
-    known = np.abs(y) + np.where(state, SPAN * span * np.abs(yd), 0.0)
-    known = np.maximum(known, GROUP * group_maximum(system, known))
-    known = np.where(np.isfinite(known), known, 0.0)
+    excited, quick = excitation(system, t0, t0 + span, y, yd)
+    tau = time_scale(system, span, y, yd, quick)
+    known = np.maximum(np.abs(y), GROUP * group_maximum(system, np.abs(y)))
+    growing = np.where(state, tau * np.abs(yd), 0.0)
+    growing = np.maximum(growing, GROUP * group_maximum(system, growing))
+    known = np.where(known > 0.0, known, growing)
     found = np.where(system.nominal > 0.0, system.nominal, known)
     jy, jyd = system.jacobian(t0, y, yd)
-    size = np.abs(jy) + np.abs(jyd) / (SPAN * span)
+    size = np.abs(jy) + np.abs(jyd) / tau
     size = np.where(np.isfinite(size), size, 0.0)
-    excited = excitation(system, t0, t_end, y, yd)
     pattern = system.pattern
     # what follows from the state is balanced against it, so that round-off of a start does not pass for a magnitude
     balanced = propagate(np.where(state, found, 0.0), pattern.row, pattern.columns_of(), size, excited)
     found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, group_maximum(system, found), found)
     tiny = np.finfo(np.float64).tiny * 1e30
-    return np.where(found > tiny, found, 1.0)
+    return np.where(found > tiny, found, 1.0), tau

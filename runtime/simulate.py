@@ -200,7 +200,8 @@ class _Runs:
             max_wall=left,
             magnitude=magnitude,
             index=self.index,
-            euler=options.euler_step if self.method == "euler" else None,
+            max_order=1 if self.method == "euler" else lib.MAX_ORDER,
+            fixed_step=options.euler_step if self.method == "euler" else None,
         )
 
     def _write(self, rows: Floats) -> None:

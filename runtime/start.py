@@ -242,7 +242,9 @@ def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[
 def _row_scale(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
     """One over the size of the terms of each row [rows]."""
     size = np.zeros(starter.settled.rows)
-    np.add.at(size, starter.rows, np.abs(starter.jacobian(t, x)) * np.maximum(scale, np.abs(x))[starter.columns])
+    np.add.at(
+        size, starter.rows, np.abs(starter.jacobian(t, x)) * np.maximum(scale, np.abs(x))[starter.columns]
+    )
     return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
 
 

@@ -11,8 +11,10 @@ in SIGSEGV at exit.
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import os
+import resource
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -222,7 +224,9 @@ class TraceWriter:
         if self.closed:
             return
         self.closed = True
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
         with contextlib.suppress(Exception):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limits[1], limits[1]))
             handle = self._file.id.get_vfd_handle()
             copy = os.memfd_create("sysdyn-trace")
             size = os.fstat(handle).st_size
@@ -236,6 +240,11 @@ class TraceWriter:
             os.close(copy)
         with contextlib.suppress(Exception):
             self._file.close()
+        # every handle of the file dies while its writes still succeed
+        self._sets, self._time = [], None
+        gc.collect()
+        with contextlib.suppress(Exception):
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
     def discard(self) -> None:
         """Closes without finishing; the file stays as it was last flushed."""

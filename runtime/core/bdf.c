@@ -11,8 +11,6 @@
 #define SLOW 0.9            /* contraction above which Newton gives up */
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
-#define FAILURES_NEWTON 20
-#define FAILURES_ERROR 20
 
 sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
 {
@@ -253,14 +251,26 @@ static void fit_end(sd_bdf *bdf)
         bdf->h = h;
 }
 
+/* t + h is t, or nearly (the last bit of the span is a step nonetheless) */
+static int too_small(const sd_bdf *bdf)
+{
+    double left = bdf->t_end - bdf->t;
+    return bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), left) && bdf->h < left;
+}
+
 int sd_bdf_step(sd_bdf *bdf)
 {
-    int32_t newton = 0, error_failures = 0, order_next = 1;
+    int32_t error_failures = 0, order_next = 1;
     double ck, error;
     set_weights(bdf);
+    bdf->cause = SD_FINE;
     bdf->jacobian_age++;
     for (;;) {
         fit_end(bdf);
+        if (too_small(bdf)) {
+            bdf->cause = bdf->cause ? bdf->cause : SD_STEP;
+            return bdf->cause;
+        }
         sd_bdf_coefficients(bdf, &ck);
         predict(bdf);
         int cause = correct(bdf);
@@ -273,23 +283,16 @@ int sd_bdf_step(sd_bdf *bdf)
         if (cause) {
             /* Newton, a singular matrix, a number that is not finite: much smaller */
             bdf->newton_failures++;
-            if (++newton >= FAILURES_NEWTON)
-                return bdf->cause;
             reduce(bdf, 0.25);
         } else {
             bdf->rejected_steps++;
             bdf->rising = 0;
-            if (++error_failures >= FAILURES_ERROR)
-                return bdf->cause;
+            error_failures++;
             double ratio = 0.25;
             if (error_failures == 1)
                 ratio = fmax(0.25, fmin(0.9, 0.9 * pow(2.0 * bdf->error_next + 1e-4, -1.0 / (order_next + 1))));
             bdf->order = error_failures > 2 ? 1 : order_next;
             reduce(bdf, ratio);
-        }
-        if (bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), bdf->t_end - bdf->t)) {
-            bdf->cause = cause ? cause : SD_STEP;
-            return bdf->cause;
         }
     }
     bdf->cause = SD_FINE;

@@ -36,6 +36,8 @@ class _Builder:
             self.rows.append({**row, "unit": "1", **{key: value[k] for key, value in extra.items()}})
 
     def add_block(self, name, base, expressions):
+        if not expressions:
+            return
         first = next(k for k, row in enumerate(self.rows) if row["block"] == base)
         order = [n for n, kind, _ in self.families]
         number, size = {n: k for k, n in enumerate(order)}, len(order)

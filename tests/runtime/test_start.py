@@ -15,7 +15,13 @@ REFERENCES = {
     ),
     "slider_crank": (
         models.slider_crank,
-        {"q_3": 2.577935475, "f_2": 1.414213562, "f_3": -1.948736046, "kappa_crank": 2.298092371, "kappa_rod": 0.3622568847},
+        {
+            "q_3": 2.577935475,
+            "f_2": 1.414213562,
+            "f_3": -1.948736046,
+            "kappa_crank": 2.298092371,
+            "kappa_rod": 0.3622568847,
+        },
         {"f_1": -1.894552251, "f_2": -3.762301999, "f_3": -1.694301436},
     ),
     "pendulum_spring": (
@@ -71,7 +77,10 @@ def test_guesses_move_and_say_for_whom_fixed_values_do_not():
 def test_guess_moves_least():
     # two guesses, one row: the nearest point of the circle
     made = models.small(
-        "x y", "f_x**2 + f_y**2", phi={"rod": "q_x**2 + q_y**2 - 1"}, initial={"q_x": (0.6, False), "q_y": (1.2, False)}
+        "x y",
+        "f_x**2 + f_y**2",
+        phi={"rod": "q_x**2 + q_y**2 - 1"},
+        initial={"q_x": (0.6, False), "q_y": (1.2, False)},
     )
     system, state = started(made)
     places = [system.unknown_names.index(name) for name in ("q_x", "q_y")]
@@ -99,7 +108,12 @@ def test_contradicting_fixed_values_are_named():
 
 def test_effort_constraint_without_solution_is_named():
     made = models.small(
-        "x", "f_x**2", work={"x": "e_g"}, implicit=("g",), gamma={"load": "e_g**2 + 3.1 + f_x**2"}, initial={"q_x": (0, True)}
+        "x",
+        "f_x**2",
+        work={"x": "e_g"},
+        implicit=("g",),
+        gamma={"load": "e_g**2 + 3.1 + f_x**2"},
+        initial={"q_x": (0, True)},
     )
     with pytest.raises(InconsistentStart) as caught:
         started(made)

@@ -1,0 +1,151 @@
+import json
+
+import numpy as np
+import pytest
+import small_models as models
+from sysdyn.runtime.carrier import load
+from sysdyn.runtime.failures import SolverFailure
+from sysdyn.runtime.simulate import Options, choose_index, simulate
+from sysdyn.runtime.trace import Parameter, Trace
+
+# /work/shared/seed/references.json: values at the last instant of each system
+END = {
+    "pendulum": (
+        models.pendulum,
+        4.0,
+        {"q1": -0.12866541720223088, "f2": 0.043574977767020996, "kappa1": 2.4298740715415423},
+    ),
+    "mass_spring": (models.mass_spring, 10.0, {"q_x": 0.660513656270509, "f_x": -0.50486318891423}),
+    "dc_motor": (
+        models.dc_motor,
+        0.6,
+        {"f_c": 0.936225230071879, "f_a": 45.03517523655459, "q_a": 21.57951085649930},
+    ),
+    "lead_filter": (models.lead_filter, 1.0, {"q_2": -0.00001891163095, "f_3": 0.000756465238384}),
+    "pendulum_spring": (models.pendulum_spring, 10.0, {"q_1": -0.65903118951028, "q_2": -5.10735094044785}),
+    "fluid_tank": (models.fluid_tank, 10.0, {"q_2": 1.794195321783635, "f_3": 0.598065107261211}),
+    "nonlinear_fluid": (models.nonlinear_fluid, 60.0, {"q_2": 4.971874535507478, "f_3": 0.728375598501610}),
+    "slider_crank": (models.slider_crank, 4.0, {"q_1": -0.94799123004660, "q_3": 1.026518170347651}),
+}
+
+
+def outcome(made, path, t_end, **options):
+    manifest, binding, module = made
+    return simulate(manifest, binding, load(module), Options(path, 0.0, t_end, **options))
+
+
+@pytest.mark.parametrize("name", END)
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+def test_accuracy_is_met(name, accuracy, tmp_path):
+    make, t_end, values = END[name]
+    result = outcome(make(), tmp_path / "o.h5", t_end, accuracy=accuracy, every=t_end / 40)
+    trace = Trace.open(tmp_path / "o.h5")
+    assert result.final
+    assert result.error_estimate <= accuracy
+    assert not result.warnings
+    for quantity, value in values.items():
+        assert abs(trace[quantity][-1] - value) <= accuracy * trace[quantity].nominal, quantity
+    assert trace.time[-1] == t_end
+    assert trace.time.size == 41
+
+
+def test_trace_of_accepted_steps_holds_the_instants_asked_for(tmp_path):
+    result = outcome(models.pendulum(), tmp_path / "o.h5", 4.0, at=(0.4, 1.0), accuracy=1e-4)
+    trace = Trace.open(tmp_path / "o.h5")
+    assert {0.0, 0.4, 1.0, 4.0} <= set(trace.time.tolist())
+    assert (np.diff(trace.time) > 0).all()
+    assert result.index == "2"
+    assert trace.time.size > 40
+    # derivatives are those of the quantity
+    assert np.allclose(trace["q1"].derivative, trace["f1"].values, atol=1e-14)
+    with pytest.raises(ValueError, match="outside"):
+        outcome(models.pendulum(), tmp_path / "p.h5", 4.0, at=(5.0,))
+
+
+def test_expert_mode_is_one_run(tmp_path):
+    result = outcome(models.mass_spring(), tmp_path / "o.h5", 10.0, rtol=1e-6, atol=1e-9)
+    assert result.error_estimate is None
+    assert result.statistics["steps"] < 600
+    trace = Trace.open(tmp_path / "o.h5")
+    assert trace.attributes["rtol"] == 1e-6
+    assert trace.attributes["atol"] == 1e-9
+
+
+def test_accuracy_that_cannot_be_reached_is_a_warning(tmp_path):
+    result = outcome(models.slider_crank(), tmp_path / "o.h5", 1.0, accuracy=1e-15, every=0.1)
+    assert result.final
+    assert "not reached" in result.warnings[0]
+    assert result.error_estimate < 1e-9
+
+
+def test_accuracy_on_one_quantity(tmp_path):
+    loose = outcome(models.slider_crank(), tmp_path / "a.h5", 2.0, accuracy=1e-2, every=0.1)
+    one = outcome(
+        models.slider_crank(), tmp_path / "b.h5", 2.0, accuracy=1e-2, accuracy_on=(("q_3", 1e-8),), every=0.1
+    )
+    assert one.statistics["steps"] > 2 * loose.statistics["steps"]
+
+
+def test_failing_run_leaves_a_readable_trace(tmp_path):
+    with pytest.raises(SolverFailure) as caught:
+        outcome(models.mass_spring(), tmp_path / "o.h5", 10.0, max_steps=40)
+    trace = Trace.open(tmp_path / "o.h5")
+    assert trace.attributes["final"] == 0
+    assert not trace.final
+    assert trace.time.size > 10
+    assert trace.time[-1] == pytest.approx(caught.value.partial.reached)
+    assert caught.value.partial.final is False
+    assert trace["q_x"].nominal >= np.abs(trace["q_x"].values).max() * 0.999
+
+
+def test_interruption_leaves_what_was_computed(tmp_path):
+    def interrupt(fraction, left):
+        if fraction > 0.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        outcome(models.mass_spring(), tmp_path / "o.h5", 1e6, progress=interrupt)
+    trace = Trace.open(tmp_path / "o.h5")
+    assert trace.attributes["final"] == 0
+    assert trace.time.size > 100
+
+
+def test_two_runs_without_timings_are_equal_byte_for_byte(tmp_path):
+    for name in "ab":
+        outcome(
+            models.slider_crank(),
+            tmp_path / f"{name}.h5",
+            4.0,
+            timings=False,
+            parameters=(Parameter("m1", 1.0, "kg"),),
+        )
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_statistics_and_timings(tmp_path):
+    result = outcome(models.pendulum(), tmp_path / "o.h5", 4.0)
+    attributes = Trace.open(tmp_path / "o.h5").attributes
+    names = ["steps", "rejected_steps", "residual_evaluations", "jacobian_evaluations", "factorisations"]
+    assert list(json.loads(attributes["statistics"])) == [*names, "newton_failures", "error_estimate"]
+    timings = json.loads(attributes["timings"])
+    assert set(timings) == {"cpu_integrate_s", "wall_integrate_s", "cpu_compile_s", "wall_total_s"}
+    assert 0.0 < timings["cpu_integrate_s"] <= timings["wall_total_s"] * 1.5
+    assert result.statistics["steps"] > 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "form"), [("auto", "2"), ("3", "3"), ("2", "2"), ("2v", "2v"), ("1", "1")]
+)
+def test_index_option(wanted, form, tmp_path):
+    result = outcome(models.pendulum(), tmp_path / "o.h5", 1.0, index=wanted, rtol=1e-6)
+    assert result.index == form
+    assert bool(result.warnings) == (wanted in ("3", "1"))
+
+
+def test_options_that_do_not_exist(tmp_path):
+    with pytest.raises(ValueError, match="index 0"):
+        outcome(models.pendulum(), tmp_path / "o.h5", 1.0, index="0")
+    with pytest.raises(ValueError, match="radau"):
+        outcome(models.pendulum(), tmp_path / "o.h5", 1.0, method="radau")
+    assert choose_index is not None

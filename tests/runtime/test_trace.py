@@ -1,0 +1,151 @@
+import os
+import random
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import small_models as models
+from sysdyn.runtime.carrier import load
+from sysdyn.runtime.failures import TraceError
+from sysdyn.runtime.simulate import Options, simulate
+from sysdyn.runtime.trace import Column, Parameter, Trace, TraceWriter
+
+HERE = Path(__file__).parent
+
+
+def written(path, **options):
+    manifest, binding, module = models.pendulum()
+    settings = {
+        "every": 0.1,
+        "parameters": (Parameter("m", 1.13, "kg"),),
+        "attributes": {"model": "pendulum"},
+    }
+    return simulate(manifest, binding, load(module), Options(path, 0.0, 4.0, **{**settings, **options}))
+
+
+def test_layout(tmp_path):
+    path = tmp_path / "o.h5"
+    written(path)
+    with h5py.File(path) as file:
+        assert file["time"].is_scale
+        assert file["q1"].dtype == np.float64
+        assert file["q1"].dims[0][0] == file["time"]
+        assert file["q1"].attrs["derivative"] == b"/derivatives/q1"
+        assert file["derivatives/q1"].shape == file["time"].shape
+        assert "derivative" not in file["kappa1"].attrs
+        assert file["audit/energy"].attrs["units"] == b"J"
+        assert file["parameters/m"][()] == 1.13
+        assert file.attrs["final"] == 1
+        assert h5py.check_string_dtype(file.attrs.get_id("model").dtype).length is not None
+        for name in ("q1", "audit/energy"):
+            assert file[name].chunks[0] >= 1024
+    trace = Trace.open(path)
+    assert trace.names == ("a1", "a2", "f1", "f2", "kappa1", "q1", "q2")
+    assert trace.parameters["m"] == (1.13, "kg")
+    assert np.asarray(trace["q1"]).shape == trace.time.shape
+
+
+def test_opens_in_xarray(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    path = tmp_path / "o.h5"
+    written(path)
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        assert data["q1"].dims == ("time",)
+        assert data["time"].size == 41
+        assert data["q1"].attrs["units"] == "1"
+        assert float(data["q1"].sel(time=4.0)) == pytest.approx(-0.12866541720223088, abs=1e-4)
+
+
+def test_unwritable_paths_and_foreign_files(tmp_path):
+    with pytest.raises(TraceError):
+        written(tmp_path / "no" / "such" / "folder.h5")
+    with pytest.raises(TraceError):
+        written(tmp_path)
+    (tmp_path / "text.h5").write_text("no trace")
+    for name in ("text.h5", "missing.h5"):
+        with pytest.raises(TraceError):
+            Trace.open(tmp_path / name)
+
+
+LIMITED = """
+import resource, signal, sys
+import numpy as np
+from sysdyn.runtime.failures import TraceError
+from sysdyn.runtime.trace import Column, TraceWriter
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+writer = TraceWriter(sys.argv[1], [Column("x", 0, "m", "x", False)], 1, {"model": "m"})
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
+try:
+    for k in range(100):
+        writer.append(np.full((1024, 10), float(k)))
+        writer.flush()
+except TraceError as error:
+    print("TraceError", error)
+    sys.exit(5)
+"""
+
+
+def test_a_full_disk_is_an_error_and_no_signal(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(tmp_path / "o.h5")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 5, done.stderr
+    assert "TraceError" in done.stdout
+
+
+def test_too_little_room_is_seen_before_anything_is_written(tmp_path, monkeypatch):
+    writer = TraceWriter(tmp_path / "o.h5", [Column("x", 0, "m", "x", False)], 1, {})
+    writer.append(np.ones((10, 10)))
+    writer.flush()
+    real = os.statvfs(tmp_path)
+    fake = type("Disk", (), {"f_bavail": 0, "f_frsize": real.f_frsize})
+    monkeypatch.setattr(os, "statvfs", lambda path: fake)
+    writer.append(np.ones((10, 10)))
+    with pytest.raises(TraceError, match="no space"):
+        writer.flush()
+    assert Trace.open(tmp_path / "o.h5").time.size == 10
+
+
+ENDLESS = """
+import sys
+sys.path.insert(0, {here!r})
+import small_models as models
+from sysdyn.runtime import trace
+from sysdyn.runtime.carrier import load
+from sysdyn.runtime.simulate import Options, simulate
+trace.FLUSH_SECONDS = {flush}
+manifest, binding, module = models.mass_spring()
+print("begin", flush=True)
+simulate(manifest, binding, load(module), Options({path!r}, 0.0, 1e9, every=None, rtol=1e-6))
+"""
+
+
+@pytest.mark.parametrize("flush", [0.8, 0.01])
+def test_a_killed_run_leaves_a_readable_trace(tmp_path, flush):
+    random.seed(int(flush * 100))
+    for k in range(4):
+        path = tmp_path / f"{k}.h5"
+        code = textwrap.dedent(ENDLESS).format(here=str(HERE), path=str(path), flush=flush)
+        process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+        process.stdout.readline()
+        waited = time.monotonic()
+        while not (path.exists() and path.stat().st_size > 0) and time.monotonic() - waited < 20:
+            time.sleep(0.01)
+        seconds = 0.3 + 1.2 * random.random()
+        time.sleep(seconds)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        process.stdout.close()
+        trace = Trace.open(path)
+        assert trace.attributes["final"] == 0
+        if flush < 0.1 or seconds > 1.2:
+            assert trace.time.size > 0
+        assert np.isfinite(trace.time).all()
+        assert (np.diff(trace.time) > 0).all()
+        assert np.isfinite(trace["q_x"].values).all()
