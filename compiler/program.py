@@ -19,6 +19,7 @@ Operand = int | float  # the number of an assignment, or a constant
 
 ROWS_A_ROUTINE = 50  # gcc -O2: 1000 equations 12.1 s in one function, 1.85 s in functions of 50 (FACTS.md)
 ENTRIES_A_ROUTINE = 150  # about three entries a row
+STATEMENTS_A_ROUTINE = 2000  # of long rows: as many as 50 rows of 40 operations
 TERMS_A_PIECE = 50  # terms of one row: each about as long as a row of its own
 
 
@@ -157,13 +158,16 @@ class Programmer:
         rows: list[int],
         entries: int,
     ) -> None:
-        """Routines of about 50 rows for scalar kernels, one for a loop."""
-        size = len(outputs) if bounds else ENTRIES_A_ROUTINE if entries else ROWS_A_ROUTINE
-        for start in range(0, len(outputs), max(size, 1)):
-            piece = outputs[start : start + size]
-            body = _Body(self, len(bounds)).run(piece)
-            touched = tuple(dict.fromkeys(rows[start : start + size]))
-            self.routines.append(Routine(*what, bounds, body, entries, touched))
+        """Routines of about 50 rows for scalar kernels, fewer where rows are long; one for a loop."""
+        size = ENTRIES_A_ROUTINE if entries else ROWS_A_ROUTINE
+        body, touched = _Body(self, len(bounds)), dict[int, None]()
+        for k, ((place, root), row) in enumerate(zip(outputs, rows, strict=True), 1):
+            body.store(place, root)
+            touched[row] = None
+            full = not bounds and (k % size == 0 or len(body.statements) >= STATEMENTS_A_ROUTINE)
+            if full or k == len(outputs):
+                self.routines.append(Routine(*what, bounds, tuple(body.statements), entries, tuple(touched)))
+                body, touched = _Body(self, len(bounds)), {}
 
 
 def _pieces(root: Node) -> list[Node]:
@@ -197,15 +201,13 @@ class _Body:
         self.depth = depth
         self.count = 0
         self.loops = {f"#{k}": k for k in range(depth)}
+        self.statements: list[Statement] = []
+        self.values: dict[Node, Operand] = {}
 
-    def run(self, outputs: list[tuple[Reference | int, Node]]) -> tuple[Statement, ...]:
-        """Statements that compute and store the outputs in order."""
-        values: dict[Node, Operand] = {}
-        body: list[Statement] = []
-        for place, root in outputs:
-            body += self._compute(root, values)
-            body.append(Store(place, values[root]))
-        return tuple(body)
+    def store(self, place: Reference | int, root: Node) -> None:
+        """Compute and store one output."""
+        self.statements += self._compute(root, self.values)
+        self.statements.append(Store(place, self.values[root]))
 
     def _compute(self, root: Node, values: dict[Node, Operand]) -> list[Assign | Fold]:
         """Assignments for what is not known yet; values of reductions' bodies stay in their own scope."""
