@@ -24,6 +24,7 @@ class Notation:
 
 def number(value: float, notation: Notation) -> str:
     """A double that reads back as itself, in parentheses where negative."""
+    value = float(value)  # NumPy's own doubles print their type
     if math.isnan(value):
         return notation.nan
     if math.isinf(value):
