@@ -7,6 +7,7 @@ file and renames it.  Nothing of the user's text reaches a command line.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
 import shutil
@@ -32,11 +33,26 @@ class NoCompilerError(BuildError):
 
 
 def cache_folder() -> Path:
-    """The private folder of compiled models: SYSDYN_CACHE, or sysdyn in XDG_CACHE_HOME or ~/.cache."""
+    """The private folder of compiled models: SYSDYN_CACHE, or sysdyn in XDG_CACHE_HOME or ~/.cache.
+
+    Where it cannot be made, or others could put a library into it, a folder for this process takes its place.
+    """
     own = os.environ.get("SYSDYN_CACHE")
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path("~").expanduser() / ".cache")
     folder = Path(own) if own else Path(base) / "sysdyn"
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+    except OSError:
+        return _folder_of_process()
+    private = found.st_uid == os.getuid() and not found.st_mode & 0o022
+    return folder if private and os.access(folder, os.W_OK) else _folder_of_process()
+
+
+@cache
+def _folder_of_process() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="sysdyn-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 
 

@@ -146,3 +146,24 @@ def test_a_refused_text_says_what_the_compiler_said(tmp_path, monkeypatch):
         build_.build("this is no C")
     assert "error" in error.value.output
     assert not list(tmp_path.glob("*.so"))
+
+
+def test_a_folder_that_others_write_is_not_used(tmp_path, monkeypatch):
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o777)
+    monkeypatch.setenv("SYSDYN_CACHE", str(shared))
+    assert build_.cache_folder() != shared
+    monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("")
+    folder = build_.cache_folder()
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert build_.build("int sd_x;").parent == folder
+
+
+def test_many_processes_build_one_text(tmp_path):
+    run = "from sysdyn.compiler.build import build; import ctypes; ctypes.CDLL(str(build('int sd_x = 7;')))"
+    env = {**os.environ, "SYSDYN_CACHE": str(tmp_path / "cache")}
+    children = [subprocess.Popen([sys.executable, "-c", run], env=env) for _ in range(8)]
+    assert [child.wait() for child in children] == [0] * 8
+    assert len(list((tmp_path / "cache").iterdir())) == 1
