@@ -153,6 +153,8 @@ def states(model: Elaborator, report: Report) -> None:
         given.setdefault(dynamic.state.data[0], []).append(dynamic.place)
     for state in model.states:
         places = given.get(state.name, [])
+        if not places and state.name in model.given:
+            continue
         if not places:
             help_ = f"dynamic {state.name}' = ..."
             report.error("E507", f"state {state.name} has no dynamic", state.place, help=help_)
@@ -171,6 +173,42 @@ def accelerations(model: Elaborator, report: Report) -> None:
         if second:
             message = f"second derivative {second[0]} outside trace and expect"
             report.error("E518", message, place, help="accelerations are results, not data")
+
+
+def smoothness(model: Elaborator, report: Report) -> None:
+    """W301: a law with a corner or a jump where its flow vanishes; a content with a corner there is set-valued."""
+    for work in model.works:
+        _corner(work.effort, work.place, report)
+    for constraint in model.constraints:
+        if constraint.kind == "gamma":
+            _corner(constraint.expression, constraint.place, report)
+    for energy in model.energies:
+        if energy.function != "D":
+            continue
+        for flow in unknowns_of(energy.expression, "f"):
+            slope = ex.derivative(energy.expression, flow)
+            if _jumps(slope, flow):
+                message = f"content D with a corner at {flow} = 0 is set-valued friction: not supported yet"
+                report.note("N608", f"{message} (planned: events and inequalities)", energy.place)
+                break
+
+
+def _corner(node: Node, place: Place, report: Report) -> None:
+    if not any(n.op == "call" and n.data in ("abs", "sign") for n in ex.topological([node])):
+        return
+    for flow in unknowns_of(node, "f"):
+        if _jumps(node, flow) or _jumps(ex.derivative(node, flow), flow):
+            message = f"the law is not differentiable at {flow} = 0 and contains abs or sign"
+            report.warning("W301", message, place, help="tanh to smooth; set-valued friction is content D with abs")
+            return
+
+
+def _jumps(node: Node, at: Node) -> bool:
+    """Whether the value differs on the two sides of at = 0 (others at a sampled point)."""
+    leaves = [n for n in ex.topological([node]) if n.op in ("var", "param", "time", "index", "table")]
+    values = {n: 0.3 + ((k + 1) * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
+    sides = [ex.evaluate([node], lambda n, x=x: x if n is at else values.get(n, 0.5))[0] for x in (-1e-9, 1e-9, 1.0)]
+    return all(map(math.isfinite, sides)) and abs(sides[1] - sides[0]) > 1e-6 * (abs(sides[2]) + abs(sides[1]))
 
 
 def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
@@ -261,6 +299,6 @@ def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
 
 def run(model: Elaborator, report: Report, *, required: bool) -> None:
     """All rules; those with values only where every value is there."""
-    for rule in (energies, families, constraints, states, accelerations):
+    for rule in (energies, families, constraints, states, accelerations, smoothness):
         rule(model, report)
     parameters(model, report, required=required)

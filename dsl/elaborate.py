@@ -92,6 +92,7 @@ class Elaborator:
         self.requirements: list[tuple[Node, tuple[Loop, ...], Place, str]] = []
         self._body = list(_flatten(model.body, ()))
         self.inputs: dict[str, tuple[Unit, Place]] = {}
+        self.given: set[str] = set()  # states that have a dynamic, sound or not
 
     # -- frame ---------------------------------------------------------------------------------------------
 
@@ -117,8 +118,10 @@ class Elaborator:
             try:
                 with self._inside(loops):
                     do(statement)
-            except Failed:
-                continue
+            except Failed:  # reported; what it would have declared is not reported again where it is used
+                for decl in _declared(statement):
+                    if decl.name not in self.scope.symbols:
+                        self.scope.broken.add(decl.name)
 
     @contextmanager
     def _inside(self, loops: tuple[syntax.For, ...]) -> Iterator[None]:
@@ -171,7 +174,7 @@ class Elaborator:
         what = _LATER.get(type(statement))
         if what is None:
             return
-        decls = getattr(statement, "decls", None) or ((statement.decl,) if hasattr(statement, "decl") else ())
+        decls = _declared(statement)
         names = ", ".join(f"'{d.name}'" for d in decls)
         planned = _PLANNED.get(type(statement), _NETWORKS)
         message = " ".join(filter(None, (what, names, f"is not supported yet ({planned})")))
@@ -304,6 +307,7 @@ class Elaborator:
         if decl.indices:
             raise self.resolver.fail("N608", f"an array of inputs ('{decl.name}') is not supported yet", decl.span)
         self.inputs[decl.name] = (unit, place)
+        self.resolver.inputs.add(decl.name)
         if statement.value is None:
             self._enter(ParameterSymbol(decl.name, (), unit.dimension, False, place))
             self.parameters[decl.name] = Parameter(decl.name, (), unit, (), (), place)
@@ -524,19 +528,21 @@ class Elaborator:
 
     def _work(self, s: syntax.Work) -> None:
         effort, on = self.resolver.scalar(s.effort), self.resolver.scalar(s.on)
+        self._is_displacement(on.node, s.on)
         if effort.dimension is not None and on.dimension is not None:
             found = multiply(effort.dimension, on.dimension)
             if found != dim.ENERGY:
                 factor = dim.show(dim.quotient(dim.ENERGY, found))
                 message = f"work: effort*displacement is {dim.show(found)}, not J (factor: {factor})"
                 raise self.resolver.fail("E208", message, s.effort.span, help=self.resolver.missing(found, dim.ENERGY))
-        flows = [n for n in ex.variables(on.node) if n.op == "var" and n.data[1] not in ("q", "s")]
-        if flows:
-            message = f"work on an expression that contains the flow {flows[0]}"
-            if flows[0].data[1] != "f":
-                message = f"work on an expression that contains {flows[0]}, which is no displacement"
-            raise self.resolver.fail("E319", message, s.on.span, help="work is done on displacements: work E on q")
         self.works.append(Work(effort.node, on.node, self.resolver.loops, self.place(s.span)))
+
+    def _is_displacement(self, node: Node, where: syntax.Expr) -> None:
+        others = [n for n in ex.variables(node) if n.op == "var" and n.data[1] not in ("q", "s")]
+        if others:
+            what = f"the flow {others[0]}" if others[0].data[1] == "f" else f"{others[0]}, which is no displacement"
+            message = f"work on an expression that contains {what}"
+            raise self.resolver.fail("E319", message, where.span, help="work is done on displacements: work E on q")
 
     def _dynamic(self, s: syntax.Dynamic) -> None:
         target = s.target.base if isinstance(s.target, syntax.Prime) else s.target
@@ -655,6 +661,13 @@ def _flatten(body: Sequence[syntax.Statement], loops: tuple[syntax.For, ...]) ->
             yield from _flatten(statement.body, (*loops, statement))
         else:
             yield statement, loops
+
+
+def _declared(statement: syntax.Statement) -> tuple[syntax.Decl, ...]:
+    """The names that a statement declares."""
+    decls: tuple[syntax.Decl, ...] = getattr(statement, "decls", ())
+    own = getattr(statement, "decl", None)
+    return decls if own is None else (*decls, own)
 
 
 def _names_in(statement: syntax.Param) -> set[str]:

@@ -36,7 +36,7 @@ from sysdyn.dsl.symbols import (
     nearest,
 )
 from sysdyn.dsl.unit_reading import read_unit
-from sysdyn.dsl.units import NONE, Dimension, multiply, raised
+from sysdyn.dsl.units import NONE, Dimension, known, multiply, raised
 
 Value = Typed | Vector
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
@@ -60,6 +60,7 @@ class Failed(Exception):  # noqa: N818
     """The expression is wrong and has been reported."""
 
 
+
 class Resolver:
     """Resolves the expressions of one model; holds what has been learnt on the way."""
 
@@ -67,6 +68,7 @@ class Resolver:
         self.report = report
         self.uses: list[Use] = []
         self.whole: set[str] = set()  # parameters used as sizes or indices
+        self.inputs: set[str] = set()  # parameters that are inputs: no sizes
         self.constraints: dict[str, list[Constraint]] = {}
         self._values: dict[Definition, Value] = {}
         self._active: list[Definition] = []
@@ -75,6 +77,7 @@ class Resolver:
         self._names: dict[str, int] = {}
         self.scope = Scope()
         self.source = SourceText("", "")
+        self._unknown = ("E101", "unknown name '{}'")
         self.statics = False  # static quantities are in sight (expect static)
 
     # -- context -------------------------------------------------------------------------------------------
@@ -88,6 +91,15 @@ class Resolver:
             yield
         finally:
             self.scope, self.source = before
+
+    @contextmanager
+    def unknown_as(self, code: str, message: str) -> Iterator[None]:
+        """Report unknown names under another code (message: with {} for the name)."""
+        before, self._unknown = self._unknown, (code, message)
+        try:
+            yield
+        finally:
+            self._unknown = before
 
     @contextmanager
     def loop(self, name: str, first: Node, last: Node, unique: bool = False) -> Iterator[Loop]:
@@ -157,6 +169,8 @@ class Resolver:
         for node in ex.topological([value.node]):
             if node.op in ("var", "time", "table"):
                 raise self.fail("E807", f"{what} depends on '{node}', which is no constant", expression.span)
+            if node.op == "param" and node.data in self.inputs:
+                raise self.fail("E807", f"{what} depends on the input '{node.data}', which may vary", expression.span, help="a param")
             if node.op == "param":
                 self.whole.add(node.data)
             if node.op == "const" and node.data != node.data:
@@ -180,8 +194,22 @@ class Resolver:
             raise self.fail(
                 "E201", "degC is no unit of a quantity: its zero is not 0 K", e.span, help=f"celsius({e.text})"
             )
+        self._looks_like_division(e)
         value = e.value if unit.scale == 1 else float(Fraction(e.text) * unit.scale)
         return Typed(ex.const(value), unit.dimension)
+
+    def _looks_like_division(self, e: syntax.Quantity) -> None:
+        """W201: the last unit has the name and the dimension of a variable in sight."""
+        last = e.unit.factors[-1]
+        if len(e.unit.factors) < 2 or last.op != "/" or last.exponent != 1:
+            return
+        symbol = self.scope.find(last.name)
+        own = known(last.name)
+        if isinstance(symbol, ParameterSymbol) and not symbol.shape and own is not None and symbol.dimension == own[0]:
+            before = e.unit.text.rpartition("/")[0]
+            message = f"in '{e.text} {e.unit.text}' {last.name} is the unit; a variable {last.name} is in scope"
+            help_ = f"'{e.text} {before} / {last.name}' divides by it"
+            self.report.warning("W201", message, self.place(e.span), help=help_)
 
     def _bool(self, e: syntax.Bool) -> Value:
         return Typed(ex.compare("==", ex.const(float(e.value)), ex.const(1.0)), NONE, truth=True)
@@ -288,17 +316,17 @@ class Resolver:
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
 
     def _template(self, symbol: Definition) -> Value:
-        if symbol in self._values:
-            value = self._values[symbol]
-            if value is _BAD:
-                raise Failed
-            return value
         if symbol in self._active:
             chain = [s.name for s in self._active[self._active.index(symbol) :]] + [symbol.name]
             place = Place(symbol.source, symbol.span)
             help_ = "break it with a state or an implicit closed by a gamma"
             self.report.error("E105", f"circular definition: {' -> '.join(chain)}", place, help=help_)
             raise Failed
+        if symbol in self._values:
+            value = self._values[symbol]
+            if value is _BAD:
+                raise Failed
+            return value
         bound, loops = self._bound, self._loops
         self._bound = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         self._loops = []

@@ -212,7 +212,8 @@ class SceneReader:
             self.guarded(self._item, item)
 
     def _item(self, item: syntax.TraceItem) -> None:
-        value = self.resolver.resolve(item.expr)
+        with self.resolver.unknown_as("E905", "trace '{}' does not exist"):
+            value = self.resolver.resolve(item.expr)
         if isinstance(value, Vector):
             raise self.resolver.fail(
                 "E905", f"'{format_expression(item.expr)}' is an array: trace its elements", item.span
