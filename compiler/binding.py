@@ -30,6 +30,8 @@ from sysdyn.dsl.network import Network
 
 Overrides = Mapping[Override, Any]
 
+SCALAR = ("observe", "audit")  # blocks whose row families are scalars, whatever else has their names
+
 
 @dataclass(frozen=True, slots=True)
 class Start:
@@ -89,8 +91,8 @@ def bind(
     return Binding(
         p,
         np.asarray(ix, dtype=np.int32),
-        tuple(owners.get(f.owner, ()) for f in form.families),
-        tuple(owners.get(r.owner, ()) for r in form.rows),
+        tuple(() if f.kind == "audit" else owners[f.owner] for f in form.families),
+        tuple(() if r.block in SCALAR else owners[r.owner] for r in form.rows),
         starts,
         constants,
         dict(parameters.values),
@@ -203,10 +205,10 @@ def _layout(
     size = len(scalars)
     arrays = {q.name: np.ravel(parameters.values[q.name]) for q in network.parameters if q.shape}
     tables = {f"table {t.name}": numbers(t) for t in network.tables if t.name in program.tables}
-    for name, numbers_ in (*arrays.items(), *offsets.items(), *tables.items()):
+    for name, held in (*arrays.items(), *offsets.items(), *tables.items()):
         where[name] = size
-        parts.append(numbers_)
-        size += len(numbers_)
+        parts.append(held)
+        size += len(held)
     return np.concatenate(parts), where
 
 

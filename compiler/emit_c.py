@@ -199,13 +199,13 @@ def _block(name: str, part: str, program: Program) -> str:
         f"void sd_{name}_{part}(const sd_frame *frame, double t, const double *y, const double *yd, double *{out})\n{{"
     )
     lines = [head]
-    for position_, k in enumerate(numbers):
+    for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
         routine = program.routines[k]
         call = f"f{k}(frame->p, frame->ix, frame->at, frame->to, t, y, yd, {out})"
         if part != "rows":
             call = f"v = {call}" if routine.loops else f"(void){call}"
         lines.append(f"    {call};")
-        last = position_ + 1 == len(numbers) or program.routines[numbers[position_ + 1]].kernel != routine.kernel
+        last = later < 0 or program.routines[later].kernel != routine.kernel
         if part != "rows" and not routine.loops and last:
             lines.append(f"    v += {routine.entries};")
     if part != "rows":

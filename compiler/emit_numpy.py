@@ -109,8 +109,8 @@ def _loop(k: int) -> str:
 class _Writer:
     """One routine as a Python function."""
 
-    def __init__(self, number_: int, routine: Routine) -> None:
-        self.number = number_
+    def __init__(self, k: int, routine: Routine) -> None:
+        self.number = k
         self.routine = routine
         self.depth = len(routine.loops)
         self.open = 0  # reductions around the statement being written

@@ -202,8 +202,9 @@ def _initials(network: Network) -> Iterator[Target]:
 
 
 def _quantities(network: Network) -> Iterator[Quantity]:
-    """Traced quantities, then the sides of each expectation."""
-    for o in network.observations:
+    """Traced quantities, each name once, then the sides of each expectation."""
+    first = {o.name: o for o in reversed(network.observations)}
+    for o in (o for o in network.observations if first[o.name] is o):
         _, (expression,) = canonical((), flows(o.expression))
         yield Quantity(o.name, expression, True, o.unit.text, o.place)
     for k, e in enumerate(network.expectations):

@@ -1,6 +1,7 @@
 """Arrays stay arrays: one text for every length, the residual of an unrolled reference, large sizes at once."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -197,3 +198,20 @@ def test_momenta_cover_the_elements_that_have_a_mass(first, given, tmp_path):
             momentum = carrier.rows("momentum", t, y, yd)[rows["momentum"] :][:5]
             expected = np.where(heavy, 4 * p - f, p) if given else np.where(heavy, p - 4 * f, p)
             np.testing.assert_allclose(momentum, expected)
+
+
+def test_names_of_traces_are_their_own():
+    """A trace may bear the name of an array, or of an audit's member."""
+    with x.fresh():
+        net = chain(4)
+        named = [
+            replace(o, name=name) for o, name in zip(net.observations, ("x", "link", "kinetic", "y"), strict=False)
+        ]
+        model = compile_network(replace(net, observations=tuple(named)))
+        binding = model.bind()
+        shapes = {r.label: s for r, s in zip(model.form.rows, binding.row_shapes, strict=True) if r.block == "observe"}
+        assert shapes["x"] == shapes["link"] == ()
+        oracle = Oracle(model.form, binding)
+        t, y, yd = point(oracle)
+        seen = [oracle.rows("observe", t, y, yd)[oracle.to[k]] for k, r in enumerate(model.form.rows) if r.label == "x"]
+        assert y[3] in seen
