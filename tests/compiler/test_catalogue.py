@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from carriers import CCarrier, NumpyCarrier
-from catalogue import BLOCKS, load, network, state
+from catalogue import BLOCKS, convert, load, network, state
 from sysdyn.compiler.descriptor import BLOCKS as ALL_BLOCKS
 from sysdyn.compiler.descriptor import WITHOUT_ENTRIES
 from sysdyn.compiler.oracle import Oracle
@@ -162,3 +162,36 @@ def test_entries_are_the_rows_derivatives(case):
             slope = (8 * along(1e-4) - along(2e-4)) / 12e-4
             size = np.max(np.abs(oracle.magnitudes(block, t, y, yd)), initial=1.0)
             np.testing.assert_allclose(jacobian @ direction, slope, rtol=1e-7, atol=1e-9 * size)
+
+
+WITH_STATES = [p for p in cases() if CATALOGUE[p.values[0][0]]["models"][p.values[0][1]]["s"]]
+
+
+@pytest.mark.parametrize("which", [p for p in WITH_STATES if p.values[0][3] == "T*"])
+def test_rates_of_states_are_those_of_the_reduced_system(which):
+    """s' by lambda against d/dt of the state's map under the independent reduced equations."""
+    key, k, name, _, form = which
+    entry = CATALOGUE[key]
+    reduced, model = entry["reduced"], entry["models"][k]
+    held = load("references.json")
+    states = held.get("systems", held)[key]["state_values"]
+    with x.fresh():
+        compiled = compile_network(network(entry, model), form, integrating=False)
+        oracle = Oracle(compiled.form, compiled.bind())
+        values = VALUES[name]
+        names = {"t": x.time()} | {n: x.param(n) for n in entry["parameters"]}
+        names |= {n: x.var(n, "s") for n in reduced["rhs"]}
+        for n, text in reduced["aux"].items():
+            names[n] = convert(text, names)
+        rates = {names[n]: convert(text, names) for n, text in reduced["rhs"].items()} | {x.time(): x.const(1)}
+        for j, t in enumerate(values["t"]):
+            _, y, yd = known_rates(oracle, values, j)
+            at = {names[n]: float(v[j]) for n, v in states.items()} | {x.time(): t}
+            at |= {x.param(n): float(v) for n, v in entry["parameters"].items()}
+            for s, text in zip(model["s"], model["s_map"], strict=True):
+                map_ = convert(text, names)
+                moving = {n: rates[n] for n in sorted(x.variables(map_), key=lambda n: n.number)}
+                (expected,) = x.evaluate([x.differential(map_, moving)], at.__getitem__)
+                family = next(i for i, f in enumerate(compiled.form.families) if (f.owner, f.kind) == (s, "s"))
+                scale = oracle.magnitudes("lambda", t, y, yd).max()
+                assert yd[oracle.at[family]] == pytest.approx(expected, rel=1e-10, abs=1e-12 * scale)
