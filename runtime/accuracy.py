@@ -23,7 +23,7 @@ POWER = 0.8
 CREDIT = 0.5
 """Largest power with which the finer run's error is believed to be smaller: BDF's error falls irregularly where its
 order changes (measured on the harmonic oscillator: locally 0.3)."""
-SAFETY = 1.5
+SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
 RATIO = 0.1
 """Of the tolerances of the first two runs."""

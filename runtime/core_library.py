@@ -219,6 +219,7 @@ class Run(c.Structure):
         ("instants", _I),
         ("every_step", _I),
         ("sample_steps", _I),
+        ("start_rate", _P),
         ("row", _P),
         ("room", _I),
         ("rows", _I),

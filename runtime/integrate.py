@@ -104,6 +104,7 @@ class Integration:
         self.cpu = 0.0
         self.y, self.yd = start.for_form(system)
         jy, jyd = system.jacobian(start.t, self.y, self.yd)
+        self._start_rate = self.yd
         # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, jyd, request.index)
@@ -183,6 +184,7 @@ class Integration:
             np.full(self._instants.size, TRACE) if kinds is None else kinds, dtype=np.int32
         )
         run.instant_kind = lib.pointer(self._kinds)
+        run.start_rate = lib.pointer(self._start_rate)
         run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps = int(request.sample_steps)

@@ -1,8 +1,8 @@
 """Magnitudes of the unknowns: what relative tolerances and scaled matrices refer to.
 
-A magnitude is the nominal value of the manifest where it names one.  Else the larger of |y| at the start and a
-thousandth of the largest |y| among unknowns of the same kind and unit; where all of these are zero, |y'| times the
-time scale of the start (never the span alone: a long run would call everything small).
+A magnitude is the nominal value of the manifest where it names one.  Else the largest of |y| at the start, |y'| times
+the time scale of the start (never the span alone: a long run would call everything small), and a thousandth of these
+among unknowns of the same kind and unit.
 Unknowns that are zero with all of that take the magnitude that balances the rows they stand in: the other terms
 of the row, and how far the row itself moves with t over the span (sources that start at zero).
 While a run tracks magnitudes they grow with max |y|; a second run starts with the maxima of the first.
@@ -39,14 +39,22 @@ def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: floa
     """Shortest of: a hundredth of the span, y / y', sqrt(q / f'), the time scale of what moves with t (s)."""
     found = min(SPAN * span, excited)
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
-    size, rate = group_maximum(system, np.abs(y))[state], np.abs(yd)[state]
-    found = min(
-        found, float((size[(size > 0) & (rate > 0)] / rate[(size > 0) & (rate > 0)]).min(initial=np.inf))
-    )
+    form, size, rate = system.form, group_maximum(system, np.abs(y)), np.abs(yd)
+    # values that are nothing beside what their rate makes of them are round-off
+    real = state & (size > 1e-9 * rate * span) & (rate > 0.0)
+    found = min(found, float((size[real] / rate[real]).min(initial=np.inf)))
+    both = (size[form.k_q] > 0.0) & (rate[form.k_f] > 0.0)
+    return min(found, float(np.sqrt(size[form.k_q][both] / rate[form.k_f][both]).min(initial=np.inf)))
+
+
+def _flows(system: System, found: Floats, span: float) -> Floats:
+    """Flows at rest, and not accelerated but by round-off: a small part of what would move their q in the span."""
     form = system.form
-    size, rate = group_maximum(system, np.abs(y))[form.k_q], np.abs(yd)[form.k_f]
-    both = (size > 0) & (rate > 0)
-    return min(found, float(np.sqrt(size[both] / rate[both]).min(initial=np.inf)))
+    least = 0.1 * found[form.k_q] / span
+    result = found.copy()
+    quiet = found[form.k_f] < NOISE * least
+    result[form.k_f[quiet]] = GROUP * least[quiet]
+    return result
 
 
 def propagate(
@@ -93,18 +101,20 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
     excited, quick = excitation(system, t0, t0 + span, y, yd)
     tau = time_scale(system, span, y, yd, quick)
-    known = np.maximum(np.abs(y), GROUP * group_maximum(system, np.abs(y)))
-    growing = np.where(state, tau * np.abs(yd), 0.0)
-    growing = np.maximum(growing, GROUP * group_maximum(system, growing))
-    known = np.where(known > 0.0, known, growing)
+    known = np.maximum(np.abs(y), np.where(state, tau * np.abs(yd), 0.0))
+    known = np.maximum(known, GROUP * group_maximum(system, known))
     found = np.where(system.nominal > 0.0, system.nominal, known)
+    found = _flows(system, found, span)
     jy, jyd = system.jacobian(t0, y, yd)
     size = np.abs(jy) + np.abs(jyd) / tau
     size = np.where(np.isfinite(size), size, 0.0)
     pattern = system.pattern
-    # what follows from the state is balanced against it, so that round-off of a start does not pass for a magnitude
-    balanced = propagate(np.where(state, found, 0.0), pattern.row, pattern.columns_of(), size, excited)
-    found = np.where(found > NOISE * balanced, found, balanced)
+    # momenta are balanced against flows, what follows from the state against all of it: so round-off of a start does
+    # not pass for a magnitude
+    for kinds in (("q", "f", "s"), ("q", "f", "p", "s")):
+        kept = np.where(np.isin(system.kinds, kinds), found, 0.0)
+        balanced = propagate(kept, pattern.row, pattern.columns_of(), size, excited)
+        found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, group_maximum(system, found), found)
     tiny = np.finfo(np.float64).tiny * 1e30
     return np.where(found > tiny, found, 1.0), tau

@@ -9,6 +9,7 @@
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
 #define SLOW 0.9            /* contraction above which Newton gives up */
+#define STAGNANT 0.1        /* of the tolerance: corrections this small that do not shrink are round-off */
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
 
@@ -189,7 +190,7 @@ static int iterate(sd_bdf *bdf, double t)
         } else {
             double rate = pow(size / first, 1.0 / m);
             if (rate > SLOW)
-                return SD_NEWTON;
+                return size <= STAGNANT ? SD_FINE : SD_NEWTON;
             bdf->contraction = rate / (1.0 - rate);
             if (rate > SLUGGISH)
                 bdf->jacobian_age = OLD_JACOBIAN;

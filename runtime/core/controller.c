@@ -1,6 +1,7 @@
 /* Local error, order and step size of the BDF (Brenan, Campbell & Petzold, section 5.2.3 f.; see bdf.h). */
 #include "bdf.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -109,9 +110,13 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
             bdf->phi[j][i] += bdf->phi[j + 1][i];
 }
 
-/* A first step: a thousandth of the span, or such that y changes by half its tolerance over it. */
+/* A first step: a thousandth of the span, or such that the local error h^2 y''/2 is within tolerance, with y'' guessed
+ * as y'^2 / y: h = sqrt(rtol) y / y' (the error test cuts it where that was too bold). */
 double sd_bdf_first_step(const sd_bdf *bdf, const double *yd, double span)
 {
-    double h = 1e-3 * span, change = sd_bdf_norm(bdf, yd, NULL, NULL);
-    return isfinite(change) && change > 0.5 / h ? 0.5 / change : h;
+    double change = sqrt(bdf->rtol > 0.0 ? bdf->rtol : 1e-6) * sd_bdf_norm(bdf, yd, NULL, NULL);
+    double h = 1e-3 * span, least = 1e3 * DBL_EPSILON * fmax(fabs(bdf->t), span);
+    if (isfinite(change) && change * h > 0.5)
+        h = 0.5 / change;
+    return fmax(h, fmin(least, span));
 }

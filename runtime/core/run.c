@@ -77,7 +77,7 @@ static void emit(sd_run *run, double t, double kind, int at_step)
     double out[4], end[4] = {0.0, 0.0, 0.0, 0.0}, dissipated = 0.0, supplied = 0.0;
     if (!run->started) {
         memcpy(run->point, run->bdf->y, (size_t)run->bdf->n * sizeof(double));
-        memcpy(run->point_d, run->bdf->yd, (size_t)run->bdf->n * sizeof(double));
+        memcpy(run->point_d, run->start_rate, (size_t)run->bdf->n * sizeof(double));
     } else {
         if (!at_step)
             integrate(run, t, &dissipated, &supplied, end);

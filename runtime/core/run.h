@@ -28,6 +28,7 @@ typedef struct sd_run {
     const double *instant;            /* [instants] ascending, within the span */
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
+    const double *start_rate;         /* [unknowns] yd at the start, also of what the stepper does not differentiate */
     double *row;                      /* [room][SD_ROW_HEAD + 2 observed] */
     int32_t room;
     /* progress */

@@ -10,6 +10,7 @@
 #define ITERATIONS 6
 #define EXACT 4e-15     /* scaled residual that counts as round-off */
 #define CLOSE 1e-9      /* scaled residual with which one may live */
+#define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
@@ -114,13 +115,18 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
     return 0;
 }
 
-/* one Gauss-Newton step of x = (y, chosen yd) */
-static void move(sd_settle *settle, double *y, double *yd)
+/* One Gauss-Newton step of x = (y, chosen yd); the largest move, in magnitudes.  The state is drawn to where it came
+ * from, what follows from it only held where it is: so in the end it exerts no pull. */
+static double move(sd_settle *settle, double *y, double *yd)
 {
     int32_t n = settle->unknowns, moves = n + settle->rates;
+    double largest = 0.0;
     for (int32_t j = 0; j < moves; j++) {
         double now = j < n ? y[j] : yd[settle->rate[j - n]];
-        settle->step[j] = -settle->weight[j] * (now - settle->x0[j]) / settle->scale[j];
+        if (settle->weight[j] < 1.0)
+            settle->step[j] = 0.0;
+        else
+            settle->step[j] = -settle->weight[j] * (now - settle->x0[j]) / settle->scale[j];
     }
     for (int32_t i = 0; i < settle->rows; i++)
         settle->step[moves + i] = -settle->r[i] * settle->row_scale[i];
@@ -129,6 +135,9 @@ static void move(sd_settle *settle, double *y, double *yd)
         y[j] += settle->step[j] * settle->scale[j];
     for (int32_t k = 0; k < settle->rates; k++)
         yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
+    for (int32_t j = 0; j < moves; j++)
+        largest = fmax(largest, fabs(settle->step[j]));
+    return largest;
 }
 
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
@@ -139,18 +148,18 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
     for (int32_t k = 0; k < settle->rates; k++)
         settle->x0[n + k] = yd[settle->rate[k]];
     int failed = !settle->ready && factorise(settle, t, y, yd);
-    double before = failed ? INFINITY : measure(settle, t, y, yd), best = before;
+    double moved = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd), best = before;
     memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
-    for (int m = 0; m < ITERATIONS && !failed && !(before <= EXACT) && !*settle->system->stop; m++) {
-        move(settle, y, yd);
+    for (int m = 0; m < ITERATIONS && !failed && !(before <= EXACT && moved < SMALL) && !*settle->system->stop; m++) {
+        moved = move(settle, y, yd);
         double now = measure(settle, t, y, yd);
-        if (now < best) {
+        if (now < best || now <= EXACT) {
             best = now;
             memcpy(settle->x, y, (size_t)n * sizeof *y);
             for (int32_t k = 0; k < settle->rates; k++)
                 settle->x[n + k] = yd[settle->rate[k]];
         }
-        if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < CLOSE))
+        if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < CLOSE && moved < SMALL))
             break;
         if (now > CONTRACTS * before && now > EXACT)
             failed = factorise(settle, t, y, yd);

@@ -197,7 +197,7 @@ def test_scaled_models_behave_alike():
         )
         _, columns, finished = run(made, 10.0, rtol=1e-6)
         counters.append(finished.statistics.steps)
-        assert columns["x"][-1] / scale == pytest.approx(0.660513656270509, rel=1e-4)
+        assert columns["x"][-1] / scale == pytest.approx(0.660513656270509, rel=5e-4)
     assert counters[0] == counters[1] == counters[2]
 
 
