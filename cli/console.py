@@ -83,8 +83,8 @@ def with_console(name: str) -> Callable[[F], Callable[..., Any]]:
             return code
 
         command.__doc__ = function.__doc__
-        for parameter in reversed(getattr(function, "__click_params__", [])):
-            command.__dict__.setdefault("__click_params__", []).append(parameter)
+        # click lists decorators from the inside out: the function's own options stand before these three
+        command.__dict__["__click_params__"] += getattr(function, "__click_params__", [])
         return click.command(name)(command)
 
     return decorate

@@ -85,8 +85,10 @@ def _compiled(network: Network, formulation: str, backend: str, report: Report) 
         compiled = compile_network(network, formulation, "c")
         try:
             return compiled, carrier.load(compiled.library()), "c"
-        except build.NoCompiler as error:
-            report.note("N602", f"{error}: the NumPy backend takes over", network.place, help="--backend numpy")
+        except build.BuildError as error:  # none there, or one that cannot build (no headers, no room)
+            first = error.output.strip().splitlines()[:1]
+            said = ": ".join([str(error), *first])
+            report.note("N602", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
     compiled = compile_network(network, formulation, "numpy")
     return compiled, carrier.load(module_of(compiled.text)), "numpy"
 

@@ -1,0 +1,152 @@
+"""Every model of the repository: clean, in the canonical layout, and its scenes run and keep their promises."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from reduced import ROOT
+
+from sysdyn.cli.main import run
+from sysdyn.runtime.trace import Trace
+
+MODELS = ROOT / "models"
+FILES = sorted(path.relative_to(MODELS).with_suffix("").as_posix() for path in MODELS.glob("*/*.sd"))
+REDUCED = tomllib.loads((MODELS / "ci.toml").read_text())
+
+
+def settings(name):
+    """The reduced size at which a model runs in CI, as options."""
+    folder, file = name.split("/")
+    values = REDUCED.get(folder, {}).get(file, {})
+    return [option for key, value in values.items() for option in ("--set", f"{key}={value}")]
+
+
+def result(capsys):
+    """The JSON object that the command has printed."""
+    return json.loads(capsys.readouterr().out)
+
+
+def test_reduced_sizes_are_of_models_that_exist():
+    assert {f"{folder}/{file}" for folder, files in REDUCED.items() for file in files} <= set(FILES)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_check_is_clean(name, capsys):
+    code = run(["check", "--json", "--strict", str(MODELS / f"{name}.sd")])
+    found = result(capsys)
+    assert [d for d in found["diagnostics"] if d["severity"] != "note"] == []
+    assert code == 0
+    assert all(target["ok"] for file in found["result"]["files"] for target in file["targets"])
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_layout_is_canonical(name, capsys):
+    assert run(["fmt", "--check", str(MODELS / f"{name}.sd")]) == 0, capsys.readouterr().err
+
+
+def scenes(name):
+    """Names of the scenes of a file."""
+    lines = (MODELS / f"{name}.sd").read_text().splitlines()
+    return [line.split()[1] for line in lines if line.startswith("scene ")]
+
+
+@pytest.mark.parametrize(
+    ("name", "scene"), [(name, scene) for name in FILES if not name.startswith("seed/") for scene in scenes(name)]
+)
+def test_scenes_run_and_hold_what_they_expect(name, scene, tmp_path, capsys):
+    output = tmp_path / "trace.h5"
+    options = ["--scene", scene, "--json", "-o", str(output), *settings(name), "--max-wall", "120"]
+    code = run(["simulate", str(MODELS / f"{name}.sd"), *options])
+    found = result(capsys)
+    assert code == 0, found
+    assert found["result"]["final"] is True
+    assert found["result"]["warnings"] == []
+    assert all(claim["ok"] for claim in found["result"]["expects"])
+    trace = Trace.open(output)
+    assert trace.names
+    assert all(np.all(np.isfinite(trace[n].values)) for n in trace.names)
+
+
+def traced(tmp_path, name, scene, *options):
+    """The trace of a scene."""
+    output = tmp_path / f"{scene}.h5"
+    assert run(["simulate", "-q", str(MODELS / f"{name}.sd"), "--scene", scene, "-o", str(output), *options]) == 0
+    return Trace.open(output)
+
+
+def test_both_coordinate_choices_of_the_arm_give_one_motion(tmp_path):
+    angles = traced(tmp_path, "gallery/two_link_arm", "angles")
+    cartesian = traced(tmp_path, "gallery/two_link_arm", "cartesian")
+    for name in ("x2", "y2"):
+        assert np.max(np.abs(angles[name].values - cartesian[name].values)) < 1e-5
+
+
+def test_pendulum_swings_with_its_period(tmp_path):
+    from scipy.special import ellipk
+
+    trace = traced(tmp_path, "gallery/pendulum", "swing", "--accuracy", "1e-7")
+    x, rate = trace["x"].values, trace["x"].derivative
+    # x is greatest where its rate falls through zero: at one period, and nowhere before
+    falls = np.flatnonzero((rate[1:-1] > 0.0) & (rate[2:] <= 0.0)) + 1
+    k = falls[0]
+    found = trace.time[k] + rate[k] / (rate[k] - rate[k + 1]) * (trace.time[k + 1] - trace.time[k])
+    swing = np.arcsin(1.0 / 2.34)
+    assert found == pytest.approx(4.0 * np.sqrt(2.34 / 9.80665) * ellipk(np.sin(swing / 2.0) ** 2), rel=1e-5)
+    # at rest the rod carries the weight's component along it; the multiplier is the tension
+    assert trace["tension"].values[0] == pytest.approx(1.13 * 9.80665 * np.cos(swing), rel=1e-6)
+    assert x[0] == 1.0
+
+
+def test_friction_acts_against_the_motion(tmp_path):
+    trace = traced(tmp_path, "gallery/friction_book", "brakes")
+    np.testing.assert_allclose(trace["ex"].values, -0.2 * 9.80665 * 2.0 / np.sqrt(5.0), rtol=1e-6)
+    np.testing.assert_allclose(trace["y"].values, 0.5 * trace["x"].values, atol=1e-9)
+
+
+PUBLISHED = [
+    0.1581077119629904e2,
+    -0.1575637105984298e2,
+    0.4082224013073101e-1,
+    -0.5347301163226948,
+    0.5244099658805304,
+    0.5347301163226948,
+    0.1048080741042263e1,
+]
+"""Test Set for IVP Solvers, II-8: end values at 0.03 s, tolerance 1e-14."""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_andrews_meets_the_published_end_values(tmp_path, formulation):
+    options = ("--accuracy", "1e-8", "--formulation", formulation, "--max-wall", "120")
+    trace = traced(tmp_path, "benchmark/andrews", "reference", *options)
+    for k, value in enumerate(PUBLISHED):
+        assert trace[f"y{k}"].values[-1] == pytest.approx(value, rel=1e-6, abs=1e-9)
+
+
+def chain_text(tmp_path, n):
+    """The C text of the chain with n links."""
+    folder = tmp_path / str(n)
+    file = str(MODELS / "gallery/chain_1000.sd")
+    assert run(["compile", "-q", file, "--set", f"n={n}", "-o", str(folder)]) == 0
+    return (folder / "residual.c").read_text()
+
+
+def test_chain_has_one_c_text_for_every_length(tmp_path):
+    assert chain_text(tmp_path, 10) == chain_text(tmp_path, 1000)
+
+
+def test_chain_of_1000_links_takes_100_steps(tmp_path, capsys):
+    output = tmp_path / "chain.h5"
+    file = str(MODELS / "gallery/chain_1000.sd")
+    assert run(["simulate", file, "--max-steps", "100", "-o", str(output), "--max-wall", "120"]) == 3
+    said = capsys.readouterr().err
+    assert "in 100 steps" in said
+    assert "energy balance" in said
+    trace = Trace.open(output)
+    assert not trace.final
+    assert trace.statistics["steps"] == 100
+    # 2 kg fall for 53 ms: about 0.3 J are exchanged
+    assert trace.time[-1] > 0.02
+    assert np.max(np.abs(trace["audit.energy"].values)) < 1e-3
+    assert np.max(trace["audit.constraints"].values) < 1e-9

@@ -1,0 +1,139 @@
+"""The book's systems against the seed's reference values, as they stand and with everything changed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from changed import CHANGED, STIFF
+from reduced import ROOT, load, solution
+
+from sysdyn.cli.running import Request, run
+from sysdyn.dsl.diagnostics import Report
+from sysdyn.runtime.trace import Trace
+
+ALLOWED = 1e-5
+"""Of each variable's largest magnitude, at an accuracy of 1e-6."""
+SEED = ROOT / "models" / "seed"
+MODELS = sorted(path.stem for path in SEED.glob("*.sd"))
+REFERENCES = load("references.json")
+CATALOGUE = load("catalogue.json")
+
+
+def formulations(model):
+    """What the catalogue says the model can be written in, of what is built so far."""
+    found = {m["form"] for m in CATALOGUE[model]["models"]} & {"lagrangian", "hamiltonian"}
+    assert found
+    return sorted(found)
+
+
+CASES = [(model, formulation) for model in MODELS for formulation in formulations(model)]
+
+
+def simulated(tmp_path, model, *, formulation, backend, times, settings=()):
+    """Traced values at the instants asked for."""
+    report = Report()
+    request = Request(
+        str(SEED / f"{model}.sd"),
+        scene="reference",
+        formulation=formulation,
+        backend=backend,
+        accuracy=1e-6,
+        at=",".join(map(repr, times)),
+        settings=tuple((name, repr(value)) for name, value in settings),
+        output=str(tmp_path / "trace.h5"),
+        max_wall="60",
+    )
+    ran = run(request, report)
+    assert ran is not None, [f"{d.code} {d.message}" for d in report]
+    assert ran.exit == 0
+    assert ran.prepared.formulation == formulation
+    assert ran.prepared.backend == backend
+    assert not ran.outcome.warnings
+    trace = Trace.open(tmp_path / "trace.h5")
+    places = [int(np.argmin(np.abs(trace.time - t))) for t in times]
+    np.testing.assert_allclose(trace.time[places], times, rtol=1e-14)
+    return {name: trace[name].values[places] for name in trace.names}
+
+
+def errors(found, wanted):
+    """Largest error of each variable, relative to its largest magnitude."""
+    result = {}
+    for name, values in wanted.items():
+        expected = np.asarray(values, dtype=float)
+        size = np.max(np.abs(expected))
+        result[name] = float(np.max(np.abs(found[name] - expected)) / (size if size > 0.0 else 1.0))
+    return result
+
+
+def test_every_model_of_the_issue_is_there():
+    assert set(MODELS) == set(CHANGED)
+    assert all(len(sets) >= 3 for sets in CHANGED.values())
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.parametrize(("model", "formulation"), CASES)
+def test_reference_values(tmp_path, model, formulation, backend):
+    reference = REFERENCES[model]
+    found = simulated(tmp_path, model, formulation=formulation, backend=backend, times=reference["t"])
+    assert set(found) == set(reference["variables"])
+    worst = errors(found, reference["values"])
+    assert max(worst.values()) <= ALLOWED, worst
+
+
+@pytest.mark.parametrize(("model", "formulation"), CASES)
+@pytest.mark.parametrize("case", range(3))
+def test_changed_values(tmp_path, model, formulation, case):
+    reference = REFERENCES[model]
+    settings = CHANGED[model][case]
+    known = set(reference["parameters"]) | {f"{name}_0" for name in reference["initial"]}
+    assert set(settings) <= known
+    times = sorted({*reference["t"], *(0.5 * (a + b) for a, b in zip(reference["t"], reference["t"][1:], strict=False))})
+    wanted = witness(model, case, tuple(times))
+    found = simulated(
+        tmp_path, model, formulation=formulation, backend="c", times=times, settings=tuple(settings.items())
+    )
+    worst = errors(found, {name: wanted[name] for name in found})
+    assert max(worst.values()) <= ALLOWED, worst
+
+
+_WITNESSES = {}
+
+
+def witness(model, case, times):
+    """The reduced ODE's solution; both formulations are compared with one."""
+    if (model, case) not in _WITNESSES:
+        reference, settings = REFERENCES[model], CHANGED[model][case]
+        parameters = {name: settings.get(name, value) for name, value in reference["parameters"].items()}
+        initial = {name: settings.get(f"{name}_0", value) for name, value in reference["initial"].items()}
+        method, rtol = STIFF.get(model, ("DOP853", 1e-12))
+        _WITNESSES[model, case] = solution(reference["reduced_ode"], parameters, initial, times, method, rtol)
+    return _WITNESSES[model, case]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_witness_meets_the_reference_values(model):
+    reference = REFERENCES[model]
+    method, rtol = STIFF.get(model, ("DOP853", 1e-12))
+    ode = reference["reduced_ode"]
+    found = solution(ode, reference["parameters"], reference["initial"], reference["t"], method, rtol)
+    worst = errors(found, reference["values"])
+    assert max(worst.values()) <= 1e-8, worst
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_parameters_have_the_books_names_and_values(model):
+    from sysdyn.api import compile_model
+
+    values = {p["name"]: p["value"] for p in compile_model(SEED / f"{model}.sd", backend="numpy").manifest["parameters"]}
+    reference = REFERENCES[model]
+    for name, value in reference["parameters"].items():
+        if name in ("q20", "q30", "q10"):  # a constant of integration: by default what the initial values make it
+            assert name in values
+            continue
+        assert values[name] == pytest.approx(value, rel=1e-14), name
+    for name, value in reference["initial"].items():
+        assert values[f"{name}_0"] == pytest.approx(value, rel=1e-14), name
+
+
+def test_the_folder_holds_nothing_else():
+    assert {path.suffix for path in Path(SEED).iterdir() if path.is_file()} <= {".sd", ".py"}
