@@ -74,9 +74,10 @@ def propagate(
         row = excited.copy()
         np.maximum.at(row, rows, size * found[columns])
         wanted = missing[columns] & (row[rows] > 0.0)
-        smallest = np.full(found.size, np.inf)
-        np.minimum.at(smallest, columns[wanted], row[rows[wanted]] / size[wanted])
-        found = np.where(missing & np.isfinite(smallest), smallest, found)
+        # the largest of what the rows propose: small proposals come of coefficients and terms that are round-off
+        largest = np.zeros(found.size)
+        np.maximum.at(largest, columns[wanted], row[rows[wanted]] / size[wanted])
+        found = np.where(missing & np.isfinite(largest), largest, found)
     return found
 
 
