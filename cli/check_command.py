@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import click
-
 from sysdyn.cli import targets
 from sysdyn.cli.console import Console, with_console
 from sysdyn.dsl import expression as ex

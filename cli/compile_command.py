@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import click
-
 from sysdyn.cli import targets
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.options import chosen
@@ -14,8 +13,7 @@ from sysdyn.cli.prepare import Prepared, prepare
 from sysdyn.cli.starting import start
 from sysdyn.compiler import descriptor, energies, program_text
 from sysdyn.dsl import expression as ex
-from sysdyn.dsl import load
-from sysdyn.dsl import network_text
+from sysdyn.dsl import load, network_text
 
 
 @with_console("compile")

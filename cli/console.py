@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 import click
-
 from sysdyn.cli.failures import envelope
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Report
 
@@ -71,7 +70,9 @@ def with_console(name: str) -> Callable[[F], Callable[..., Any]]:
     def decorate(function: F) -> Callable[..., Any]:
         @click.option("--json", "as_json", is_flag=True, help="Print one JSON object (version 1).")
         @click.option("-q", "--quiet", is_flag=True, help="Errors only.")
-        @click.option("--color", type=click.Choice(["auto", "always", "never"]), default="auto", help="Coloured messages.")
+        @click.option(
+            "--color", type=click.Choice(["auto", "always", "never"]), default="auto", help="Coloured messages."
+        )
         def command(as_json: bool, quiet: bool, color: str, **options: Any) -> int:
             console = Console(name, as_json=as_json, quiet=quiet, color=color)
             try:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
 from sysdyn.cli.prepare import Prepared
 from sysdyn.cli.starting import holds
 from sysdyn.dsl.diagnostics import Report
@@ -26,9 +25,7 @@ class Claim:
 
 def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: bool) -> tuple[Claim, ...]:
     """All expectations of the scene; those that fail are reported as E909."""
-    claims = [
-        _claim(prepared, outcome, k, e, report, finished) for k, e in enumerate(prepared.network.expectations)
-    ]
+    claims = [_claim(prepared, outcome, k, e, report, finished) for k, e in enumerate(prepared.network.expectations)]
     for golden in prepared.network.goldens:
         path = Path(golden.place.file).parent / golden.file
         if not path.is_file():
@@ -41,9 +38,7 @@ def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: boo
     return tuple(claims)
 
 
-def _claim(
-    prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report: Report, finished: bool
-) -> Claim:
+def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report: Report, finished: bool) -> Claim:
     text = e.text.removeprefix("expect ")
     time, left, right, within = _sides(prepared, outcome, k, e)
     if e.moment == "finally":
@@ -93,5 +88,6 @@ def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, 
     size = max(abs(a), abs(b))
     if estimate and size > 0.0 and off - w < estimate * size:
         wanted = max((off - w) / size / 10.0, 1e-13)
-        help_ = f"this is less than the estimated error of the run ({estimate:.1g}): --accuracy {wanted:.0e} would decide it"
+        less = f"this is less than the estimated error of the run ({estimate:.1g})"
+        help_ = f"{less}: --accuracy {wanted:.0e} would decide it"
     report.error("E909", message, e.place, help=help_)

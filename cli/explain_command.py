@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 
 import click
-
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 from sysdyn.dsl import codes

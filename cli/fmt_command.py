@@ -9,7 +9,6 @@ import tempfile
 from pathlib import Path
 
 import click
-
 from sysdyn.cli.console import Console, with_console
 from sysdyn.dsl.decoding import decode
 from sysdyn.dsl.diagnostics import SourceText

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.runtime.trace import Trace
 
 Floats = NDArray[np.float64]
@@ -198,7 +197,7 @@ def unit_text(unit: str) -> str:
         return ""
     found = []
     for before, character in zip(" " + unit, unit, strict=False):
-        raised = character in "0123456789-" and before not in " .(/*" or (character.isdigit() and before == "-")
+        raised = (character in "0123456789-" and before not in " .(/*") or (character.isdigit() and before == "-")
         found.append(character.translate(_RAISED) if raised else "·" if character == "." else character)
     return "".join(c for c in found if c != "^")
 

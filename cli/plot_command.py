@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 
@@ -72,6 +71,7 @@ def _open(file: str) -> Trace:
     from sysdyn.runtime.trace import Trace
 
     if file != "-":
+        Path(file).open("rb").close()  # a plainer message than HDF5's where there is none
         return Trace.open(file)
     with tempfile.NamedTemporaryFile(suffix=".h5") as copy:
         copy.write(sys.stdin.buffer.read())

@@ -53,9 +53,7 @@ class Prepared:
         }
 
 
-def prepare(
-    network: Network, report: Report, *, formulation: str | None = None, backend: str = "c"
-) -> Prepared | None:
+def prepare(network: Network, report: Report, *, formulation: str | None = None, backend: str = "c") -> Prepared | None:
     """Compile and bind a network; None where the report says why not.
 
     formulation None: the scene's, else auto.  A missing C compiler is reported as a note and NumPy takes over.

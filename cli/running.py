@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-import numpy as np
 
+import numpy as np
 from sysdyn.cli import targets
 from sysdyn.cli.expectations import Claim, judge
 from sysdyn.cli.failures import UsageError
@@ -242,7 +242,8 @@ _CAUSES = {
 
 def _failure(prepared: Prepared, error: SolverFailure) -> str:
     """The sentence of exit code 3: time, element, source line."""
-    text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {_CAUSES.get(error.cause, error.cause)}"
+    cause = _CAUSES.get(error.cause, error.cause)
+    text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {cause}"
     if error.row is not None:
         place = place_at(prepared.network, error.row.file, error.row.line)
         text += f", in {error.row.kind} {error.row.label}, {place.file}:{place.start[0]}"

@@ -6,7 +6,6 @@ from typing import Any
 
 import click
 import numpy as np
-
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.options import chosen
 from sysdyn.cli.progress import ProgressLine
@@ -54,8 +53,9 @@ def _summary(ran: Ran) -> str:
     s, t = o.statistics, o.timings
     estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
     form = {"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {}
+    how = (ran.prepared.formulation, o.method, f"index {form.get(o.index, o.index)}", ran.prepared.backend)
     lines = [
-        f"{ran.target.name}: {ran.prepared.formulation}, {o.method}, index {form.get(o.index, o.index)}, {ran.prepared.backend}",
+        f"{ran.target.name}: {', '.join(how)}",
         f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
         f"  energy balance {_last(o.samples.energy):.2e} J, constraints {_last(o.samples.constraints):.1e}",
         f"  {o.trace}{'' if o.final else ' (not final)'}",

@@ -54,7 +54,9 @@ def _inconsistent(prepared: Prepared, error: InconsistentStart, report: Report) 
     free = ", ".join(f"'{c.label}'" for c in error.candidates)
     match error.kind:
         case "gamma":
-            message = f"gamma '{names}' has no solution at the start: the residual cannot fall below {error.residual:.3g}"
+            message = (
+                f"gamma '{names}' has no solution at the start: the residual cannot fall below {error.residual:.3g}"
+            )
             report.error("E519", message, where, related=related)
         case "implicit":
             message = f"the gammas do not determine {', '.join(error.names)} at the start"
@@ -83,7 +85,9 @@ def _structural(prepared: Prepared, facts: Structure, report: Report) -> None:
     elif facts.undetermined:
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
         message = f"the equations do not determine {names}"
-        report.error("E516", message, prepared.network.place, help="inertia, stiffness, dissipation or a constraint is missing")
+        report.error(
+            "E516", message, prepared.network.place, help="inertia, stiffness, dissipation or a constraint is missing"
+        )
 
 
 def _statics(prepared: Prepared, facts: Structure, report: Report) -> None:
@@ -118,7 +122,9 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
         message = f"static quantity '{missing[0]}' is not supported yet (planned: four formulations)"
         report.note("N608", message, claim.place)
     elif not holds(claim.operator, left, right, 0.0):
-        report.error("E909", f"expect failed: {claim.text.removeprefix('expect ')}, found {left:g} and {right:g}", claim.place)
+        report.error(
+            "E909", f"expect failed: {claim.text.removeprefix('expect ')}, found {left:g} and {right:g}", claim.place
+        )
 
 
 def holds(operator: str, left: float, right: float, within: float) -> bool:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from sysdyn.cli import targets
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.prepare import Prepared, prepare
@@ -26,7 +25,7 @@ from sysdyn.runtime.failures import SolverFailure
 from sysdyn.runtime.system import System
 from sysdyn.runtime.trace import Trace
 
-__all__ = ["Module", "ModelError", "SolverFailure", "Trace", "UsageError", "compile_model", "simulate"]
+__all__ = ["ModelError", "Module", "SolverFailure", "Trace", "UsageError", "compile_model", "simulate"]
 
 
 class Module:

@@ -6,7 +6,6 @@ import tomllib
 import numpy as np
 import pytest
 from reduced import ROOT
-
 from sysdyn.cli.main import run
 from sysdyn.runtime.trace import Trace
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from changed import CHANGED, STIFF
 from reduced import ROOT, load, solution
-
 from sysdyn.cli.running import Request, run
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.runtime.trace import Trace
@@ -87,7 +86,9 @@ def test_changed_values(tmp_path, model, formulation, case):
     settings = CHANGED[model][case]
     known = set(reference["parameters"]) | {f"{name}_0" for name in reference["initial"]}
     assert set(settings) <= known
-    times = sorted({*reference["t"], *(0.5 * (a + b) for a, b in zip(reference["t"], reference["t"][1:], strict=False))})
+    times = sorted(
+        {*reference["t"], *(0.5 * (a + b) for a, b in zip(reference["t"], reference["t"][1:], strict=False))}
+    )
     wanted = witness(model, case, tuple(times))
     found = simulated(
         tmp_path, model, formulation=formulation, backend="c", times=times, settings=tuple(settings.items())
@@ -124,7 +125,9 @@ def test_the_witness_meets_the_reference_values(model):
 def test_parameters_have_the_books_names_and_values(model):
     from sysdyn.api import compile_model
 
-    values = {p["name"]: p["value"] for p in compile_model(SEED / f"{model}.sd", backend="numpy").manifest["parameters"]}
+    values = {
+        p["name"]: p["value"] for p in compile_model(SEED / f"{model}.sd", backend="numpy").manifest["parameters"]
+    }
     reference = REFERENCES[model]
     for name, value in reference["parameters"].items():
         if name in ("q20", "q30", "q10"):  # a constant of integration: by default what the initial values make it
