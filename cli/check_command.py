@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 from sysdyn.cli import targets
 from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import INPUT_OUTPUT, classify
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import load
 from sysdyn.dsl.diagnostics import Report
@@ -16,10 +17,16 @@ from sysdyn.dsl.network import Network
 @click.option("--strict", is_flag=True, help="Warnings count as errors.")
 def command(console: Console, files: tuple[str, ...], strict: bool) -> int:
     """Check every model and scene of FILES, the consistent start included; no C compiler is needed."""
-    results = [_file(console, path) for path in files]
+    results, unread = [], False
+    for path in files:
+        try:
+            results.append(_file(console, path))
+        except OSError as error:
+            unread = True
+            console.complain(classify(error)[1], INPUT_OUTPUT)
     console.result = {"files": results}
     warned = any(d.severity == "warning" for d in console.report)
-    return console.finish(1 if strict and warned else 0)
+    return console.finish(INPUT_OUTPUT if unread else 1 if strict and warned else 0)
 
 
 def _file(console: Console, path: str) -> dict[str, object]:
@@ -40,7 +47,9 @@ def _line(summary: dict[str, object]) -> str:
     counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}, index {index}".format(**summary)
     moved = summary["moved"]
     assert isinstance(moved, list)
-    return "; ".join([f"ok: {counts}", *moved])
+    from sysdyn.cli.starting import shortened
+
+    return "; ".join([f"ok: {counts}", *shortened(moved)])
 
 
 def _target(console: Console, target: targets.Target) -> dict[str, object]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 from sysdyn.cli import targets
 from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import chosen
 from sysdyn.cli.prepare import Prepared, prepare
 from sysdyn.cli.starting import start
@@ -37,6 +38,8 @@ def command(
     explain: bool,
 ) -> int:
     """Compile the model of FILE: write DIR/residual.c (or .py) and DIR/manifest.json."""
+    if levels:
+        raise UsageError("--level is not supported yet (planned: levels)")
     document = targets.read(file, console.report)
     target = targets.one(document, file, model, scene, console.report)
     if target is None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 import click
-from sysdyn.cli.failures import envelope
+from sysdyn.cli.failures import envelope, plain
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Report
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -26,16 +27,18 @@ class Console:
         self.color = color == "always" or (color == "auto" and not plain)
         self.report = Report()
         self.result: dict[str, Any] = {}
+        self._plain: list[dict[str, object]] = []
 
     def say(self, message: str) -> None:
         """A message for the person at the terminal."""
         if not (self.quiet or self.as_json):
             print(message, file=sys.stderr)
 
-    def complain(self, message: str) -> None:
-        """A message that --quiet does not silence."""
+    def complain(self, message: str, code: int) -> None:
+        """A finding that has no place in a text, with the exit code that it leads to; --quiet does not silence it."""
+        self._plain.append(plain(message, code))
         if not self.as_json:
-            print(message, file=sys.stderr)
+            print(f"sysdyn: {message}", file=sys.stderr)
 
     def data(self, text: str) -> None:
         """Data that was asked for."""
@@ -48,7 +51,8 @@ class Console:
         if code == 0 and self.report.failed:
             code = 1
         if self.as_json:
-            print(json.dumps(envelope(self.command, code, [d.to_json() for d in found], self.result), allow_nan=False))
+            diagnostics = [*(d.to_json() for d in found), *self._plain]
+            print(json.dumps(finite(envelope(self.command, code, diagnostics, self.result)), allow_nan=False))
         else:
             self._render(found)
         return code
@@ -62,6 +66,15 @@ class Console:
         errors = sum(d.severity == "error" for d in shown)
         if errors > 1:
             print(f"{errors} errors", file=sys.stderr)
+
+
+def finite(value: Any) -> Any:
+    """A value of JSON: infinities and what is not a number become null."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def with_console(name: str) -> Callable[[F], Callable[..., Any]]:

@@ -21,10 +21,13 @@ def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
     """Print what went wrong (as JSON where asked for) and return the exit code."""
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 1
-    code, message = _classify(error)
+    code, message = classify(error)
+    if type(error).__name__ == "NoArgsIsHelpError":  # `sysdyn` alone: the message is the help
+        print(message, file=sys.stderr)
+        return code
     if "--json" in arguments:
         command = next((a for a in arguments if not a.startswith("-")), None)
-        print(json.dumps(envelope(command, code, [_plain(message, code)], {})))
+        print(json.dumps(envelope(command, code, [plain(message, code)], {})))
     elif code == INTERRUPTED:
         print("interrupted", file=sys.stderr)
     else:
@@ -36,7 +39,8 @@ def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
     return code
 
 
-def _classify(error: BaseException) -> tuple[int, str]:
+def classify(error: BaseException) -> tuple[int, str]:
+    """Exit code and message."""
     if isinstance(error, (KeyboardInterrupt, click.Abort)):
         return INTERRUPTED, "interrupted"
     if isinstance(error, click.UsageError):
@@ -59,7 +63,7 @@ def _silence() -> None:
     sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, PTH123
 
 
-def _plain(message: str, code: int) -> dict[str, object]:
+def plain(message: str, code: int) -> dict[str, object]:
     """A finding without a place in a text."""
     kinds = {USAGE: "usage", SOLVER: "solver", FAULT: "fault", INPUT_OUTPUT: "input_output", INTERRUPTED: "interrupted"}
     fields = dict.fromkeys(("help", "file", "line", "column", "end_line", "end_column"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -74,6 +75,12 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     began = time.monotonic()
     if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
         raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
+    if request.rtol is not None and not 0.0 < request.rtol < 1.0:
+        raise UsageError(f"--rtol {request.rtol:g}: it must be positive and less than 1")
+    if request.atol is not None and not 0.0 <= request.atol < math.inf:
+        raise UsageError(f"--atol {request.atol:g}: it must not be negative")
+    if request.output and request.file != "-" and _same(request.output, request.file):
+        raise UsageError(f"-o {request.output} is the model itself")
     document = targets.read(request.file, report)
     target = targets.one(document, request.file, request.model, request.scene, report)
     if target is None:
@@ -92,6 +99,13 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         if started is None or report.failed:
             return None
         return _ran(target, prepared, started, options, report)
+
+
+def _same(one: str, other: str) -> bool:
+    try:
+        return Path(one).samefile(other)
+    except OSError:
+        return False
 
 
 def _possible(request: Request, network: Network, report: Report) -> bool:
@@ -119,7 +133,7 @@ def _options(
         t1 = instant(request.until, "--until")
     elif t1 is None:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
-    at = [instant(text, "--at") for text in request.at.split(",")] if request.at else []
+    at = [instant(text, "--at") for text in _separate(request.at)] if request.at else []
     wall = instant(request.max_wall, "--max-wall") if request.max_wall else None
     if t1 is None or None in at or report.failed:
         return None
@@ -168,6 +182,18 @@ def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float
         return ACCURACY, ()
     wanted = prepared.binding.evaluate(scene.accuracy)
     return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
+
+
+def _separate(text: str) -> list[str]:
+    """The parts between commas outside brackets."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "([") - (character in ")]")
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
 
 
 def _default_output(file: str, scene: str) -> str:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import chosen
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.running import Ran, Request, run
-from sysdyn.cli.starting import described
+from sysdyn.cli.starting import described, shortened
 
 
 @with_console("simulate")
@@ -32,20 +37,36 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     """Simulate a scene of FILE and write its trace."""
     line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)
+    if request.output == "-" and console.as_json:
+        raise UsageError("-o - and --json both want standard output")
     try:
-        ran = run(request, console.report, line)
+        ran = (
+            _to_standard_output(request, console, line) if request.output == "-" else run(request, console.report, line)
+        )
     finally:
         line.clear()
     if ran is None:
         return console.finish(1)
     console.report = type(console.report)(d for d in console.report if not d.code.startswith("N50"))
     console.result = _result(ran)
-    for text in (*described(ran.started.state), *ran.outcome.warnings):
+    for text in (*shortened(described(ran.started.state)), *ran.outcome.warnings):
         console.say(text)
     if ran.failure:
-        console.complain(ran.failure)
+        console.complain(ran.failure, SOLVER)
     console.say(_summary(ran))
     return console.finish(ran.exit)
+
+
+def _to_standard_output(request: Request, console: Console, line: ProgressLine) -> Ran | None:
+    """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
+    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        path = Path(folder) / "trace.h5"
+        try:
+            return run(replace(request, output=str(path)), console.report, line)
+        finally:  # what was computed before an interruption, too
+            if path.is_file():
+                sys.stdout.buffer.write(path.read_bytes())
+                sys.stdout.buffer.flush()
 
 
 def _summary(ran: Ran) -> str:

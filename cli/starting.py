@@ -42,6 +42,11 @@ def described(state: ConsistentState) -> list[str]:
     return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
 
 
+def shortened(lines: list[str]) -> list[str]:
+    """The first few of many lines."""
+    return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
+
+
 def _place(prepared: Prepared, label: RowLabel) -> Place:
     return place_at(prepared.network, label.file, label.line)
 

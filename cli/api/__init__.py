@@ -112,6 +112,8 @@ def _request(path: str, options: dict[str, Any]) -> Request:
         given["at"] = ",".join(_text(t) for t in np.atleast_1d(at))
     if "o" in given:
         given["output"] = given.pop("o")
+    if "no_timings" in given:
+        given["timings"] = not given.pop("no_timings")
     if given.get("output") is not None:
         given["output"] = str(given["output"])
     try:
