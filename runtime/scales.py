@@ -11,6 +11,7 @@ While a run tracks magnitudes they grow with max |y|; a second run starts with t
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.system import System
 
@@ -18,6 +19,8 @@ GROUP = 1e-3
 SPAN = 1e-2
 NOISE = 1e-6
 """Values below this part of what balances their rows are round-off, or zero by chance."""
+QUIET = 1e-9
+"""Efforts below this part of (largest energy) / q are round-off."""
 _SAMPLES = 16
 _SWEEPS = 8
 
@@ -58,11 +61,18 @@ def _flows(system: System, found: Floats, span: float) -> Floats:
 
 
 def propagate(
-    magnitude: Floats, rows: np.ndarray, columns: np.ndarray, size: Floats, excited: Floats
+    magnitude: Floats,
+    rows: NDArray[np.integer],
+    columns: NDArray[np.integer],
+    size: Floats,
+    excited: Floats,
+    *,
+    largest: bool = False,
 ) -> Floats:
     """Fills zeros of `magnitude` [unknowns] so that their terms balance the others of their rows.
 
     rows, columns, size [entries]: |coefficient| of each place; excited [rows]: magnitude of the rows' free terms.
+    Of several rows' proposals the least counts (a coefficient that is small by chance proposes much), or the largest.
     """
     found = magnitude.copy()
     places = size > 0.0
@@ -74,11 +84,30 @@ def propagate(
         row = excited.copy()
         np.maximum.at(row, rows, size * found[columns])
         wanted = missing[columns] & (row[rows] > 0.0)
-        # the largest of what the rows propose: small proposals come of coefficients and terms that are round-off
-        largest = np.zeros(found.size)
-        np.maximum.at(largest, columns[wanted], row[rows[wanted]] / size[wanted])
-        found = np.where(missing & np.isfinite(largest), largest, found)
+        best = np.zeros(found.size) if largest else np.full(found.size, np.inf)
+        pick = np.maximum if largest else np.minimum
+        pick.at(best, columns[wanted], row[rows[wanted]] / size[wanted])
+        found = np.where(missing & np.isfinite(best), best, found)
     return found
+
+
+def _efforts(system: System, found: Floats, row: Floats) -> Floats:
+    """Least effort that counts in each row of dynamics [rows]: a tiny part of the largest energy over its q."""
+    form, description = system.form, system.description
+    places = {description.families[k].owner: k for k in description.families_of("q")}
+    rows: list[NDArray[np.int64]] = []
+    columns: list[NDArray[np.int64]] = []
+    for group, family, first in form.groups:
+        owner = description.rows[family].owner
+        number = description.rows[family].size
+        if group == "dynamics" and owner in places and description.families[places[owner]].size == number:
+            rows.append(first + np.arange(number))
+            columns.append(form.at[places[owner]] + np.arange(number))
+    least = np.zeros(system.rows)
+    if rows:
+        i, q = np.concatenate(rows), found[np.concatenate(columns)]
+        least[i] = QUIET * (row[i] * q).max(initial=0.0) / np.where(q > 0.0, q, np.inf)
+    return least
 
 
 def group_maximum(system: System, values: Floats) -> Floats:
@@ -110,12 +139,17 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     size = np.abs(jy) + np.abs(jyd) / tau
     size = np.where(np.isfinite(size), size, 0.0)
     pattern = system.pattern
+    rows, columns = pattern.row.astype(np.int64), pattern.columns_of()
     # momenta are balanced against flows, what follows from the state against all of it: so round-off of a start does
     # not pass for a magnitude
-    for kinds in (("q", "f", "s"), ("q", "f", "p", "s")):
-        kept = np.where(np.isin(system.kinds, kinds), found, 0.0)
-        balanced = propagate(kept, pattern.row, pattern.columns_of(), size, excited)
-        found = np.where(found > NOISE * balanced, found, balanced)
+    kept = np.where(np.isin(system.kinds, ("q", "f", "s")), found, 0.0)
+    balanced = propagate(kept, rows, columns, size, excited, largest=True)
+    found = np.where((system.kinds != "p") | (found > NOISE * balanced), found, balanced)
+    kept = np.where(state, found, 0.0)
+    row = excited.copy()
+    np.maximum.at(row, rows, size * kept[columns])
+    balanced = propagate(kept, rows, columns, size, np.maximum(excited, _efforts(system, found, row)))
+    found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, group_maximum(system, found), found)
     tiny = np.finfo(np.float64).tiny * 1e30
     return np.where(found > tiny, found, 1.0), tau
