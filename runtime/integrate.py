@@ -20,6 +20,7 @@ from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.scales import magnitudes
 from sysdyn.runtime.settled import Settler
 from sysdyn.runtime.start import ConsistentState
+from sysdyn.runtime.structure import DENSE, null_place
 from sysdyn.runtime.system import System
 from sysdyn.runtime.unknown_roles import Roles, roles
 
@@ -204,19 +205,27 @@ class Integration:
             row = self.system.row_label(bdf.bad_row)
         if cause == "singular":
             unknown = self.system.name(bdf.bad_column)
-        linear = self.linear.contents
-        if cause in ("newton", "step_too_small", "error_test") and linear.smallest < 1e-13:
-            # Newton failed because the matrix is singular to round-off: say so, with the place
-            return SolverFailure(
-                "singular",
-                bdf.t,
-                bdf.h,
-                self.system.name(linear.bad_column),
-                self.system.row_label(linear.bad_row),
-            )
+        if cause in ("newton", "step_too_small", "error_test", "singular") and self.system.unknowns <= DENSE:
+            # where the equations themselves are singular there, say so, with the place
+            names, at = self._null_place()
+            if names:
+                return SolverFailure(
+                    "singular", bdf.t, bdf.h, ", ".join(names[:3]), self.system.row_label(at)
+                )
+            cause = "newton" if cause == "singular" else cause
         if cause in ("error_test", "step_too_small", "newton"):
             unknown = self._worst()
         return SolverFailure(cause, bdf.t, bdf.h, unknown, row)
+
+    def _null_place(self) -> tuple[tuple[str, ...], int]:
+        """Unknowns and row of a singular pencil at the last accepted point; () where it is regular."""
+        bdf, n = self.bdf.contents, self.system.unknowns
+        y = lib.reader(bdf.phi[0], n).copy()
+        yd = self.yd if bdf.steps == 0 else lib.reader(bdf.yd, n).copy()
+        jy, jyd = self.system.jacobian(bdf.t, y, yd)
+        if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
+            return (), -1
+        return null_place(self.system, jy, jyd)
 
     def _worst(self) -> str:
         """The unknown with the largest weighted correction in the last step."""

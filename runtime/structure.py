@@ -78,14 +78,15 @@ def pencil_index(e: Floats, b: Floats) -> int | None:
     return None
 
 
-def _null_names(system: System, jy: Floats, jyd: Floats) -> tuple[str, ...]:
-    """Unknowns in the null vector of dF/dy + cj dF/dyd at a generic cj, () where it is regular."""
+def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...], int]:
+    """Unknowns in the null vector of dF/dy + cj dF/dyd at a generic cj, () where it is regular; its row."""
     e, b = _equilibrate(system.dense(jyd), system.dense(jy))
-    _, sigma, vt = np.linalg.svd(b + 0.7310585786300049 * e)
+    u, sigma, vt = np.linalg.svd(b + 0.7310585786300049 * e)
     if sigma.size == 0 or sigma[-1] > 1e-12 * sigma[0]:
-        return ()
+        return (), -1
     null = np.abs(vt[sigma <= 1e-12 * sigma[0]]).max(axis=0)
-    return tuple(system.name(int(k)) for k in np.flatnonzero(null > 1e-6 * null.max()))
+    names = tuple(system.name(int(k)) for k in np.flatnonzero(null > 1e-6 * null.max()))
+    return names, int(np.argmax(np.abs(u[:, -1])))
 
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
@@ -186,7 +187,7 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
         return 0, ()
     if system.unknowns > DENSE:
         return _growth_index(system, jy, jyd), ()
-    names = _null_names(system, jy, jyd)
+    names = null_place(system, jy, jyd)[0]
     if names:
         return None, names
     return pencil_index(system.dense(jyd), system.dense(jy)), ()
