@@ -32,7 +32,7 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
     if co:
         return _complementary(network, wanted, place)
     if wanted in COMPLEMENTARY:
-        return "lagrangian", (_obstacle(network, wanted, place),)
+        return "lagrangian", (_obstacle(network, wanted, place) or _planned(network, place),)
     if wanted == "auto":
         return ("hamiltonian" if any(e.function == "T" for e in network.energies) else "lagrangian"), ()
     return wanted, ()
@@ -44,15 +44,21 @@ def _complementary(network: Network, wanted: str, place: Place | None) -> tuple[
         message = f"{wanted} of a model with the cocoordinate '{name.name}'"
         related = (Related("a momentum coordinate", name.place),)
         return wanted, (Diagnostic("E603", message, place or name.place, "co_lagrangian, co_hamiltonian", related),)
+    return "lagrangian", (_planned(network, place or name.place),)
+
+
+def _planned(network: Network, place: Place | None) -> Diagnostic:
     message = "the complementary formulations are not supported yet (planned: four formulations)"
-    return "lagrangian", (Diagnostic("N608", message, place or name.place),)
+    return Diagnostic("N608", message, place or network.place)
 
 
 def _unknowns(node: Node, kind: str) -> list[Node]:
-    return sorted((n for n in variables(node) if n.op == "var" and n.data[1] == kind), key=lambda n: n.number)
+    """Unknowns of a kind; those of nodes and branches count as those of coordinates."""
+    kinds = (kind, f"n{kind}", f"b{kind}")
+    return sorted((n for n in variables(node) if n.op == "var" and n.data[1] in kinds), key=lambda n: n.number)
 
 
-def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic:
+def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic | None:
     """The first statement that keeps a model with `coord` out of the complementary family."""
     help_ = "formulation lagrangian, hamiltonian"
     for energy in network.energies:
@@ -67,8 +73,8 @@ def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic:
             label = f"{constraint.kind} {constraint.name}"
             message = f"not expressible in {wanted}: {label} depends on displacement {displacements[0]}"
             return Diagnostic("E602", message, constraint.place, help_)
-    first = network.coordinates[0] if network.coordinates else None
-    message = f"{wanted} of a model with 'coord'" + (f" ('{first.name}')" if first else "")
-    return Diagnostic(
-        "E603", message, place or (first.place if first else network.place), "network style expresses both"
-    )
+    if not network.coordinates:
+        return None
+    first = network.coordinates[0]
+    message = f"{wanted} of a model with 'coord' ('{first.name}')"
+    return Diagnostic("E603", message, place or first.place, "network style expresses both")

@@ -15,23 +15,29 @@ from sysdyn.dsl.expression import Node
 from sysdyn.dsl.network import Energy
 from sysdyn.dsl.values import Values
 
-_CONJUGATE = {"T*": ("f", "flow"), "T": ("p", "momentum"), "D": ("f", "flow")}
+_CLASS = {k: k[-1] for k in ("nq", "nf", "np", "bq", "bf", "bp")} | {"be": "e", "ne": "e"}
+
+
+def letter(node: Node) -> str:
+    """q f p e s kappa mu audit: nodes' and branches' quantities count as those of coordinates."""
+    kind = node.data[1]
+    return _CLASS.get(kind, kind)
 
 
 def unknowns_of(node: Node, kinds: str = "") -> list[Node]:
     """The unknowns of an expression (of those kinds) in the order of their making."""
-    found = (n for n in ex.variables(node) if n.op == "var" and (not kinds or n.data[1] in kinds.split()))
+    found = (n for n in ex.variables(node) if n.op == "var" and (not kinds or letter(n) in kinds.split()))
     return sorted(found, key=lambda n: n.number)
 
 
 def energies(model: Elaborator, report: Report) -> None:
     """E307, E309, E312: the variables that each state function may have."""
-    for energy in model.energies:
+    for energy in model.parts.energies:
         primal = energy.function in ("T*", "T", "V", "D")
         for node in unknowns_of(energy.expression):
             message, help_ = _misplaced(energy, node, primal)
             if message:
-                code = "E309" if energy.function == "V" and node.data[1] == "f" else "E307"
+                code = "E309" if energy.function == "V" and letter(node) == "f" else "E307"
                 report.error(code, message, energy.place, help=help_)
                 break
         if any(n.data[2] for n in unknowns_of(energy.expression)):
@@ -41,7 +47,7 @@ def energies(model: Elaborator, report: Report) -> None:
 
 
 def _misplaced(energy: Energy, node: Node, primal: bool) -> tuple[str | None, str | None]:
-    kind = node.data[1]
+    kind = letter(node)
     function = energy.function
     if kind in ("kappa", "mu", "e", "audit"):
         return f"{function} contains {node}: a state function depends on coordinates, rates, states and time", None
@@ -62,8 +68,8 @@ def _misplaced(energy: Energy, node: Node, primal: bool) -> tuple[str | None, st
 
 
 def _twice(model: Elaborator, report: Report) -> None:
-    coenergy = {n.data[0]: e for e in model.energies if e.function == "T*" for n in unknowns_of(e.expression, "f")}
-    for energy in model.energies:
+    coenergy = {n.data[0]: e for e in model.parts.energies if e.function == "T*" for n in unknowns_of(e.expression, "f")}
+    for energy in model.parts.energies:
         if energy.function == "T":
             for node in unknowns_of(energy.expression, "p"):
                 if node.data[0] in coenergy:
@@ -76,10 +82,10 @@ def _twice(model: Elaborator, report: Report) -> None:
 
 def families(model: Elaborator, report: Report) -> None:
     """E318: coordinates and cocoordinates in one expression."""
-    co = {c.name for c in model.coordinates if c.complementary}
-    if not co or len(co) == len(model.coordinates):
+    co = {c.name for c in model.parts.coordinates if c.complementary}
+    if not co or len(co) == len(model.parts.coordinates):
         return
-    primal = {c.name for c in model.coordinates if not c.complementary}
+    primal = {c.name for c in model.parts.coordinates if not c.complementary}
     for node, place in _expressions(model):
         names = [n.data[0] for n in unknowns_of(node, "q f p")]
         both = [next((n for n in names if n in group), None) for group in (primal, co)]
@@ -90,7 +96,7 @@ def families(model: Elaborator, report: Report) -> None:
 
 def constraints(model: Elaborator, report: Report) -> None:
     """E501, E502, E503, E511, E518 on phi and psi."""
-    for constraint in model.constraints:
+    for constraint in model.parts.constraints:
         what = f"{constraint.kind} {constraint.name}"
         nodes = unknowns_of(constraint.expression)
         accelerations = [n for n in nodes if n.data[2]]
@@ -100,13 +106,13 @@ def constraints(model: Elaborator, report: Report) -> None:
             continue
         if constraint.kind == "gamma":
             continue
-        implicit = [n for n in nodes if n.data[1] in ("e", "kappa", "mu")]
-        flows = [n for n in nodes if n.data[1] == "f"]
+        implicit = [n for n in nodes if letter(n) in ("e", "kappa", "mu")]
+        flows = [n for n in nodes if letter(n) == "f"]
         if implicit:
             report.error("E502", f"{what} contains {_named(implicit[0])}", constraint.place, help="it is a gamma")
         elif constraint.kind == "phi" and flows:
             report.error("E501", f"{what} contains the flow {flows[0]}", constraint.place, help="it is a psi")
-        elif constraint.kind == "phi" and not [n for n in nodes if n.data[1] == "q"]:
+        elif constraint.kind == "phi" and not [n for n in nodes if letter(n) == "q"]:
             report.error(
                 "E511", f"{what} contains no coordinate", constraint.place, help="'require' checks a parameter"
             )
@@ -122,7 +128,7 @@ def constraints(model: Elaborator, report: Report) -> None:
 
 
 def _named(node: Node) -> str:
-    kind = {"e": "the implicit unknown", "kappa": "the multiplier", "mu": "the multiplier"}[node.data[1]]
+    kind = {"e": "the implicit unknown", "kappa": "the multiplier", "mu": "the multiplier"}[letter(node)]
     return f"{kind} {node}"
 
 
@@ -149,11 +155,11 @@ def _samples(node: Node) -> Iterable[float]:
 def states(model: Elaborator, report: Report) -> None:
     """E507: every state has exactly one dynamic."""
     given: dict[str, list[Place]] = {}
-    for dynamic in model.dynamics:
+    for dynamic in model.parts.dynamics:
         given.setdefault(dynamic.state.data[0], []).append(dynamic.place)
-    for state in model.states:
+    for state in model.parts.states:
         places = given.get(state.name, [])
-        if not places and state.name in model.given:
+        if not places and state.name in model.parts.given:
             continue
         if not places:
             help_ = f"dynamic {state.name}' = ..."
@@ -165,9 +171,9 @@ def states(model: Elaborator, report: Report) -> None:
 
 def accelerations(model: Elaborator, report: Report) -> None:
     """E518: second derivatives feed traces and expectations only."""
-    statements: list[tuple[Node, Place]] = [(w.effort, w.place) for w in model.works]
-    statements += [(d.expression, d.place) for d in model.dynamics]
-    statements += [(i.target, i.place) for i in model.initials]
+    statements: list[tuple[Node, Place]] = [(w.effort, w.place) for w in model.parts.works]
+    statements += [(d.expression, d.place) for d in model.parts.dynamics]
+    statements += [(i.target, i.place) for i in model.parts.initials]
     for node, place in statements:
         second = [n for n in unknowns_of(node) if n.data[2]]
         if second:
@@ -177,12 +183,12 @@ def accelerations(model: Elaborator, report: Report) -> None:
 
 def smoothness(model: Elaborator, report: Report) -> None:
     """W301: a law with a corner or a jump where its flow vanishes; a content with a corner there is set-valued."""
-    for work in model.works:
+    for work in model.parts.works:
         _corner(work.effort, work.place, report)
-    for constraint in model.constraints:
+    for constraint in model.parts.constraints:
         if constraint.kind == "gamma":
             _corner(constraint.expression, constraint.place, report)
-    for energy in model.energies:
+    for energy in model.parts.energies:
         if energy.function != "D":
             continue
         for flow in unknowns_of(energy.expression, "f"):
@@ -213,10 +219,10 @@ def _jumps(node: Node, at: Node) -> bool:
 
 def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
     """E406, E904: parameters and inputs without a value (required: a scene wants them)."""
-    for name, parameter in model.parameters.items():
+    for name, parameter in model.parts.parameters.items():
         if parameter.values or not required:
             continue
-        if name in model.inputs:
+        if name in model.parts.inputs:
             report.error("E904", f"input '{name}' of the model is not set", parameter.place, help=f"set {name} = ...")
         else:
             help_ = f"set {name} = ... in the scene, or a default"
@@ -225,7 +231,8 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
 
 def values(model: Elaborator, known: Values, report: Report) -> None:
     """E322, E324, E805, E807 with the values bound."""
-    for node, loops, place, text in model.requirements:
+    for r in model.parts.requirements:
+        node, loops, place, text = r.condition, r.loops, r.place, r.text
         bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
         if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
             shown = ", ".join(f"{n} = {known.number(n, bound):g}" for n in _parameters(node))
@@ -258,7 +265,7 @@ def _is_constant(node: Node) -> bool:
 
 def _sizes(model: Elaborator, known: Values, report: Report) -> None:
     for name in sorted(model.resolver.whole):
-        parameter = model.parameters.get(name)
+        parameter = model.parts.parameters.get(name)
         if parameter is None or parameter.shape or not parameter.values:
             continue
         value = known.number(ex.param(name))
@@ -282,17 +289,17 @@ def _indices(model: Elaborator, known: Values, report: Report) -> None:
 
 def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
     """Every expression that the model's equations are made of."""
-    for e in model.energies:
+    for e in model.parts.energies:
         yield e.expression, e.place
-    for w in model.works:
+    for w in model.parts.works:
         yield ex.add(w.effort, w.on) if w.effort is not w.on else w.on, w.place
-    for c in model.constraints:
+    for c in model.parts.constraints:
         yield c.expression, c.place
-    for d in model.dynamics:
+    for d in model.parts.dynamics:
         yield d.expression, d.place
-    for i in model.initials:
+    for i in model.parts.initials:
         yield i.value, i.place
-    for p in model.parameters.values():
+    for p in model.parts.parameters.values():
         for value in p.values:
             yield value, p.place
 

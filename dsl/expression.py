@@ -7,7 +7,8 @@ identity is equality and common subexpressions share themselves.  Sums and produ
     mul    data = exponents                  value = prod(a_i ^ e_i), exponents are constants
 
 Other operations: const (data value), param (name; args indices), time, index (name of a loop variable),
-var ((family, kind, order); args indices; kind q f p s e kappa mu audit; order 1 is the time derivative),
+var ((family, kind, order); args indices; kind q f p s e kappa mu audit, of networks be bf bq bp (branches), ne nf nq np
+(nodes); order 1 is the time derivative),
 pow (base, exponent), call (function), cond (test, then, other), cmp (operator), and, or, not,
 table ((name, order); order counts derivatives), reduce ((operator, index); args first, last, body).
 
@@ -528,10 +529,10 @@ def rate(node: Node) -> Node | None:
     if node.op == "time":
         return const(1.0)
     family, kind, order = node.data
-    if order or kind in ("kappa", "mu", "audit"):
+    if order or kind in ("kappa", "mu", "audit", "ne"):
         return None
-    if kind == "q":
-        return var(family, "f", *node.args)
+    if kind in ("q", "nq", "bq"):  # coordinates, nodes, branches: the rate of a displacement is the flow
+        return var(family, kind[:-1] + "f", *node.args)
     return var(family, kind, *node.args, order=1)
 
 

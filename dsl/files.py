@@ -20,16 +20,15 @@ from sysdyn.dsl.symbols import (
     DomainSymbol,
     FunctionSymbol,
     Scope,
+    Space,
     Symbol,
     TableSymbol,
-    Unsupported,
     nearest,
 )
 from sysdyn.dsl.unit_reading import read_unit
 from sysdyn.dsl.units import NONE, Unit, multiply
 
 LIBRARY = Path(__file__).parent / "std"
-_MODULES = ("electrical", "mechanical", "fluid", "thermal", "transduce", "control")
 
 
 @cache
@@ -41,15 +40,16 @@ def prelude() -> syntax.File:
 
 
 class FileScope:
-    """A file's own names on top of the prelude's, and the values of its tables."""
+    """A file's own names on top of the prelude's, the values of its tables, and the modules that it imports."""
 
     def __init__(self, file: syntax.File, report: Report) -> None:
         self.file = file
         self.report = report
         self.tables: dict[str, Table] = {}
-        outer = Scope()
-        self._declare(prelude(), outer)
-        self.scope = Scope(outer)
+        self._modules: dict[Path, Scope | None] = {}
+        self.outer = Scope()
+        self._declare(prelude(), self.outer)
+        self.scope = Scope(self.outer)
         self._declare(file, self.scope)
 
     def _declare(self, file: syntax.File, scope: Scope) -> None:
@@ -95,30 +95,72 @@ class FileScope:
             case syntax.Domain():
                 yield from self._domain(item, scope, source)
             case syntax.Bundle():
-                yield BundleSymbol(item.name.name, Place(source, item.name.span))
+                members = tuple((w.name, m.domain.name) for m in item.members for w in m.names)
+                yield BundleSymbol(item.name.name, members, Place(source, item.name.span))
             case syntax.Component() | syntax.Model():
-                yield ComponentSymbol(item.name.name, Place(source, item.name.span))
+                yield ComponentSymbol(item.name.name, item.body, scope, source, Place(source, item.name.span))
             case syntax.Const():
                 span = item.name.span
                 place = Place(source, span)
-                yield Definition(item.name.name, "const", item.value, (), None, source, place, span)
+                space = Space("", scope, scope, source)
+                yield Definition(item.name.name, "const", item.value, (), None, space, place, span)
             case syntax.Function():
-                yield FunctionSymbol(item, source, Place(source, item.name.span))
+                yield FunctionSymbol(item, source, scope, Place(source, item.name.span))
             case syntax.Table():
                 yield from self._table(item, scope, source)
             case syntax.Import():
                 yield from self._import(item, source)
 
     def _import(self, item: syntax.Import, source: SourceText) -> Iterator[Symbol]:
-        names = item.module.names
-        if names[0] != "std" or len(names) != 2 or names[1] not in _MODULES:
-            text = ".".join(names)
-            near = nearest(names[-1], _MODULES)
-            place = Place(source, item.module.span)
-            help_ = f"nearest module: 'std.{near}'" if near else None
-            self.report.error("E103", f"there is no module '{text}'", place, help=help_)
+        module = self._module(item, source)
+        if module is None:
+            for word in item.names:  # reported; what hangs on them is not reported again
+                self.scope.broken.add(word.name)
+            return
         for word in item.names:
-            yield Unsupported(word.name, "library component", Place(source, word.span))
+            symbol = module.symbols.get(word.name)
+            unit = module.units.get(word.name)
+            if unit is not None:
+                self.scope.units[word.name] = unit
+            elif symbol is not None:
+                yield symbol
+            else:
+                near = nearest(word.name, module.symbols)
+                text = ".".join(item.module.names)
+                help_ = f"nearest exported name: '{near}'" if near else f"it exports {', '.join(module.symbols)}"
+                self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
+                self.scope.broken.add(word.name)
+
+    def _module(self, item: syntax.Import, source: SourceText) -> Scope | None:
+        """The names of a module: std.x from the library, others from the folder of the importing file."""
+        names = item.module.names
+        place = Place(source, item.module.span)
+        inside = names[0] == "std"
+        folder = LIBRARY if inside else Path(source.name).parent
+        path = folder.joinpath(*names[inside:]).with_suffix(".sd")
+        if path in self._modules:
+            found = self._modules[path]
+            if found is None:
+                self.report.error("E801", f"module '{'.'.join(names)}' imports itself", place)
+            return found
+        if not path.is_file():
+            modules = [p.stem for p in folder.glob("*.sd") if p.stem != "prelude"]
+            near = nearest(names[-1], modules)
+            head = "std." if inside else ""
+            help_ = f"nearest module: '{head}{near}'" if near else f"there are {', '.join(sorted(modules)) or 'none'}"
+            self.report.error("E103", f"there is no module '{'.'.join(names)}'", place, help=help_)
+            return None
+        self._modules[path] = None
+        file, problems = parse(SourceText.read(path, f"std/{path.name}" if inside else None))
+        self.report.extend(problems)
+        scope = Scope(self.outer)
+        before, self.scope = self.scope, scope
+        try:
+            self._declare(file, scope)
+        finally:
+            self.scope = before
+        self._modules[path] = scope
+        return scope
 
     def _domain(self, item: syntax.Domain, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         units: dict[str, Unit] = {}

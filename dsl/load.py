@@ -17,9 +17,10 @@ from sysdyn.dsl.elaborate import Elaborator
 from sysdyn.dsl.files import FileScope
 from sysdyn.dsl.network import Network, Scene
 from sysdyn.dsl.parse import parse
+from sysdyn.dsl.parts import Parts
 from sysdyn.dsl.resolve import Failed, Resolver
 from sysdyn.dsl.scenes import SceneReader
-from sysdyn.dsl.symbols import nearest
+from sysdyn.dsl.symbols import Space, nearest
 from sysdyn.dsl.units import Dimension
 from sysdyn.dsl.values import Values
 
@@ -101,18 +102,24 @@ def _network(
 ) -> Network | None:
     files = FileScope(document.file, report)
     elaborator = Elaborator(files, model, report)
-    elaborator.declare()
+    elaborator.names()
     reader = SceneReader(elaborator)
+    given = [s for name, value in settings for s in _set(name, value, report)]
+    if scene is not None:
+        reader.levels(scene)
+    for source, statement in given:
+        reader.command(source, statement, SceneReader.set_input)
+    elaborator.elements()
     if scene is not None:
         reader.settings(scene)
-    for name, value in settings:
-        _set(reader, name, value, report)
+    for source, statement in given:
+        reader.command(source, statement, SceneReader.set_parameter)
     elaborator.statements()
     read_scene: Scene | None = None
     if scene is not None:
         read_scene = reader.read(scene, Place(document.file.source, scene.name.span))
     checks.run(elaborator, report, required=required)
-    known = Values(elaborator.parameters, reader.elements)
+    known = Values(elaborator.parts.parameters, reader.elements)
     checks.values(elaborator, known, report)
     if report.failed or any(d.code == "N608" for d in report):
         return None
@@ -121,26 +128,40 @@ def _network(
 
 def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) -> Network:
     whole = elaborator.resolver.whole
+    parts = elaborator.parts
     return Network(
         model=elaborator.model.name.name,
         place=Place(elaborator.source, elaborator.model.name.span),
-        parameters=tuple(replace(p, whole=p.name in whole) for p in elaborator.parameters.values()),
+        parameters=tuple(replace(p, whole=p.name in whole) for p in parts.parameters.values()),
         tables=tuple(elaborator.files.tables.values()),
-        coordinates=tuple(elaborator.coordinates),
-        unknowns=tuple(elaborator.unknowns),
-        states=tuple(elaborator.states),
-        energies=tuple(elaborator.energies),
-        works=tuple(elaborator.works),
-        constraints=tuple(elaborator.constraints),
-        dynamics=tuple(elaborator.dynamics),
-        initials=tuple(elaborator.initials),
+        coordinates=tuple(parts.coordinates),
+        unknowns=tuple(parts.unknowns),
+        states=tuple(parts.states),
+        energies=tuple(parts.energies),
+        works=tuple(parts.works),
+        constraints=tuple(parts.constraints),
+        dynamics=tuple(parts.dynamics),
+        initials=tuple(parts.initials),
         observations=tuple(reader.observations),
-        expectations=tuple(e for e in elaborator.expectations if e.moment != "static"),
-        statics=tuple(e for e in elaborator.expectations if e.moment == "static"),
-        goldens=tuple(elaborator.goldens),
+        expectations=tuple(e for e in parts.expectations if e.moment != "static"),
+        statics=tuple(e for e in parts.expectations if e.moment == "static"),
+        goldens=tuple(parts.goldens),
         scene=scene,
         elements=tuple(reader.elements),
+        nodes=tuple(parts.nodes),
+        branches=tuple(parts.branches),
+        couplings=tuple(parts.couplings),
+        read=_read(parts),
     )
+
+
+def _read(parts: Parts) -> frozenset[str]:
+    """Common-effort nodes whose effort an equation reads."""
+    roots = [e.expression for e in parts.energies] + [c.expression for c in parts.constraints]
+    roots += [n for w in parts.works for n in (w.effort, w.on)] + [d.expression for d in parts.dynamics]
+    roots += [b.law for b in parts.branches if b.law is not None] + [c.ratio for c in parts.couplings]
+    found = (n for n in ex.topological(roots) if n.op == "var")
+    return frozenset(n.data[0] for n in found if n.data[1] == "ne")
 
 
 def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
@@ -157,7 +178,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
         return None
     value = items[0].value
     resolver = Resolver(report)
-    with _deep(), ex.fresh(), resolver.within(FileScope(document.file, Report()).scope, source):
+    with _deep(), ex.fresh(), resolver.space(_space(document, source)):
         try:
             if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
                 return resolver.scalar(value).node.data  # type: ignore[no-any-return]
@@ -171,7 +192,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     return found
 
 
-def _set(reader: SceneReader, name: str, value: str, report: Report) -> None:
+def _set(name: str, value: str, report: Report) -> list[tuple[SourceText, syntax.Set]]:
     """One `--set NAME=VALUE` of the command line, read as the statement of a scene."""
     text = f"scene command_line of model {{\n  set {name} = {value}\n}}\n"
     source = SourceText("--set", text)
@@ -182,9 +203,13 @@ def _set(reader: SceneReader, name: str, value: str, report: Report) -> None:
         report.extend(inner)
         if not inner.failed:
             report.error("E910", f"--set {name}={value} is not NAME=VALUE", source.place(0, 0))
-        return
-    with reader.resolver.within(reader.model.scope, source):
-        reader.guarded(reader.set_value, statements[0])
+        return []
+    return [(source, statements[0])]
+
+
+def _space(document: Document, source: SourceText) -> Space:
+    scope = FileScope(document.file, Report()).scope
+    return Space("", scope, scope, source)
 
 
 @contextmanager

@@ -27,6 +27,78 @@ Shape = tuple[tuple[Node, Node], ...]  # (first, last) of each index of a family
 
 
 @dataclass(frozen=True, slots=True)
+class Domain:
+    """A domain: the units of its four variables, and what its nodes have in common (effort or flow)."""
+
+    name: str
+    effort: Unit
+    flow: Unit
+    momentum: Unit
+    displacement: Unit
+    common: str
+    pseudo: bool
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class NodeFamily:
+    """Nodes of a domain.  Quantities in expressions: var kinds ne (common effort), nq nf np (common flow)."""
+
+    name: str
+    shape: Shape
+    domain: Domain
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """One end of a branch: an element of a node family, or the domain's ground (node None)."""
+
+    node: str | None
+    at: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """A branch plus -> minus, or along a displacement expression (`on`).
+
+    Its effort, flow, displacement, momentum are var kinds be bf bq bp of its name at `at` (loop variables of `loops`,
+    or constants).  kind: kinetic, potential, dissipator, effort, flow (sources), field (no law: it stands in energies
+    and constraints), port (one side of a coupling).  law: side = law, side one of e f q p; law holds the branch's own
+    conjugate variable, and others where it is modulated.
+    """
+
+    name: str
+    at: tuple[Node, ...]
+    loops: tuple[Loop, ...]
+    domain: Domain
+    kind: str
+    side: str | None
+    law: Node | None
+    plus: Terminal | None
+    minus: Terminal | None
+    on: Node | None
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """A two-port of two branches: transformer f1 = ratio*f2 (side f) or e1 = ratio*e2 (side e); gyrator e1 = ratio*f2.
+
+    The companion law follows from e1 f1 + e2 f2 = 0.
+    """
+
+    kind: str
+    first: str
+    second: str
+    at: tuple[Node, ...]
+    loops: tuple[Loop, ...]
+    side: str
+    ratio: Node
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
 class Parameter:
     """A run-time constant; value holds one node, one per element of a literal array, or one over `loops`.
 
@@ -232,3 +304,7 @@ class Network:
     goldens: tuple[Golden, ...]
     scene: Scene | None
     elements: tuple[ElementSetting, ...] = ()
+    nodes: tuple[NodeFamily, ...] = ()
+    branches: tuple[Branch, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)

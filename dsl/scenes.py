@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
-from sysdyn.dsl.diagnostics import Place
+from sysdyn.dsl.diagnostics import Place, SourceText
 from sysdyn.dsl.elaborate import Elaborator
 from sysdyn.dsl.expression import Node
 from sysdyn.dsl.format import format_expression
-from sysdyn.dsl.network import ElementSetting, Observation, Parameter, Scene
+from sysdyn.dsl.members import Located
+from sysdyn.dsl.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.resolve import Failed
-from sysdyn.dsl.symbols import Definition, ParameterSymbol, Typed, Unsupported, Vector, nearest
+from sysdyn.dsl.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
 from sysdyn.dsl.unit_reading import read_unit
 from sysdyn.dsl.units import NONE, Dimension, Unit, si
 
@@ -36,9 +38,18 @@ class SceneReader:
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
         self._found: dict[str, object] = {}
 
+    def levels(self, scene: syntax.Scene) -> None:
+        """The `level` statements and those that set inputs: before the model's instances are elaborated."""
+        self._each(scene, {syntax.SceneLevel: SceneReader.level, syntax.Set: SceneReader.set_input})
+
     def settings(self, scene: syntax.Scene) -> None:
-        """The `set` statements: before the model's statements are resolved, since inputs may be anything."""
-        self._each(scene, {syntax.Set: SceneReader.set_value})
+        """The `set` statements on parameters: when those of instances are known."""
+        self._each(scene, {syntax.Set: SceneReader.set_parameter})
+
+    def set_input(self, s: syntax.Set) -> None:
+        """A `set` of an input of the model; others wait."""
+        if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
+            self._set_input(s.target.name, *self.model.parts.inputs[s.target.name], s)
 
     def read(self, scene: syntax.Scene, place: Place) -> Scene:
         """Everything else of the scene."""
@@ -47,12 +58,17 @@ class SceneReader:
         return Scene(scene.name.name, place, **self._found)  # type: ignore[arg-type]
 
     def _each(self, scene: syntax.Scene, table: dict[type, Callable[..., None]]) -> None:
-        with self.resolver.within(self.model.scope, self.model.source):
+        with self.model.entering(self.model.space):
             for statement in scene.body:
                 if isinstance(statement, syntax.Broken):
-                    self.model.scope.broken |= statement.names
+                    self.model.space.scope.broken |= statement.names
                 elif type(statement) in table:
                     self.guarded(lambda s: table[type(s)](self, s), statement)
+
+    def command(self, source: SourceText, s: syntax.Set, do: Callable[[SceneReader, syntax.Set], None]) -> None:
+        """A `--set` of the command line."""
+        with self.model.entering(self.model.space), self.resolver.within(self.model.space.scope, source):
+            self.guarded(lambda statement: do(self, statement), s)
 
     def guarded(self, do: Callable[..., None], statement: object) -> None:
         """Carry out one statement; what fails has been reported."""
@@ -68,34 +84,36 @@ class SceneReader:
 
     # -- set -----------------------------------------------------------------------------------------------
 
-    def set_value(self, s: syntax.Set) -> None:
-        """`set ref = value`: a parameter, an element of one, or an input."""
-        target = s.target
-        base = target.base if isinstance(target, syntax.Item) else target
-        if not isinstance(base, syntax.Name):
-            raise self.resolver.fail("E910", "'set' of something that is not a parameter or input", target.span)
-        symbol = self.model.scope.symbols.get(base.name)
+    def set_parameter(self, s: syntax.Set) -> None:
+        """`set ref = value` of a parameter or an element of one; paths lead into instances."""
+        if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
+            return
+        found = self.resolver.located(s.target)
+        symbol = None if found is None else found.symbol
         if isinstance(symbol, Unsupported):
             raise Failed
-        parameter = self.model.parameters.get(base.name)
-        if base.name in self.model.inputs and isinstance(target, syntax.Name):
-            self._set_input(base.name, *self.model.inputs[base.name], s)
-        elif parameter is not None and isinstance(symbol, ParameterSymbol):
-            self._set_parameter(symbol, parameter, target, s)
-        elif symbol is None and self.model.scope.is_broken(base.name):
+        if found is not None and isinstance(symbol, ParameterSymbol):
+            self._set_parameter(symbol, found, s)
+            return
+        root = s.target
+        while isinstance(root, (syntax.Item, syntax.Member)):
+            root = root.base
+        shown = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
+        name = root.name if isinstance(root, syntax.Name) else shown
+        if self.model.space.scope.is_broken(name):
             raise Failed
-        else:
-            near = nearest(base.name, (*self.model.parameters, *self.model.inputs))
-            message = f"'{base.name}' is not a parameter or input of model '{self.model.model.name.name}'"
-            help_ = f"nearest: '{near}'" if near else "init sets initial values" if symbol is not None else None
-            raise self.resolver.fail("E910", message, target.span, help=help_)
+        near = nearest(shown, (*self.model.parts.parameters, *self.model.parts.inputs))
+        message = f"'{shown}' is not a parameter or input of model '{self.model.model.name.name}'"
+        help_ = f"nearest: '{near}'" if near else "init sets initial values" if symbol is not None else None
+        raise self.resolver.fail("E910", message, s.target.span, help=help_)
 
     def _set_input(self, name: str, unit: Unit, place: Place, s: syntax.Set) -> None:
         value = self._bare(s.value, unit.dimension)
-        self.model.parameters.pop(name, None)
-        self.model.define_input(
-            Definition(name, "input", value, (), unit.dimension, self.resolver.source, place, s.span)
-        )
+        self.model.parts.parameters.pop(name, None)
+        space = self.model.space
+        if self.resolver.source is not space.source:  # the command line has a text of its own
+            space = Space("", space.scope, space.file_scope, self.resolver.source)
+        self.model.define_input(Definition(name, "input", value, (), unit.dimension, space, place, s.span))
 
     def _bare(self, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
         """On the command line a bare number is in SI units."""
@@ -106,32 +124,27 @@ class SceneReader:
         self.model.files.scope.units.update({f"SI {dim.show(dimension)}": si(dimension)})
         return syntax.Negative(number, value.span) if isinstance(value, syntax.Negative) else number
 
-    def _set_parameter(self, symbol: ParameterSymbol, parameter: Parameter, target: syntax.Expr, s: syntax.Set) -> None:
+    def _set_parameter(self, symbol: ParameterSymbol, found: Located, s: syntax.Set) -> None:
+        parameter = self.model.parts.parameters[symbol.family.name]
         value = self.resolver.resolve(self._bare(s.value, symbol.dimension or NONE))
         items = value.items if isinstance(value, Vector) else (value,)
         for item in items:
             self._check_setting(symbol, item, s)
-        if isinstance(target, syntax.Item):
-            at = tuple(
-                self.resolver.whole_number(i, "an index") for i in target.indices if not isinstance(i, syntax.Range)
-            )
-            if len(at) != len(parameter.shape) or len(items) != 1:
-                message = f"'{symbol.name}' has {len(parameter.shape)} indices"
-                raise self.resolver.fail("E805", message, target.span)
-            self.elements.append(ElementSetting(symbol.name, at, items[0].node, self.resolver.place(s.span)))
-            return
-        if isinstance(value, Vector) and (
-            len(parameter.shape) != 1 or not self.model._fits(parameter.shape, len(items))
-        ):
-            message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
-            raise self.resolver.fail("E805", message, s.value.span)
+        around = tuple(ex.substitute(n, found.change) for n in symbol.family.prefix)
+        at = (*around, *(self.resolver.whole_number(i, "an index") for i in found.indices if not isinstance(i, syntax.Range)))
         nodes = tuple(i.node for i in items)
         if symbol.truth:
             nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
         place = self.resolver.place(s.span)
-        self.model.parameters[symbol.name] = Parameter(
-            symbol.name, parameter.shape, parameter.unit, nodes, (), place, parameter.whole
-        )
+        if at:
+            if len(at) != len(parameter.shape) or len(items) != 1:
+                raise self.resolver.index_count(symbol.name, len(symbol.shape), len(found.indices), s.target.span)
+            self.elements.append(ElementSetting(parameter.name, at, nodes[0], place))
+            return
+        if isinstance(value, Vector) and (len(parameter.shape) != 1 or not self.model.fits(parameter.shape, len(items))):
+            message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
+            raise self.resolver.fail("E805", message, s.value.span)
+        self.model.parts.parameters[parameter.name] = replace(parameter, values=nodes, indices=(), place=place)
 
     def _check_setting(self, symbol: ParameterSymbol, value: Typed, s: syntax.Set) -> None:
         if value.truth != symbol.truth:
@@ -238,7 +251,7 @@ class SceneReader:
     def _traced_unit(self, item: syntax.TraceItem, value: Typed) -> Unit:
         if item.unit is None:
             return si(value.dimension or NONE)
-        unit = read_unit(item.unit, self.model.scope, self.resolver.source, self.report)
+        unit = read_unit(item.unit, self.model.space.scope, self.resolver.source, self.report)
         if unit is None:
             raise Failed
         if value.dimension is not None and unit.dimension != value.dimension:
@@ -276,11 +289,13 @@ class SceneReader:
     def _golden(self, s: syntax.Golden) -> None:
         self.model.golden(s)
 
-    def _later(self, s: syntax.SceneLevel | syntax.When) -> None:
-        what = "level" if isinstance(s, syntax.SceneLevel) else "when"
-        self.report.error(
-            "N608", f"{what} is not supported yet (planned: networks and events)", self.resolver.place(s.span)
-        )
+    def level(self, s: syntax.SceneLevel) -> None:
+        """`level ref = name`: before the model's instances are elaborated."""
+        text = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
+        self.model.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
+
+    def _later(self, s: syntax.When) -> None:
+        self.report.note("N608", "when is not supported yet (planned: events)", self.resolver.place(s.span))
 
 
 def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
@@ -298,6 +313,5 @@ _STATEMENTS: dict[type, Callable[..., None]] = {
     syntax.Init: SceneReader._init,
     syntax.Expect: SceneReader._expect,
     syntax.Golden: SceneReader._golden,
-    syntax.SceneLevel: SceneReader._later,
     syntax.When: SceneReader._later,
 }

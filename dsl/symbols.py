@@ -5,11 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 from sysdyn.dsl import syntax
 from sysdyn.dsl.diagnostics import Place, SourceText
 from sysdyn.dsl.expression import Node
-from sysdyn.dsl.network import Shape
+from sysdyn.dsl.network import Domain as DomainSymbol
+from sysdyn.dsl.network import Loop, Shape
 from sysdyn.dsl.units import Dimension, Unit
 
 
@@ -31,32 +33,22 @@ class Vector:
 
 
 @dataclass(frozen=True, slots=True)
-class DomainSymbol:
-    """A domain: the units of its four variables and what its nodes have in common."""
-
-    name: str
-    effort: Unit
-    flow: Unit
-    momentum: Unit
-    displacement: Unit
-    common: str
-    pseudo: bool
-    place: Place
-
-
-@dataclass(frozen=True, slots=True)
 class BundleSymbol:
-    """A bundle of nodes."""
+    """A bundle of nodes: the domain of each member."""
 
     name: str
+    members: tuple[tuple[str, str], ...]
     place: Place
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentSymbol:
-    """A component: parsed, lowered by a later issue."""
+    """A component with the file it stands in; a model is one without ports."""
 
     name: str
+    body: tuple[syntax.Statement, ...]
+    file_scope: Scope
+    source: SourceText
     place: Place
 
 
@@ -76,6 +68,7 @@ class FunctionSymbol:
 
     definition: syntax.Function
     source: SourceText
+    file_scope: Scope
     place: Place
 
     @property
@@ -85,14 +78,37 @@ class FunctionSymbol:
 
 
 @dataclass(frozen=True, slots=True)
+class Family:
+    """Where a name's values live: the path of its own name, and the indices of the instances around it.
+
+    shape holds the own indices only; `whole` the instances' too.  X[i].cell.q has family X.cell and prefix (i,).
+    """
+
+    name: str
+    prefix: tuple[Node, ...]
+    around: Shape
+    shape: Shape
+
+    @property
+    def whole(self) -> Shape:
+        """First and last of every index."""
+        return (*self.around, *self.shape)
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterSymbol:
     """A parameter or an input that holds a constant."""
 
     name: str
-    shape: Shape
+    family: Family
     dimension: Dimension | None
     truth: bool
     place: Place
+
+    @property
+    def shape(self) -> Shape:
+        """Own indices."""
+        return self.family.shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,11 +117,16 @@ class UnknownSymbol:
 
     name: str
     kind: str
-    shape: Shape
+    family: Family
     dimension: Dimension
     domain: DomainSymbol | None
     complementary: bool
     place: Place
+
+    @property
+    def shape(self) -> Shape:
+        """Own indices."""
+        return self.family.shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +135,95 @@ class ConstraintSymbol:
 
     name: str
     kind: str
+    family: Family
     place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSymbol:
+    """A node of a domain."""
+
+    name: str
+    family: Family
+    domain: DomainSymbol
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class BundleNode:
+    """Several nodes (or ports) handled as one."""
+
+    name: str
+    members: dict[str, NodeSymbol | PortSymbol]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A node's element, or the domain's ground (node None)."""
+
+    node: NodeSymbol | None
+    at: tuple[Node, ...]  # all indices, those of instances first
+    domain: DomainSymbol
+
+
+@dataclass(frozen=True, slots=True)
+class PortSymbol:
+    """A component's port, bound to a node of its user."""
+
+    name: str
+    end: End
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class BranchSymbol:
+    """A branch: effort e, flow f, displacement q, momentum p between two ends or along an expression."""
+
+    name: str
+    family: Family
+    domain: DomainSymbol
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TwoPortSymbol:
+    """A transformer or gyrator: its branches carry e1 f1 and e2 f2."""
+
+    name: str
+    branches: tuple[BranchSymbol, BranchSymbol]
+    place: Place
+
+
+@dataclass(eq=False, slots=True)
+class Space:
+    """The inside of a model or of one instance: its scope, its text, the loops of its label."""
+
+    path: str
+    scope: Scope
+    file_scope: Scope
+    source: SourceText
+    loops: tuple[Loop, ...] = ()
+    prefix: tuple[Node, ...] = ()
+    around: Shape = ()
+    component: str = ""
+    level: str | None = None
+    bound: dict[str, Typed] = field(default_factory=dict)  # e f q p of the component's single branch
+    ends: dict[str, Any] = field(default_factory=dict)  # of its branches (instances.Ends)
+    laws: dict[str, Place] = field(default_factory=dict)  # branches that have a law
+
+    def family(self, name: str, shape: Shape = ()) -> Family:
+        """The family of a name declared inside."""
+        return Family(f"{self.path}.{name}" if self.path else name, self.prefix, self.around, shape)
+
+
+@dataclass(eq=False, slots=True)
+class InstanceSymbol:
+    """Instances under one label: one space a statement; `fits` says which of them has an index."""
+
+    name: str
+    place: Place
+    spaces: list[Space] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,15 +238,16 @@ class Definition:
     expression: syntax.Expr
     at: tuple[str, ...]
     dimension: Dimension | None  # declared (inputs)
-    source: SourceText
+    space: Space  # where the expression is read
     place: Place
     span: syntax.Span
     implied: bool = False
+    bound: tuple[tuple[str, Typed], ...] = ()  # loop variables in sight where it is read
 
 
 @dataclass(frozen=True, slots=True)
 class Unsupported:
-    """A name whose meaning is built by a later issue (nodes, instances, discrete variables)."""
+    """A name whose meaning is built by a later issue (discrete variables)."""
 
     name: str
     what: str
@@ -153,6 +263,12 @@ Symbol = (
     | ParameterSymbol
     | UnknownSymbol
     | ConstraintSymbol
+    | NodeSymbol
+    | BundleNode
+    | PortSymbol
+    | BranchSymbol
+    | TwoPortSymbol
+    | InstanceSymbol
     | Definition
     | Unsupported
 )
