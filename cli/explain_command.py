@@ -15,7 +15,7 @@ from sysdyn.dsl import codes
 def command(console: Console, code: str) -> int:
     """Explain CODE: the rule, its reason, a text that breaks it and one that keeps it."""
     name = code.strip().upper()
-    known = list(codes.CODES)
+    known = list(codes.codes())
     if name not in known:
         near = difflib.get_close_matches(name, known, 3, 0.5)
         hint = f"; near: {', '.join(near)}" if near else ""

@@ -29,8 +29,8 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     """
     files = [trace, *(name for name in names if _is_trace(name))]
     wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
-    target = _target(trace, output, console)
     traces = [(_label(file), _open(file)) for file in files]
+    target = _target(trace, output, console)
     drawn = _quantities([t for _, t in traces], wanted)
     from sysdyn.cli.picture import picture  # matplotlib: half a second that a wrong name need not wait for
 

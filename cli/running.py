@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from sysdyn.cli.targets import Target
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import load
-from sysdyn.dsl.diagnostics import Report
+from sysdyn.dsl.diagnostics import Place, Report
 from sysdyn.dsl.network import Network, Scene
 from sysdyn.dsl.units import si_text
 from sysdyn.runtime.failures import SolverFailure
@@ -275,4 +276,16 @@ def _failure(prepared: Prepared, error: SolverFailure) -> str:
         text += f", in {error.row.kind} {error.row.label}, {place.file}:{place.start[0]}"
     if error.unknown is not None:
         text += f", unknown {error.unknown}"
+        if error.row is None:
+            place = _declared(prepared.network, error.unknown)
+            text += f", {place.file}:{place.start[0]}"
     return text
+
+
+def _declared(network: Network, unknown: str) -> Place:
+    """Where the family of an unknown is declared: `x[3]'`, `x.p` and `rod.multiplier` are of x and rod."""
+    name = re.split(r"[^\w]", unknown, maxsplit=1)[0]
+    families = (network.coordinates, network.states, network.unknowns)
+    places = {item.name: item.place for group in families for item in group}
+    places |= {item.name: item.place for item in network.constraints if item.name}
+    return places.get(name, network.place)

@@ -1,0 +1,93 @@
+"""`sysdyn.api`: the Python face."""
+
+import numpy as np
+import pytest
+from sysdyn import api
+from texts import ARRAY, BROKEN, FAILING, PENDULUM, STUCK, TWO_SCENES, write
+
+
+def test_simulate_and_trace(tmp_path):
+    trace = api.simulate(
+        write(tmp_path, PENDULUM), accuracy=1e-6, set={"l": 2.0, "m": "900 g"}, at=[0.123, 0.5], until=1
+    )
+    assert trace.time[-1] == 1.0
+    assert 0.123 in trace.time
+    assert trace["x"].units == "m"
+    assert trace["x"][0] == 1.0
+    assert trace.parameters["m"] == (0.9, "kg")
+    assert np.asarray(trace["y"]).shape == trace.time.shape
+    again = api.Trace.open(trace.path)
+    assert again.names == trace.names
+    np.testing.assert_array_equal(again["x"], trace["x"])
+
+
+def test_options_have_the_commands_names(tmp_path):
+    path = write(tmp_path, TWO_SCENES)
+    options = {
+        "no_timings": True,
+        "backend": "numpy",
+        "formulation": "hamiltonian",
+        "max_wall": 60,
+        "o": tmp_path / "x.h5",
+    }
+    trace = api.simulate(path, scene="again", **options)
+    assert "timings" not in trace.attributes
+    assert trace.attributes["formulation"] == "hamiltonian"
+    with pytest.raises(api.UsageError, match="colour"):
+        api.simulate(path, scene="again", colour="red")
+    with pytest.raises(api.UsageError, match="several scenes"):
+        api.simulate(path)
+
+
+def test_errors_are_raised(tmp_path):
+    with pytest.raises(api.ModelError) as caught:
+        api.simulate(write(tmp_path, BROKEN))
+    assert caught.value.diagnostics[0].code == "E208"
+    with pytest.raises(api.ModelError, match="E909"):
+        api.simulate(write(tmp_path, FAILING))
+    with pytest.raises(api.SolverFailure):
+        api.simulate(write(tmp_path, STUCK), max_wall=20)
+    with pytest.raises(FileNotFoundError):
+        api.simulate("missing.sd")
+    with pytest.raises(api.ModelError):
+        api.compile_model(write(tmp_path, BROKEN))
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_residual(tmp_path, backend):
+    module = api.compile_model(write(tmp_path, PENDULUM), backend=backend)
+    names = list(module.unknowns)
+    assert [u["name"] for u in module.manifest["unknowns"]] == names
+    rng = np.random.default_rng(1)
+    y, ydot = rng.normal(size=len(names)), rng.normal(size=len(names))
+    value = dict(zip(names, y, strict=True))
+    r = module.residual(0.0, y, ydot)
+    rows = [row["label"] for row in module.manifest["rows"]]
+    phi = next(k for k, label in enumerate(rows) if "rod" in label)
+    assert abs(r[phi]) == pytest.approx(abs(value["x"] ** 2 + value["y"] ** 2 - 2.34**2), rel=1e-12)
+    changed = module.residual(0.0, y, ydot, {"l": 1.0})
+    assert abs(changed[phi]) == pytest.approx(abs(value["x"] ** 2 + value["y"] ** 2 - 1.0), rel=1e-12)
+    np.testing.assert_array_equal(module.residual(0.0, y, ydot), r)
+    with pytest.raises(api.ModelError):
+        module.residual(0.0, y, ydot, {"L": 1.0})
+
+
+def test_backends_agree_on_residuals(tmp_path):
+    for text in (PENDULUM, ARRAY):
+        path = write(tmp_path, text)
+        modules = [api.compile_model(path, backend=backend) for backend in ("c", "numpy")]
+        n = len(modules[0].unknowns)
+        rng = np.random.default_rng(2)
+        y, ydot = rng.normal(size=n), rng.normal(size=n)
+        one, other = (module.residual(0.3, y, ydot) for module in modules)
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.max(np.abs(one)))
+
+
+def test_arrays_of_parameters_are_read_back(tmp_path):
+    trace = api.simulate(write(tmp_path, ARRAY))
+    assert trace.parameters["m[3]"] == (1.0, "kg")
+
+
+def test_what_the_module_offers():
+    names = {"ModelError", "Module", "SolverFailure", "Trace", "UsageError", "compile_model", "simulate"}
+    assert set(api.__all__) == names

@@ -1,0 +1,142 @@
+"""`sysdyn plot`: pictures that are the same each time, and names that are not there."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sysdyn.cli.main import run
+from sysdyn.cli.picture import curve, panels_of, unit_text
+from sysdyn.runtime.trace import Quantity, Trace
+from texts import PENDULUM, write
+
+
+@pytest.fixture
+def traces(tmp_path):
+    path = write(tmp_path, PENDULUM)
+    assert run(["simulate", "-q", path, "-o", "a.h5"]) == 0
+    assert run(["simulate", "-q", path, "-o", "b.h5", "--set", "l=1.4 m"]) == 0
+
+
+def made(traces):
+    """A trace of (name, unit, values)."""
+    time = np.linspace(0.0, 1.0, 11)
+    data = {n: Quantity(n, np.asarray(v(time)), u, None, None) for n, u, v in traces}
+    return Trace("made.h5", time, {}, {}, data)
+
+
+@pytest.mark.usefixtures("traces")
+def test_pictures(capsys):
+    assert run(["plot", "a.h5"]) == 0
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG\r\n")
+    assert "a.png: speed, x, y" in capsys.readouterr().err
+    assert run(["plot", "a.h5", "x", "audit/energy", "-o", "one.svg"]) == 0
+    text = Path("one.svg").read_text()
+    assert "audit.energy" in text
+    assert "time, s" in text
+    assert "swing of pendulum" in text
+    assert "speed" not in text
+    assert run(["plot", "a.h5", "b.h5", "x", "-o", "two.svg"]) == 0
+    assert ">b<" in Path("two.svg").read_text()
+
+
+@pytest.mark.usefixtures("traces")
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_the_same_trace_gives_the_same_bytes(kind):
+    for name in ("one", "two"):
+        assert run(["plot", "-q", "a.h5", "-o", f"{name}.{kind}"]) == 0
+    assert Path(f"one.{kind}").read_bytes() == Path(f"two.{kind}").read_bytes()
+
+
+@pytest.mark.usefixtures("traces")
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["a.h5", "sped"], "nearest: 'speed'"),
+        (["a.h5", "qqqqq"], "there are: "),
+        (["a.h5", "-o", "a.html"], ".html are not supported yet (planned: reports)"),
+        (["a.h5", "-o", "a.pdf"], "a picture is one of .png, .svg"),
+        (["a.h5", "-o", "a"], "a picture is one of .png, .svg"),
+    ],
+)
+def test_wrong_usage(arguments, said, capsys):
+    assert run(["plot", *arguments]) == 2
+    assert said in capsys.readouterr().err
+    assert sorted(p.suffix for p in Path().iterdir()) == [".h5", ".h5", ".sd"]
+
+
+def test_unreadable_files(tmp_path, capsys):
+    assert run(["plot", "none.h5"]) == 5
+    assert "none.h5: No such file or directory" in capsys.readouterr().err
+    Path("text.h5").write_text("not HDF5")
+    assert run(["plot", "text.h5"]) == 5
+    assert "text.h5" in capsys.readouterr().err
+    assert run(["plot", "."]) == 5
+
+
+@pytest.mark.usefixtures("traces")
+def test_a_picture_into_no_folder(capsys):
+    assert run(["plot", "a.h5", "-o", "no/such.png"]) == 5
+
+
+def test_layout_of_panels():
+    trace = made(
+        [
+            ("a", "m", np.sin),
+            ("b", "m", np.cos),
+            ("far", "m", lambda t: 50.0 + np.sin(t)),
+            ("force", "N", np.sin),
+            ("flat", "m", lambda t: 0.0 * t + 0.5),
+            ("tiny", "m", lambda t: 1e-3 * np.sin(t)),
+        ]
+    )
+    names = [panel.names for panel in panels_of([trace], trace.names)]
+    assert names == [["a", "b"], ["far"], ["force"], ["flat"], ["tiny"]]
+
+
+def test_names_and_values_that_are_hard_to_draw(tmp_path):
+    trace = made(
+        [
+            ("_hidden", "m", np.sin),
+            ("$x^2$", "m", np.cos),
+            ("угол", "1", np.sin),
+            ("距離", "m", np.sin),
+            ("nothing", "V", lambda t: t * np.nan),
+            ("endless", "V", lambda t: np.where(t > 0.5, np.inf, t)),
+        ]
+    )
+    from sysdyn.cli.picture import picture
+
+    text = picture([("made", trace)], trace.names, "svg").decode()
+    assert "_hidden" in text
+    assert "$x^2$" in text
+    assert "угол" in text
+
+
+def test_an_empty_trace_can_be_drawn():
+    trace = Trace("empty.h5", np.zeros(0), {"final": 0}, {}, {"x": Quantity("x", np.zeros(0), "m", 1.0, np.zeros(0))})
+    from sysdyn.cli.picture import picture
+
+    assert picture([("empty", trace)], ["x"], "png").startswith(b"\x89PNG")
+
+
+def test_many_quantities():
+    trace = made([(f"x{k}", f"m{k}", np.sin) for k in range(2, 19)])
+    from sysdyn.cli.picture import picture
+
+    assert picture([("made", trace)], trace.names, "png").startswith(b"\x89PNG")
+
+
+def test_curves_are_hermite_interpolants():
+    time = np.linspace(0.0, 3.0, 7)
+    data = {"x": Quantity("x", time**3, "m", None, 3.0 * time**2)}
+    fine, values = curve(Trace("cubic.h5", time, {}, {}, data), "x")
+    assert fine.size > 500
+    np.testing.assert_allclose(values, fine**3, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "text"),
+    [("1", ""), ("N.m", "N·m"), ("m/s^2", "m/s²"), ("V^-1", "V⁻¹"), ("kg.m2.s-2", "kg·m²·s⁻²"), ("(mm)/s", "(mm)/s")],
+)
+def test_units(unit, text):
+    assert unit_text(unit) == text

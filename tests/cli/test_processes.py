@@ -1,0 +1,161 @@
+"""The command as a process: interruptions, what it imports, what it costs."""
+
+import json
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from sysdyn.runtime.trace import Trace
+from texts import ENDLESS, PENDULUM, ROOT, environment, process, write
+
+
+def started(path, *options):
+    """A simulation that runs for long; returns when its trace exists."""
+    command = [sys.executable, "-m", "sysdyn.cli", "simulate", path, "-o", "out.h5", *options]
+    child = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    for _ in range(600):
+        if Path("out.h5").exists() or child.poll() is not None:
+            break
+        time.sleep(0.05)
+    assert child.poll() is None, child.communicate()
+    return child
+
+
+def test_exit_codes_of_the_process(tmp_path):
+    path = write(tmp_path, PENDULUM)
+    assert process("check", path).returncode == 0
+    assert process("check", path + "x").returncode == 5
+    assert process("chek", path).returncode == 2
+
+
+def test_interrupt_leaves_what_was_computed(tmp_path):
+    child = started(write(tmp_path, ENDLESS), "--max-wall", "60")
+    time.sleep(1.5)
+    child.send_signal(signal.SIGINT)
+    _, err = child.communicate(timeout=30)
+    assert child.returncode == 130
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    trace = Trace.open("out.h5")
+    assert not trace.final
+    assert trace.time.size > 100
+    assert trace.names == ("speed", "x", "y")
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.4, 1.1, 1.9])
+def test_kill_leaves_a_readable_trace(tmp_path, seconds):
+    child = started(write(tmp_path, ENDLESS), "--max-wall", "60")
+    time.sleep(seconds)
+    child.kill()
+    child.communicate(timeout=30)
+    for _ in range(3):
+        trace = Trace.open("out.h5")
+        assert not trace.final
+        assert trace["x"].values.size == trace.time.size
+    if seconds > 1.5:  # flushed at least every second
+        assert trace.time.size > 100
+
+
+def test_reader_that_goes_away(tmp_path):
+    command = f"{sys.executable} -m sysdyn.cli explain E208 | head -c 1"
+    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
+    assert "Traceback" not in ran.stderr
+
+
+def cost(code, *arguments):
+    """CPU seconds of a Python process."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=120, check=False
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert ran.returncode == 0, ran.stderr
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+COMMAND = "import sys; from sysdyn.cli.main import run; sys.exit(run(sys.argv[1:]))"
+
+
+def imported(*arguments):
+    """Top-level modules that a command has imported."""
+    code = (
+        "import sys; from sysdyn.cli.main import run; code = run(sys.argv[1:]);"
+        "print('\\n' + ' '.join(sorted({m.partition('.')[0] for m in sys.modules}))); sys.exit(code)"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=120, check=True
+    )
+    return set(ran.stdout.splitlines()[-1].split())
+
+
+HEAVY = {"numpy", "scipy", "sympy", "h5py", "matplotlib", "xarray", "lark"}
+
+
+def test_help_imports_nothing_heavy():
+    assert not imported("--help") & HEAVY
+    assert not imported("--version") & HEAVY
+    assert not imported("explain", "E208") & (HEAVY - {"lark"})
+
+
+def test_help_costs_little():
+    """Target 0.2 s of CPU over bare Python; the least of a few, since the machine is shared."""
+    bare = min(cost("pass") for _ in range(3))
+    helped = min(cost(COMMAND, "--help") for _ in range(3))
+    assert helped - bare < 0.2
+
+
+def test_fmt_and_plot_import_what_they_need(tmp_path):
+    path = write(tmp_path, PENDULUM)
+    assert not imported("fmt", "--check", path) & (HEAVY - {"lark"})
+
+
+@pytest.mark.parametrize("name", ["gallery/pendulum", "seed/rectifier_motor_crank", "benchmark/andrews"])
+def test_check_of_small_models_imports_no_algebra(name):
+    assert not imported("check", str(ROOT / "models" / f"{name}.sd")) & {"scipy", "sympy", "matplotlib", "h5py"}
+
+
+def test_check_of_200_unknowns_imports_no_algebra(tmp_path):
+    path = write(tmp_path, row_of_masses(50))
+    found = imported("check", path)
+    assert not found & {"scipy", "sympy"}
+
+
+def row_of_masses(masses):
+    """A model of 4 lines and 2 unknowns a mass."""
+    lines = ["model row {"]
+    for k in range(masses):
+        lines += [
+            f"  param m{k} = {1 + k % 7} kg",
+            f"  coord x{k}: translation = {k} mm",
+            f"  energy T* = 1/2*m{k}*x{k}'^2",
+            f"  energy V = 1/2*(3 N/m)*{f'(x{k} - x{k - 1})' if k else 'x0'}^2",
+        ]
+    return "\n".join([*lines, "}", "scene s of row {", "  time 0 s to 1 s", "  trace x0", "}", ""])
+
+
+def test_check_of_1000_lines_costs_less_than_a_second(tmp_path):
+    """Target 1 s of CPU, start of Python included (0.6 s measured on an idle machine of ours)."""
+    text = row_of_masses(249)
+    assert text.count("\n") >= 1000
+    path = write(tmp_path, text)
+    spent = min(cost(COMMAND, "check", path) for _ in range(2))
+    assert spent < 1.0
+
+
+def test_progress_is_silent_where_nobody_looks(tmp_path):
+    ran = process("simulate", write(tmp_path, PENDULUM))
+    assert "%" not in ran.stderr
+
+
+def test_home_that_cannot_be_written(tmp_path):
+    """The cache goes elsewhere; nothing is said."""
+    path = write(tmp_path, PENDULUM)
+    environ = environment(HOME="/nonexistent", SYSDYN_CACHE=None, XDG_CACHE_HOME=None, MPLCONFIGDIR=None)
+    ran = process("simulate", path, "--json", env=environ)
+    assert ran.returncode == 0, ran.stderr
+    assert json.loads(ran.stdout)["ok"]
+    assert process("plot", "model-swing.h5", env=environ).returncode == 0

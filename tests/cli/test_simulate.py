@@ -1,0 +1,282 @@
+"""`sysdyn simulate`: its options, and the trace that comes of them."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from sysdyn.cli.main import run
+from sysdyn.runtime.trace import Trace
+from texts import ARRAY, BROKEN, ENDLESS, PENDULUM, process, run_json, write
+
+
+def simulate(tmp_path, text, *options, exit_code=0):
+    """The trace of a text under options."""
+    path = write(tmp_path, text)
+    assert run(["simulate", "-q", path, "-o", "out.h5", *options]) == exit_code
+    return Trace.open("out.h5")
+
+
+def test_default_names_of_traces(tmp_path):
+    (tmp_path / "folder").mkdir()
+    path = write(tmp_path / "folder", PENDULUM, "a.b.sd")
+    assert run(["simulate", "-q", path]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.b-swing.h5", "folder"]
+
+
+def test_the_trace_is_as_the_contract_says(tmp_path):
+    simulate(tmp_path, PENDULUM)
+    with h5py.File("out.h5") as file:
+        assert file["time"].is_scale
+        assert file["time"].dtype == np.float64
+        for name, unit in (
+            ("x", "m"),
+            ("y", "mm"),
+            ("speed", "m/s"),
+            ("audit/energy", "J"),
+            ("audit/constraints", "1"),
+        ):
+            data = file[name]
+            assert data.attrs["units"] == unit.encode() or data.attrs["units"] == unit
+            assert data.attrs["long_name"]
+            assert data.dims[0].keys() == ["time"]
+            assert data.shape == file["time"].shape
+        assert file["x"].attrs["nominal"] == pytest.approx(np.max(np.abs(file["x"])), rel=1e-6)
+        assert file[file["x"].attrs["derivative"]].shape == file["time"].shape
+        wanted = {
+            "Conventions",
+            "title",
+            "source",
+            "model",
+            "scene",
+            "formulation",
+            "method",
+            "index",
+            "rtol",
+            "atol",
+            "model_sha256",
+            "statistics",
+            "timings",
+            "final",
+        }
+        assert set(file.attrs) == wanted
+        assert file.attrs["final"] == 1
+        assert dict(file["parameters"].items()).keys() == {"m", "l"}
+        assert file["parameters/l"][()] == 2.34
+
+        def no_objects(_, item):
+            if isinstance(item, h5py.Dataset):
+                assert item.dtype.kind in "fiuS"
+
+        file.visititems(no_objects)
+
+
+def test_two_runs_without_timings_are_equal_bit_for_bit(tmp_path):
+    path = write(tmp_path, PENDULUM)
+
+    def content(name):
+        found = {}
+        with h5py.File(name) as file:
+
+            def visit(place, item):
+                if isinstance(item, h5py.Dataset):
+                    found[place] = item[()].tobytes()
+                for key, value in item.attrs.items():
+                    if key not in ("DIMENSION_LIST", "REFERENCE_LIST"):
+                        found[place, key] = np.asarray(value).tobytes()
+
+            visit("/", file)
+            file.visititems(visit)
+        return found
+
+    for name in ("a.h5", "b.h5"):
+        assert process("simulate", "-q", path, "--no-timings", "-o", name).returncode == 0
+    one, other = content("a.h5"), content("b.h5")
+    assert one == other
+    assert ("/", "timings") not in one
+
+
+def test_xarray_opens_the_trace(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    simulate(tmp_path, PENDULUM)
+    with xarray.open_dataset("out.h5", engine="h5netcdf") as data:
+        assert data["x"].dims == ("time",)
+        assert "time" in data.coords
+        assert data["time"].size == 101
+        assert data["y"].attrs["units"] == "mm"
+        assert data["y"].attrs["long_name"]
+        assert float(data["x"].sel(time=0.0)) == 1.0
+
+
+def parameters(trace):
+    """Values by name."""
+    return {name: value for name, (value, _) in trace.parameters.items()}
+
+
+@pytest.mark.parametrize(
+    ("setting", "name", "value"),
+    [
+        ("l=1.5", "l", 1.5),
+        ("l = 1500 mm", "l", 1.5),
+        ("l=3 m/2", "l", 1.5),
+        ("l=hypot(0.9, 1.2)*1 m", "l", 1.5),
+        ("m=2e-1", "m", 0.2),
+        ("m=200 g", "m", 0.2),
+    ],
+)
+def test_set_a_parameter(tmp_path, setting, name, value):
+    trace = simulate(tmp_path, PENDULUM, "--set", setting)
+    assert parameters(trace)[name] == pytest.approx(value, rel=1e-15)
+
+
+def test_set_elements_sizes_and_inputs(tmp_path):
+    trace = simulate(tmp_path, ARRAY, "--set", "m[2]=3", "--set", "k=8 N/m")
+    assert parameters(trace) == {"n": 3.0, "m[1]": 1.0, "m[2]": 3.0, "m[3]": 1.0, "k": 8.0, "push": 0.0}
+    np.testing.assert_allclose(trace["last"].values[-1], 0.03 * np.cos(np.sqrt(8.0)), atol=3e-6)
+    trace = simulate(tmp_path, ARRAY, "--set", "n=5")
+    assert trace["last"].values[0] == pytest.approx(0.05)
+    trace = simulate(tmp_path, ARRAY, "--set", "push=0.5 N")
+    omega = np.sqrt(2.0)
+    assert trace["x[1]"].values[-1] == pytest.approx(0.25 + (0.01 - 0.25) * np.cos(omega), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("setting", "code", "said"),
+    [
+        ("L=2", "E910", "L"),
+        ("l=2 kg", None, "kg"),
+        ("l=2 parsnip", None, "parsnip"),
+        ("l=(", None, ""),
+        ("l=l0", "E101", "l0"),
+        ("m[1]=2", None, ""),
+        ("l=2\nsecond", None, ""),
+        ("l}=2", None, ""),
+        ("l=2; m=3", None, ""),
+    ],
+)
+def test_settings_that_make_no_sense(tmp_path, capsys, setting, code, said):
+    exit_code, found = run_json(capsys, "simulate", write(tmp_path, PENDULUM), "--set", setting)
+    assert exit_code in (1, 2)
+    errors = [d for d in found["diagnostics"] if d["severity"] == "error"]
+    assert errors
+    assert code is None or errors[0]["code"] == code
+    assert any(said in f"{d['message']} {d['help']}" for d in errors)
+    assert not Path("model-swing.h5").exists()
+
+
+def test_the_nearest_name_is_offered(tmp_path, capsys):
+    code, found = run_json(capsys, "simulate", write(tmp_path, ARRAY), "--set", "psh=1 N")
+    assert code == 1
+    assert "push" in found["diagnostics"][0]["help"]
+
+
+def test_until_and_at(tmp_path):
+    trace = simulate(tmp_path, PENDULUM, "--until", "500 ms", "--at", "0.1234,1 s/3,min(0.2, 0.3)*1 s")
+    assert trace.time[-1] == 0.5
+    for t in (0.1234, 1.0 / 3.0, 0.2):
+        assert np.min(np.abs(trace.time - t)) < 1e-15
+    assert simulate(tmp_path, PENDULUM, "--until", "0.25").time[-1] == 0.25
+
+
+@pytest.mark.parametrize("option", [("--until", "1 m"), ("--until", "x"), ("--at", "1 kg"), ("--max-wall", "2 V")])
+def test_times_with_other_units_are_refused(tmp_path, capsys, option):
+    assert run(["simulate", write(tmp_path, PENDULUM), *option]) == 1
+    assert option[0] in capsys.readouterr().err
+
+
+def test_formulation_index_and_tolerances_are_in_the_trace(tmp_path):
+    trace = simulate(tmp_path, PENDULUM, "--formulation", "hamiltonian", "--rtol", "1e-5", "--atol", "1e-9")
+    assert trace.attributes["formulation"] == "hamiltonian"
+    assert (trace.attributes["rtol"], trace.attributes["atol"]) == (1e-5, 1e-9)
+    assert trace.attributes["model_sha256"] != simulate(tmp_path, ARRAY).attributes["model_sha256"]
+    assert simulate(tmp_path, PENDULUM, "--index", "3").attributes["index"] == "3"
+
+
+def test_backends_agree(tmp_path):
+    c = simulate(tmp_path, PENDULUM)
+    numpy = simulate(tmp_path, PENDULUM, "--backend", "numpy")
+    np.testing.assert_allclose(c["x"].values, numpy["x"].values, atol=2e-4)
+
+
+def test_limits_leave_a_readable_trace(tmp_path, capsys):
+    path = write(tmp_path, PENDULUM)
+    assert run(["simulate", path, "--max-steps", "10", "-o", "out.h5"]) == 3
+    assert "the limit of steps is reached" in capsys.readouterr().err
+    trace = Trace.open("out.h5")
+    assert not trace.final
+    assert trace.statistics["steps"] == 10
+    assert run(["simulate", write(tmp_path, ENDLESS), "--max-wall", "300 ms", "-o", "out.h5"]) == 3
+    assert "the limit of wall time is reached" in capsys.readouterr().err
+    assert not Trace.open("out.h5").final
+
+
+def test_errors_leave_the_old_trace_alone(tmp_path):
+    simulate(tmp_path, PENDULUM)
+    before = Path("out.h5").read_bytes()
+    assert run(["simulate", "-q", write(tmp_path, BROKEN), "-o", "out.h5"]) == 1
+    assert Path("out.h5").read_bytes() == before
+
+
+def test_changing_parameters_compiles_nothing(tmp_path, monkeypatch):
+    cache = tmp_path / "cache"
+    monkeypatch.setenv("SYSDYN_CACHE", str(cache))
+    simulate(tmp_path, ARRAY)
+    before = sorted(cache.iterdir())
+    assert len(before) == 1
+    for setting in ("k=5 N/m", "m[1]=2 kg", "n=7", "push=1 N"):
+        simulate(tmp_path, ARRAY, "--set", setting)
+    assert sorted(cache.iterdir()) == before
+
+
+@pytest.mark.parametrize("compiler", ["/nonexistent/cc", "false"])
+def test_numpy_takes_over_without_a_compiler(tmp_path, capsys, monkeypatch, compiler):
+    monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("CC", compiler)
+    assert run(["simulate", write(tmp_path, PENDULUM)]) == 0
+    err = capsys.readouterr().err
+    assert "note N602" in err
+    assert "the NumPy backend takes over" in err
+    assert ", numpy\n" in err
+
+
+def test_an_empty_path_has_no_compiler(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CC", raising=False)
+    assert run(["simulate", write(tmp_path, PENDULUM)]) == 0
+    assert "note N602" in capsys.readouterr().err
+
+
+def test_to_standard_output(tmp_path):
+    path = write(tmp_path, PENDULUM)
+    ran = process("simulate", path, "-o", "-", text=False)
+    assert ran.returncode == 0
+    assert ran.stdout.startswith(b"\x89HDF")
+    assert b"swing of pendulum" in ran.stderr
+    drawn = process("plot", "-", "-o", "-", text=False, input=ran.stdout)
+    assert drawn.stdout.startswith(b"\x89PNG")
+    assert not list(tmp_path.glob("*.h5"))
+
+
+def test_progress_on_request(tmp_path):
+    path = write(tmp_path, ENDLESS)
+    ran = process("simulate", path, "--max-wall", "2.5", "--progress", "always")
+    assert ran.returncode == 3
+    assert " %" in ran.stderr
+    assert " %" not in process("simulate", path, "--max-wall", "1.5").stderr
+
+
+def test_what_the_start_moved_is_said(tmp_path, capsys):
+    assert run(["simulate", write(tmp_path, PENDULUM)]) == 0
+    assert "y: -2.1 -> -2.11556, asked for by phi rod" in capsys.readouterr().err
+
+
+def test_not_yet_is_said_with_a_code(tmp_path, capsys):
+    path = write(tmp_path, PENDULUM)
+    assert run(["simulate", path, "--redundancy", "drop"]) == 1
+    assert "N608" in capsys.readouterr().err
+    assert run(["simulate", path, "--level", "a=b"]) == 1
+    assert "N608" in capsys.readouterr().err
+    for option in (("--method", "radau"), ("--index", "0")):
+        assert run(["simulate", path, *option]) == 2
+        assert "not available" in capsys.readouterr().err
