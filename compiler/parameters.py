@@ -119,9 +119,11 @@ class Parameters:
         lookup = self.checked(parameter.place)
         shape = extents(box)
         if parameter.indices:
-            pairs = zip(parameter.indices, box, strict=True)
+            pairs = zip(parameter.indices, box, strict=False)  # indices that follow hold a list, or one value for all
             nest = tuple(Loop(name, const(first), const(last)) for name, (first, last) in pairs)
-            values = over(nest, parameter.values, lookup)[0]
+            columns = np.stack(over(nest, parameter.values, lookup), axis=-1)
+            rest = int(np.prod(shape[len(parameter.indices) :]))
+            values = np.broadcast_to(columns, (columns.shape[0], rest)).ravel()
         else:
             values = np.asarray([float(v) for v in evaluate(parameter.values, lookup)])
             if len(values) != int(np.prod(shape)):

@@ -72,6 +72,8 @@ class Calls(Context):
             return self._function(symbol, e)
         if isinstance(symbol, TableSymbol):
             return self._table(symbol, e)
+        if e.name == "energy_through" and len(e.args) == 1:
+            return self.through(e.args[0].value)
         if e.name in ("dot", "cross", "norm"):
             return self._vector_call(e)
         if e.name not in dim.FUNCTIONS:

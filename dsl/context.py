@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
 from sysdyn.dsl.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.expression import Node
-from sysdyn.dsl.network import Constraint, Loop
+from sysdyn.dsl.network import Branch, Constraint, Loop
 from sysdyn.dsl.symbols import Definition, InstanceSymbol, ParameterSymbol, Scope, Space, Typed, Vector
 from sysdyn.dsl.units import NONE, Dimension
 
@@ -32,6 +33,16 @@ class Use:
     place: Place
 
 
+@dataclass(slots=True)
+class Quadrature:
+    """The integral of a power since the start (J): a dynamic variable that only reading it brings into being."""
+
+    power: Node
+    shape: tuple[tuple[Node, Node], ...]
+    dimension: Dimension
+    place: Place
+
+
 class Failed(Exception):  # noqa: N818
     """The expression is wrong and has been reported."""
 
@@ -44,6 +55,9 @@ class Context:
         self.uses: list[Use] = []
         self.whole: set[str] = set()  # parameters used as sizes or indices
         self.inputs: set[str] = set()  # parameters that are inputs: no sizes
+        self.branches: list[Branch] = []  # those found so far
+        self.laws: dict[str, Any] = {}  # of branches, by family (elements.LawOf)
+        self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
         self.constraints: dict[str, list[Constraint]] = {}
         self._values: dict[Definition, Value | None] = {}
@@ -150,6 +164,10 @@ class Context:
 
     def resolve(self, expression: syntax.Expr) -> Value:
         """The value of an expression."""
+        raise NotImplementedError
+
+    def through(self, port: syntax.Expr) -> Typed:
+        """The energy that has gone into a component through one of its ports."""
         raise NotImplementedError
 
     def scalar(self, expression: syntax.Expr) -> Typed:

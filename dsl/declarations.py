@@ -32,7 +32,6 @@ _LATER = {
     syntax.Discrete: "discrete variable",
     syntax.When: "when",
     syntax.Every: "every",
-    syntax.Lossless: "lossless",
 }
 
 
@@ -71,8 +70,7 @@ class Declarations(Parameters):
             return
         decls = declared(statement)
         names = ", ".join(f"'{d.name}'" for d in decls)
-        planned = "planned: events and discrete time" if what != "lossless" else "planned: four formulations"
-        message = " ".join(filter(None, (what, names, f"is not supported yet ({planned})")))
+        message = " ".join(filter(None, (what, names, "is not supported yet (planned: events and discrete time)")))
         self.report.note("N608", message, self.place(statement.span))
         for decl in decls:
             self.enter(Unsupported(decl.name, what, self.place(decl.span)))

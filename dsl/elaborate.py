@@ -6,14 +6,17 @@ it.  What a later issue builds (events, inequalities) is reported as N608 with i
 
 from __future__ import annotations
 
+from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.dsl.files import FileScope
 from sysdyn.dsl.instances import Instances
+from sysdyn.dsl.network import Dynamic, Initial, Loop, State
 from sysdyn.dsl.parts import flatten
 from sysdyn.dsl.resolve import Failed
 from sysdyn.dsl.statements import STATEMENTS
 from sysdyn.dsl.symbols import Definition, Scope, Space
+from sysdyn.dsl.units import si
 
 
 class Elaborator(Instances):
@@ -80,6 +83,17 @@ class Elaborator(Instances):
                     chosen = [s for s in body if isinstance(s[0], kind)]
                     self.each(chosen, lambda s, m=method: m(self, s))  # type: ignore[misc]
                 self._definitions()
+
+    def quadratures(self) -> None:
+        """States for the integrals that traces, lets and expectations read."""
+        for name, found in self.resolver.quadratures.items():
+            loops = tuple(Loop(f"#e{k}", first, last) for k, (first, last) in enumerate(found.shape))
+            at = tuple(ex.index(loop.index) for loop in loops)
+            state = ex.var(name, "s", *at)
+            self.parts.states.append(State(name, found.shape, si(found.dimension), found.place))
+            self.parts.dynamics.append(Dynamic(state, found.power, loops, found.place))
+            self.parts.given.add(name)
+            self.parts.initials.append(Initial(state, ex.const(0.0), True, loops, found.place))
 
     def _definitions(self) -> None:
         """Resolve every let and output once, so that unused ones are checked too."""

@@ -669,6 +669,8 @@ def _show(node: Node, args: list[str]) -> str:
             base = family + (f"[{', '.join(args)}]" if args else "")
             if kind in ("q", "f"):
                 return base + _PRIMES.get((kind, order), "")
+            if kind[0] in "nb":  # of a node or branch
+                return f"{base}.{kind[1]}" + "'" * order
             suffix = {"p": ".p", "kappa": ".multiplier", "mu": ".multiplier"}.get(kind, "")
             return base + suffix + "'" * order
         case "sum":

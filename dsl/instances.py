@@ -75,7 +75,6 @@ class Instances(Statements):
         self.bodies: list[tuple[Space, list[Nested]]] = []
         self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
         self._waiting: dict[int, Callable[[], None]] = {}  # instances not yet elaborated, by their symbol
-        self._chain: list[str] = []
         self.resolver.awaken = self._awaken
 
     # -- frame ---------------------------------------------------------------------------------------------
@@ -230,6 +229,7 @@ class Instances(Statements):
             self._hidden(value, own, symbol.name)
             with self.resolver.inside(loops, bound), self.resolver.bound(own):
                 law = law_of(self.resolver, symbol, whole, side, value, kind, span)
+            self.resolver.laws[symbol.family.name] = law
             self.parts.branches.append(
                 self._branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))
             )
@@ -400,9 +400,10 @@ class Instances(Statements):
 
     def _component(self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol) -> None:
         self._waiting.pop(id(symbol), None)
-        if component.name in self._chain:
-            chain = " -> ".join((*self._chain[self._chain.index(component.name) :], component.name))
-            raise self.resolver.fail("E801", f"component contains itself: {chain}", s.component.span)
+        chain = (*self.current.chain, self.current.component)
+        if component.name in chain:
+            around = (*chain[chain.index(component.name) :], component.name)
+            raise self.resolver.fail("E801", f"component contains itself: {' -> '.join(around)}", s.component.span)
         at, shape = self._label(s)
         path = self.current.family(s.decl.name).name
         number = len(symbol.spaces)
@@ -416,14 +417,11 @@ class Instances(Statements):
             prefix=(*self.current.prefix, *at),
             around=(*self.current.around, *shape),
             component=component.name,
+            chain=chain,
         )
         level, body = choose_level(self, component, s, path)
         space.level = level
-        self._chain.append(component.name)
-        try:
-            self._fill(symbol, s, component, space, list(flatten(body)))
-        finally:
-            self._chain.pop()
+        self._fill(symbol, s, component, space, list(flatten(body)))
 
     def _fill(
         self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: list[Nested]

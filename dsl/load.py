@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sysdyn.dsl import checks, syntax
+from sysdyn.dsl import checks, graph_checks, syntax
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Place, Report, SourceText
@@ -118,9 +118,11 @@ def _network(
     read_scene: Scene | None = None
     if scene is not None:
         read_scene = reader.read(scene, Place(document.file.source, scene.name.span))
+    elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     known = Values(elaborator.parts.parameters, reader.elements)
     checks.values(elaborator, known, report)
+    graph_checks.run(elaborator, known, _read(elaborator.parts), report)
     if report.failed or any(d.code == "N608" for d in report):
         return None
     return _result(elaborator, reader, read_scene)

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
-from sysdyn.dsl.context import Failed, Use, Value
+from sysdyn.dsl.context import Failed, Quadrature, Use, Value
 from sysdyn.dsl.expression import Node
 from sysdyn.dsl.names import Names
-from sysdyn.dsl.network import Constraint
+from sysdyn.dsl.network import Branch, Constraint
 from sysdyn.dsl.symbols import (
     BranchSymbol,
     BundleNode,
@@ -41,7 +41,7 @@ from sysdyn.dsl.units import NONE, Dimension, multiply
 
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE}
-BRANCH = ("e", "f", "q", "p", "power")
+BRANCH = ("e", "f", "q", "p", "power", "energy", "T", "Tstar", "V", "Vstar")
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,12 +244,55 @@ class Members(Names):
         """e f q p of a branch, and the power it absorbs."""
         family, domain = symbol.family, symbol.domain
         at = (*family.prefix, *at)
-        if name == "power":
-            node = ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at))
-            return Typed(node, multiply(domain.effort.dimension, domain.flow.dimension))
         if name not in BRANCH:
             raise self.no_member(self._shown(e.base), e, BRANCH)
+        power = multiply(domain.effort.dimension, domain.flow.dimension)
+        if name == "power":
+            return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
+        if name == "energy":
+            return Typed(self._absorbed(symbol, at, power, e), multiply(power, dim.TIME))
+        if name in ("T", "Tstar", "V", "Vstar"):
+            return Typed(self._stored(symbol, at, name, power, e), multiply(power, dim.TIME))
         return Typed(ex.var(family.name, f"b{name}", *at), branch_dimension(domain, name))
+
+    def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
+        """The energy that a branch has absorbed since the start: a quadrature."""
+        family = symbol.family
+        counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
+        node = ex.mul(ex.var(family.name, "be", *counters), ex.var(family.name, "bf", *counters))
+        return self.quadrature(f"{family.name}.energy", node, family.whole, power, at, e)
+
+    def quadrature(
+        self,
+        name: str,
+        power: Node,
+        shape: tuple[tuple[Node, Node], ...],
+        dimension: Dimension,
+        at: tuple[Node, ...],
+        e: syntax.Expr,
+    ) -> Node:
+        """The integral of a power (over the counters #e0, #e1, ... of its shape) at one element."""
+        found = Quadrature(power, shape, multiply(dimension, dim.TIME), self.place(e.span))
+        self.quadratures.setdefault(name, found)
+        return ex.var(name, "s", *at)
+
+    def _stored(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member) -> Node:
+        """T, T* of a kinetic and V, V* of a potential store: half the product where the law is linear, else by power."""
+        family = symbol.family.name
+        kind, other = ("kinetic", "f") if name.startswith("T") else ("potential", "e")
+        law = self.laws.get(family)
+        if law is None or law.kind != kind:
+            what = "a kinetic" if kind == "kinetic" else "a potential"
+            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{name}': it is not {what} store", e.span)
+        one = ex.var(family, "bp" if kind == "kinetic" else "bq", *at)
+        two = ex.var(family, f"b{other}", *at)
+        own = [n for n in ex.variables(law.law) if n.op == "var" and n.data[0] == family]
+        slope = ex.derivative(law.law, own[0]) if own else ex.const(0.0)
+        linear = own and not ex.variables(slope)
+        if linear and ex.is_const(ex.substitute(law.law, {own[0]: ex.const(0.0)}), 0.0):
+            return ex.scale(0.5, ex.mul(one, two))
+        energy = self._absorbed(symbol, at, power, e)
+        return ex.sub(ex.mul(one, two), energy) if name.endswith("star") else energy
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
@@ -259,6 +302,37 @@ class Members(Names):
         branch = symbol.branches[k - 1]
         at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
         return self._changed(self.branch_quantity(branch, at, letter, e), base.change)
+
+    def port_power(self, e: syntax.Expr) -> tuple[str, Node, Dimension]:
+        """Name and power of `instance.port`: what the branches inside absorb through it."""
+        base = self.located(e.base) if isinstance(e, syntax.Member) else None
+        if base is None or not isinstance(e, syntax.Member) or not isinstance(base.symbol, InstanceSymbol):
+            raise self.fail("E102", "energy_through(label.port) wants a port of a component", e.span)
+        space, change = self.entered(base.symbol, base, e.base.span)
+        port = space.scope.symbols.get(e.name)
+        if not isinstance(port, PortSymbol):
+            raise self.fail("E407", f"'{self._shown(e.base)}' has no port '{e.name}'", e.span)
+        if change or space.around:
+            raise self.fail("N608", "energy_through of an array of components is not supported yet", e.span)
+        end, terms = port.end, []
+        common = "f" if end.domain.common == "effort" else "e"
+        for branch in self.connected(space.path):
+            for terminal, sign in ((branch.plus, 1.0), (branch.minus, -1.0)):
+                name = None if end.node is None else end.node.family.name
+                if terminal is not None and terminal.node == name and terminal.at == end.at and name is not None:
+                    terms.append((sign, ex.var(branch.name, f"b{common}", *branch.at)))
+        other = self.node_quantity(end, syntax.Member(e, "e" if common == "f" else "f", e.span))
+        power = multiply(end.domain.effort.dimension, end.domain.flow.dimension)
+        return f"{space.path}.{e.name}.energy", ex.mul(ex.linear(0.0, terms), other.node), power
+
+    def through(self, port: syntax.Expr) -> Typed:
+        """The energy that has gone into a component through one of its ports."""
+        name, node, power = self.port_power(port)
+        return Typed(self.quadrature(name, node, (), power, (), port), multiply(power, dim.TIME))
+
+    def connected(self, path: str) -> Iterable[Branch]:
+        """Branches inside an instance."""
+        return [b for b in self.branches if b.name == path or b.name.startswith(f"{path}.")]
 
     def _instance(self, symbol: InstanceSymbol, base: Located, e: syntax.Member) -> Value:
         space, change = self.entered(symbol, base, e.base.span)

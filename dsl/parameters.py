@@ -93,8 +93,6 @@ class Parameters(Frame):
             raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span)
         around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
         indices = (*around, *(loop.index for loop in own))
-        if family.prefix and len(values) > 1:
-            raise self.resolver.fail("E806", f"a list as parameter '{decl.name}' of an array of components", decl.span)
         self.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))
         self.parts.parameters[family.name] = Parameter(family.name, family.whole, unit, values, indices, place)
 

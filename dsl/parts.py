@@ -76,6 +76,7 @@ class Frame:
         self.report = report
         self.resolver = Resolver(report)
         self.parts = Parts()
+        self.resolver.branches = self.parts.branches
         self.scope = Scope()
         self.current = Space("", self.scope, self.scope, self.resolver.source)
 

@@ -207,6 +207,7 @@ class Space:
     prefix: tuple[Node, ...] = ()
     around: Shape = ()
     component: str = ""
+    chain: tuple[str, ...] = ()  # components around, for the check against recursion
     level: str | None = None
     bound: dict[str, Typed] = field(default_factory=dict)  # e f q p of the component's single branch
     ends: dict[str, Any] = field(default_factory=dict)  # of its branches (instances.Ends)

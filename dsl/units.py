@@ -60,7 +60,7 @@ _UNITS: dict[str, tuple[Dimension, Fraction, bool]] = {
     "K": (_dimension(K=1), _ONE, False),
     "mol": (_dimension(mol=1), _ONE, True),
     "cd": (_dimension(cd=1), _ONE, False),
-    "rad": (NONE, _ONE, False),
+    "rad": (NONE, _ONE, True),
     "sr": (NONE, _ONE, False),
     "deg": (NONE, _PI / 180, False),
     "turn": (NONE, 2 * _PI, False),

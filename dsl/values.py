@@ -54,11 +54,11 @@ class Values:
         return self._known[key]
 
     def _compute(self, parameter: Parameter, at: tuple[int, ...]) -> float:
-        if len(parameter.values) > 1:
-            k = at[0] - int(self.number(parameter.shape[0][0]))
-            return self.number(parameter.values[k]) if 0 <= k < len(parameter.values) else math.nan
         bound = {ex.index(name): float(i) for name, i in zip(parameter.indices, at, strict=False)}
-        return self.number(parameter.values[0], bound)
+        k = 0
+        if len(parameter.values) > 1:
+            k = at[-1] - int(self.number(parameter.shape[-1][0]))
+        return self.number(parameter.values[k], bound) if 0 <= k < len(parameter.values) else math.nan
 
     def bounds(self, node: Node, loops: Sequence[Loop]) -> tuple[float, float]:
         """Least and greatest value of an affine index over its loops (an empty loop gives inf, -inf)."""
