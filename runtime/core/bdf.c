@@ -8,6 +8,7 @@
 
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
+#define TRUST 0.02          /* least contraction assumed of a first correction (an exponential law may lie ahead) */
 #define SLOW 0.9            /* contraction above which Newton gives up */
 #define STAGNANT 0.1        /* of the tolerance: corrections this small that do not shrink are round-off */
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
@@ -195,7 +196,9 @@ static int iterate(sd_bdf *bdf, double t)
             if (rate > SLUGGISH)
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
-        if (bdf->contraction * size <= NEWTON_TOLERANCE)
+        /* a first correction is not believed beyond this, however fast earlier steps converged */
+        double contraction = m == 0 ? fmax(bdf->contraction, TRUST) : bdf->contraction;
+        if (contraction * size <= NEWTON_TOLERANCE)
             return SD_FINE;
     }
     return SD_NEWTON;
@@ -284,6 +287,7 @@ int sd_bdf_step(sd_bdf *bdf)
         if (cause) {
             /* Newton, a singular matrix, a number that is not finite: much smaller */
             bdf->newton_failures++;
+            bdf->jacobian_age = OLD_JACOBIAN; /* taken at a point that proved far off: its slopes mislead */
             reduce(bdf, 0.25);
         } else {
             bdf->rejected_steps++;
