@@ -174,6 +174,7 @@ class _Runs:
         self.names = _observed_names(system.description)
         self.instants, self.kinds = instants(options)
         self.path = Path(options.output)
+        self.target = self.path.resolve()
         self.statistics, self.last_statistics = Statistics(), Statistics()
         self.cpu = self.wall = 0.0
         self.number = 0
@@ -233,7 +234,7 @@ class _Runs:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
         self.number += 1
         first = self.done is None
-        target = self.path if first else self.path.with_name(f".{self.path.name}.part")
+        target = self.target if first else self.target.with_name(f".{self.target.name}.part")
         attributes: dict[str, str | float | int] = {
             **self.options.attributes,
             "rtol": float(rtol),
@@ -277,7 +278,8 @@ class _Runs:
         if not first:
             assert self.done is not None
             self.done[2].discard()
-            self.writer.path.replace(self.path)
+            self.writer.path.replace(self.target)
+            self.writer.path = self.target
 
     def nominal(self, largest: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""
@@ -418,6 +420,5 @@ def _close(runs: _Runs, achieved: Achieved | None, final: bool) -> None:
     if runs.done is None or runs.done[2].closed:
         return
     finished, _, writer = runs.done
-    writer.path = runs.path
     estimate = achieved.error_estimate if achieved is not None else None
     writer.finish(runs.nominal(finished.largest), runs.last_attributes(estimate), final)

@@ -136,7 +136,7 @@ def decay(function):
     """s' = function(t, s), one dynamic variable."""
     manifest, binding, module = models.small("", "0", states={"a": "-s_a"}, initial={"s_a": (1, True)})
 
-    def rows(p, ix, at, to, t, y, yd, r):  # noqa: PLR0917
+    def rows(p, ix, at, to, t, y, yd, r):
         k = next(k for k, row in enumerate(manifest["structure"]["rows"]) if row["block"] == "lambda")
         r[to[k]] += yd[0] - function(t, y[0])
 

@@ -67,6 +67,8 @@ def test_unwritable_paths_and_foreign_files(tmp_path):
         written(tmp_path / "no" / "such" / "folder.h5")
     with pytest.raises(TraceError):
         written(tmp_path)
+    with pytest.raises(TraceError, match="no regular file"):
+        written("/dev/null")
     (tmp_path / "text.h5").write_text("no trace")
     for name in ("text.h5", "missing.h5"):
         with pytest.raises(TraceError):
@@ -101,6 +103,7 @@ def test_a_full_disk_is_an_error_and_no_signal(tmp_path):
 
 def test_too_little_room_is_seen_before_anything_is_written(tmp_path, monkeypatch):
     writer = TraceWriter(tmp_path / "o.h5", [Column("x", 0, "m", "x", False)], 1, {})
+    assert Trace.open(tmp_path / "o.h5").time.size == 0
     writer.append(np.ones((10, 10)))
     writer.flush()
     real = os.statvfs(tmp_path)
@@ -110,6 +113,7 @@ def test_too_little_room_is_seen_before_anything_is_written(tmp_path, monkeypatc
     with pytest.raises(TraceError, match="no space"):
         writer.flush()
     assert Trace.open(tmp_path / "o.h5").time.size == 10
+    assert [item.name for item in tmp_path.iterdir()] == ["o.h5"]
 
 
 ENDLESS = """
