@@ -44,9 +44,7 @@ class Arithmetic(Context):
             if not isinstance(value, Vector) or (total is not None and len(value.items) != len(total)):
                 raise self.fail("E203", "an array is added to something of another size", term.span)
             signed = [Typed(ex.neg(v.node) if sign == "-" else v.node, v.dimension) for v in value.items]
-            total = (
-                signed if total is None else [self.add(a, b, term.span) for a, b in zip(total, signed, strict=True)]
-            )
+            total = signed if total is None else [self.add(a, b, term.span) for a, b in zip(total, signed, strict=True)]
         return Vector(tuple(total or ()))
 
     def _product(self, e: syntax.Product) -> Value:

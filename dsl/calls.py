@@ -57,7 +57,7 @@ class Calls(Context):
             if e.op == "sum":
                 total = self.add(total, value, e.body.span)
             elif e.op == "prod":
-                d = None if None in (total.dimension, value.dimension) else multiply(total.dimension, value.dimension)  # type: ignore[arg-type]
+                d = None if None in (total.dimension, value.dimension) else multiply(total.dimension, value.dimension)
                 total = Typed(ex.mul(total.node, value.node), d)
             else:
                 total = Typed(ex.call(e.op, total.node, value.node), total.dimension)

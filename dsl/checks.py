@@ -19,8 +19,8 @@ _CLASS = {k: k[-1] for k in ("nq", "nf", "np", "bq", "bf", "bp")} | {"be": "e", 
 
 
 def letter(node: Node) -> str:
-    """q f p e s kappa mu audit: nodes' and branches' quantities count as those of coordinates."""
-    kind = node.data[1]
+    """Kind q f p e s kappa mu audit: nodes' and branches' quantities count as those of coordinates."""
+    kind: str = node.data[1]
     return _CLASS.get(kind, kind)
 
 
@@ -59,7 +59,7 @@ def _misplaced(energy: Energy, node: Node, primal: bool) -> tuple[str | None, st
     if kind == "p" and function != "T":
         help_ = "energy T = ..." if function == "T*" else None
         return (
-            f"{function} is a function of {'f, q and t' if function != 'V' else 'q and t'}; it contains the momentum {node}",
+            f"{function} is a function of {'q and t' if function == 'V' else 'f, q and t'}; it holds momentum {node}",
             help_,
         )
     if kind == "f" and function == "T":
@@ -68,7 +68,9 @@ def _misplaced(energy: Energy, node: Node, primal: bool) -> tuple[str | None, st
 
 
 def _twice(model: Elaborator, report: Report) -> None:
-    coenergy = {n.data[0]: e for e in model.parts.energies if e.function == "T*" for n in unknowns_of(e.expression, "f")}
+    coenergy = {
+        n.data[0]: e for e in model.parts.energies if e.function == "T*" for n in unknowns_of(e.expression, "f")
+    }
     for energy in model.parts.energies:
         if energy.function == "T":
             for node in unknowns_of(energy.expression, "p"):
@@ -213,7 +215,11 @@ def _jumps(node: Node, at: Node) -> bool:
     """Whether the value differs on the two sides of at = 0 (others at a sampled point)."""
     leaves = [n for n in ex.topological([node]) if n.op in ("var", "param", "time", "index", "table")]
     values = {n: 0.3 + ((k + 1) * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
-    sides = [ex.evaluate([node], lambda n, x=x: x if n is at else values.get(n, 0.5))[0] for x in (-1e-9, 1e-9, 1.0)]
+
+    def side(x: float) -> float:
+        return ex.evaluate([node], lambda n: x if n is at else values.get(n, 0.5))[0]
+
+    sides = [side(x) for x in (-1e-9, 1e-9, 1.0)]
     return all(map(math.isfinite, sides)) and abs(sides[1] - sides[0]) > 1e-6 * (abs(sides[2]) + abs(sides[1]))
 
 

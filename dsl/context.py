@@ -202,7 +202,12 @@ class Context:
             if node.op in ("var", "time", "table"):
                 raise self.fail("E807", f"{what} depends on '{node}', which is no constant", expression.span)
             if node.op == "param" and node.data in self.inputs:
-                raise self.fail("E807", f"{what} depends on the input '{node.data}', which may vary", expression.span, help="a param")
+                raise self.fail(
+                    "E807",
+                    f"{what} depends on the input '{node.data}', which may vary",
+                    expression.span,
+                    help="a param",
+                )
             if node.op == "param":
                 self.whole.add(node.data)
             if node.op == "const" and node.data != node.data:
@@ -223,10 +228,12 @@ class Context:
         return None
 
     def is_number(self, value: Typed, e: syntax.Expr) -> None:
+        """Report a condition in the place of a number."""
         if value.truth:
             raise self.fail("E203", "a condition stands where a number is wanted", e.span)
 
     def add(self, a: Typed, b: Typed, span: syntax.Span) -> Typed:
+        """The sum of two values of one dimension."""
         if None not in (a.dimension, b.dimension) and a.dimension != b.dimension:
             raise self.fail("E203", f"the two operands differ: {dim.show(a.dimension)} + {dim.show(b.dimension)}", span)
         return Typed(ex.add(a.node, b.node), a.dimension if a.dimension is not None else b.dimension)

@@ -8,11 +8,11 @@ from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
 from sysdyn.dsl.calls import walk
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Related
-from sysdyn.dsl.network import Coordinate, Initial, NodeFamily, Parameter, Shape, State, Unknown
+from sysdyn.dsl.network import Coordinate, Initial, NodeFamily, Parameter, State, Unknown
 from sysdyn.dsl.parameters import Parameters
 from sysdyn.dsl.parts import declared
-from sysdyn.dsl.resolve import Failed
 from sysdyn.dsl.symbols import (
     BundleNode,
     BundleSymbol,
@@ -22,6 +22,7 @@ from sysdyn.dsl.symbols import (
     Family,
     NodeSymbol,
     ParameterSymbol,
+    PortSymbol,
     UnknownSymbol,
     Unsupported,
     nearest,
@@ -87,7 +88,7 @@ class Declarations(Parameters):
                 message = "a bundle has no single initial value"
                 raise self.resolver.fail("E207", message, statement.init.span, help="init name.member.q = ...")
             for decl in statement.decls:
-                members = {}
+                members: dict[str, NodeSymbol | PortSymbol] = {}
                 for member, domain_name in bundle.members:
                     domain = self.scope.find(domain_name)
                     assert isinstance(domain, DomainSymbol)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.dsl.files import FileScope
 from sysdyn.dsl.instances import Instances
 from sysdyn.dsl.network import Dynamic, Initial, Loop, State
 from sysdyn.dsl.parts import flatten
-from sysdyn.dsl.resolve import Failed
 from sysdyn.dsl.statements import STATEMENTS
 from sysdyn.dsl.symbols import Definition, Scope, Space
 from sysdyn.dsl.units import si
@@ -81,7 +81,7 @@ class Elaborator(Instances):
             with self.entering(space):
                 for kind, method in STATEMENTS.items():
                     chosen = [s for s in body if isinstance(s[0], kind)]
-                    self.each(chosen, lambda s, m=method: m(self, s))  # type: ignore[misc]
+                    self.each(chosen, lambda s, m=method: m(self, s))
                 self._definitions()
 
     def quadratures(self) -> None:

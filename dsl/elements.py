@@ -28,7 +28,7 @@ class LawOf:
 
 
 def own_variables(branch: BranchSymbol, at: tuple[Node, ...], suffix: str = "") -> dict[str, Typed]:
-    """e f q p of a branch under the names that its law uses."""
+    """Variables e f q p of a branch under the names that its law uses."""
     found = {}
     for letter in "efqp":
         node = ex.var(branch.family.name, f"b{letter}", *at)
@@ -53,7 +53,9 @@ def law_of(
     others = sorted(set(own) - {side})
     if side in own or len(others) > 1:
         names = ", ".join((side, *others))
-        raise context.fail("E303", f"the law must be solved for one port variable of its edge; it relates {names}", span)
+        raise context.fail(
+            "E303", f"the law must be solved for one port variable of its edge; it relates {names}", span
+        )
     if not others:
         return _source(context, branch, side, node, wanted, span)
     kind = _EDGES.get(frozenset((side, others[0])))
@@ -61,7 +63,9 @@ def law_of(
         raise _off_diagram(context, side, others[0], span)
     if wanted in ("effort", "flow"):
         help_ = f"that is a {kind}: '{kind}({side} = ...)'"
-        raise context.fail("E315", f"source '{branch.name}': its law is a function of its own {others[0]}", span, help=help_)
+        raise context.fail(
+            "E315", f"source '{branch.name}': its law is a function of its own {others[0]}", span, help=help_
+        )
     if wanted is not None and kind != wanted:
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
@@ -78,7 +82,9 @@ def _source(
             raise context.fail("E323", f"'{branch.name}' is a {wanted}, but its law gives {side}", span)
         return LawOf(wanted, side, node)
     if side not in "ef" or (wanted is not None and wanted[0] != side):
-        raise context.fail("E303", f"a source gives its effort or its flow, not {side}", span, help="'e = ...' or 'f = ...'")
+        raise context.fail(
+            "E303", f"a source gives its effort or its flow, not {side}", span, help="'e = ...' or 'f = ...'"
+        )
     return LawOf("effort" if side == "e" else "flow", side, node)
 
 
@@ -88,7 +94,9 @@ def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> 
         help_ = "write it as a dissipator: e = M(q)*f with M = dp/dq"
         return context.fail("E302", "p-q is the diagonal of the diagram: a memristive law", span, help=help_)
     requirement = "p' = e" if pair == frozenset("pe") else "q' = f"
-    message = f"a law must relate p-f, q-e or e-f; this one relates {side} and {other}, which {requirement} already fixes"
+    message = (
+        f"a law must relate p-f, q-e or e-f; this one relates {side} and {other}, which {requirement} already fixes"
+    )
     return context.fail("E301", message, span)
 
 
@@ -100,7 +108,7 @@ def _alone(context: Context, branch: BranchSymbol, kind: str, node: Node, span: 
         name, var_kind, _ = other.data
         if name != branch.family.name and var_kind in ("q", "nq", "bq", "p", "np", "bp"):
             what = "displacement" if var_kind.endswith("q") else "momentum"
-            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store exchanges work there and the law loses it"
+            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store works there, and the law loses it"
             function = "T*" if kind == "kinetic" else "V"
             raise context.fail("E304", message, span, help=f"energy {function} = ... with ports for both")
 
@@ -131,7 +139,9 @@ def ratio_of(
     message = f"law of '{name}': {side} is in {dim.show(dimension)}, the law in {{}}"
     node = context.wanted(value, dimension, "E208", message)
     far = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == partner.family.name}
-    near = [n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")]
+    near = [
+        n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")
+    ]
     expected = letter if kind == "transformer" else {"e": "f", "f": "e"}[letter]
     wrong = {"e": "f", "f": "e"}[expected]
     if expected not in far:

@@ -75,7 +75,7 @@ def _make(op: str, data: Any, args: tuple[Node, ...], key: Any = None) -> Node:
 def const(value: float) -> Node:
     """A number; -0.0 is 0.0."""
     value = float(value) + 0.0
-    return _make("const", value, (), key=value if value == value else "nan")
+    return _make("const", value, (), key=value if not math.isnan(value) else "nan")
 
 
 def param(name: str, *indices: Node) -> Node:
@@ -484,9 +484,8 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
             return mul(table(node.data[0], *node.args, order=node.data[1] + 1), dots[0])
         case "reduce":
             operator, name = node.data
-            first, last, body = node.args
             if operator == "sum":
-                return reduction("sum", name, first, last, dots[2])
+                return reduction("sum", name, node.args[0], node.args[1], dots[2])
             raise ValueError(f"the derivative of {operator}(... in ...) is not defined")
     raise AssertionError(node.op)
 
@@ -618,9 +617,11 @@ def _value(node: Node, values: Mapping[Node, Any], lookup: Callable[[Node], floa
 def _reduce(node: Node, first: int, last: int, lookup: Callable[[Node], float]) -> float:
     operator, name = node.data
     me = index(name)
-    items = [
-        evaluate([node.args[2]], lambda n, i=i: float(i) if n is me else lookup(n))[0] for i in range(first, last + 1)
-    ]
+
+    def at(i: int) -> float:
+        return evaluate([node.args[2]], lambda n: float(i) if n is me else lookup(n))[0]
+
+    items = [at(i) for i in range(first, last + 1)]
     match operator:
         case "sum":
             return math.fsum(items)
@@ -657,16 +658,17 @@ _PRIMES = {("q", 1): "'", ("f", 0): "'", ("f", 1): "''"}
 
 
 def _show(node: Node, args: list[str]) -> str:
+    data: Any = node.data
     match node.op:
         case "const":
             return number_text(node.data)
         case "param" | "index":
-            return node.data + (f"[{', '.join(args)}]" if args else "")
+            return str(data) + (f"[{', '.join(args)}]" if args else "")
         case "time":
             return "t"
         case "var":
-            family, kind, order = node.data
-            base = family + (f"[{', '.join(args)}]" if args else "")
+            family, kind, order = data
+            base = str(family) + (f"[{', '.join(args)}]" if args else "")
             if kind in ("q", "f"):
                 return base + _PRIMES.get((kind, order), "")
             if kind[0] in "nb":  # of a node or branch
@@ -713,7 +715,8 @@ def _show_sum(node: Node, args: list[str]) -> str:
 
 
 def _show_product(node: Node, args: list[str]) -> str:
-    above, below = [], []
+    above: list[str] = []
+    below: list[str] = []
     for e, a, n in zip(node.data, args, node.args, strict=True):
         base = _wrap(n, a)
         size = abs(e)

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import syntax
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Place, Related, Report, SourceText
 from sysdyn.dsl.network import Table
 from sysdyn.dsl.parse import parse
-from sysdyn.dsl.resolve import Failed, Resolver
+from sysdyn.dsl.resolve import Resolver
 from sysdyn.dsl.symbols import (
     BundleSymbol,
     ComponentSymbol,
@@ -234,7 +236,7 @@ class FileScope:
         axes = tuple(tuple(sorted({key[k] for key in values})) for k in range(len(units)))
         if len(units) == 1:
             keys = [_scaled(r.numbers[0], units[0]) for r in rows]
-            if len(keys) < 2 or any(a >= b for a, b in zip(keys, keys[1:], strict=False)):
+            if len(keys) < 2 or any(a >= b for a, b in pairwise(keys)):
                 message = f"the arguments of table {item.name.name} must increase from row to row, two rows at least"
                 self.report.error("E206", message, place)
                 return None

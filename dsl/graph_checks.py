@@ -64,7 +64,9 @@ def _mentioned(model: Elaborator) -> frozenset[str]:
     roots = [e.expression for e in model.parts.energies] + [c.expression for c in model.parts.constraints]
     roots += [n for w in model.parts.works for n in (w.effort, w.on)]
     roots += [b.on for b in model.parts.branches if b.on is not None]
-    return frozenset(n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] in ("ne", "nq", "nf", "np"))
+    return frozenset(
+        n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] in ("ne", "nq", "nf", "np")
+    )
 
 
 def _loops_of_sources(model: Elaborator, report: Report) -> None:
@@ -85,7 +87,9 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
         if a == b:
             what = "effort" if branch.kind == "effort" else "flow"
             others = [g.name for (kind, _), g in groups.items() if kind == branch.domain.name]
-            message = f"loop of {what} sources: {', '.join((*others, branch.name))} fix the {what} between two nodes twice"
+            message = (
+                f"loop of {what} sources: {', '.join((*others, branch.name))} fix the {what} between two nodes twice"
+            )
             report.error("E411", message, branch.place, help="an element with a law between them")
         parent[a] = b
         groups[branch.domain.name, branch.name] = branch
@@ -101,11 +105,11 @@ def _cutsets(model: Elaborator, report: Report) -> None:
     for node in model.parts.nodes:
         balanced = "flow" if node.domain.common == "effort" else "effort"
         touching = at.get((node.name, ()), [])
-        if not node.shape and len(touching) > 1 and node.domain.common == "effort":
-            if all(b.kind == balanced and not b.loops for b in touching):
-                names = ", ".join(b.name for b in touching)
-                message = f"cutset of {balanced} sources: the {balanced}s of {names} at node {node.name} must vanish in sum"
-                report.error("E412", message, node.place, help="an element that can take the difference")
+        alone = all(b.kind == balanced and not b.loops for b in touching)
+        if alone and not node.shape and len(touching) > 1 and node.domain.common == "effort":
+            names = ", ".join(b.name for b in touching)
+            message = f"cutset of {balanced} sources: the {balanced}s of {names} at node {node.name} must vanish in sum"
+            report.error("E412", message, node.place, help="an element that can take the difference")
 
 
 def _idle_branches(model: Elaborator, report: Report) -> None:
@@ -130,7 +134,9 @@ def _lossless(model: Elaborator, report: Report) -> None:
         place = Place(space.source, claims[0].span)
         wrong = next((b for b in inside if b.kind in ("dissipator", "effort", "flow", "kinetic", "potential")), None)
         if wrong is not None and wrong.kind in ("dissipator", "effort", "flow"):
-            message = f"'lossless' fails: '{wrong.name}' is a {wrong.kind}" + (" source" if wrong.kind != "dissipator" else "")
+            message = f"'lossless' fails: '{wrong.name}' is a {wrong.kind}" + (
+                " source" if wrong.kind != "dissipator" else ""
+            )
             report.error("E314", message, place)
 
 
@@ -150,11 +156,15 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
         return
     name = branch.name.rpartition("#")[0] or branch.name
     if branch.kind == "kinetic":
-        message = f"'{name}': the inertia is negative ({slope} = {value:g}): T* has no minimum and the motion is not determined"
+        message = (
+            f"'{name}': the inertia is negative ({slope} = {value:g}): the motion is not determined forward in time"
+        )
         report.error("E321", message, branch.place)
         return
     what = {"potential": "stiffness or capacitance", "dissipator": "resistance or damping"}[branch.kind]
     message = f"'{name}': negative {what} ({slope} = {value:g})"
     function = "V = 1/2*k*x.q^2" if branch.kind == "potential" else "D = 1/2*b*x.f^2"
     keyword = "energy" if branch.kind == "potential" else "content"
-    report.error("E325", message, branch.place, help=f"an unstable element that is meant is written as '{keyword} {function}'")
+    report.error(
+        "E325", message, branch.place, help=f"an unstable element that is meant is written as '{keyword} {function}'"
+    )

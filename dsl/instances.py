@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
 from sysdyn.dsl.calls import walk
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Place, Related
 from sysdyn.dsl.elements import ONE_PORTS, TWO_PORTS, law_of, own_variables, ratio_of
 from sysdyn.dsl.expression import Node
@@ -20,7 +21,6 @@ from sysdyn.dsl.levels import choose_level
 from sysdyn.dsl.network import Branch, Coupling, Shape, Terminal
 from sysdyn.dsl.parameters import Argument
 from sysdyn.dsl.parts import Nested, flatten
-from sysdyn.dsl.resolve import Failed
 from sysdyn.dsl.statements import Statements
 from sysdyn.dsl.symbols import (
     BranchSymbol,
@@ -74,7 +74,7 @@ class Instances(Statements):
         self.pending: list[Pending] = []
         self.bodies: list[tuple[Space, list[Nested]]] = []
         self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
-        self._waiting: dict[int, Callable[[], None]] = {}  # instances not yet elaborated, by their symbol
+        self._waiting: dict[int, list[Callable[[], None]]] = {}  # instances not yet elaborated, by their symbol
         self.resolver.awaken = self._awaken
 
     # -- frame ---------------------------------------------------------------------------------------------
@@ -129,14 +129,12 @@ class Instances(Statements):
             with self.entering(here):
                 self.each([(s, loops)], lambda statement: self._component(symbol, statement, component))
 
-        previous = self._waiting.get(id(symbol))
-        self._waiting[id(symbol)] = elaborate if previous is None else lambda: (previous(), elaborate())  # type: ignore[func-returns-value]
+        self._waiting.setdefault(id(symbol), []).append(elaborate)
         return elaborate
 
     def _awaken(self, symbol: InstanceSymbol) -> None:
         """Another statement reads an instance that has not been elaborated yet."""
-        do = self._waiting.pop(id(symbol), None)
-        if do is not None:
+        for do in self._waiting.pop(id(symbol), ()):
             do()
 
     def _label(self, s: syntax.Instance) -> tuple[tuple[Node, ...], Shape]:
@@ -166,7 +164,9 @@ class Instances(Statements):
         if kind in ONE_PORTS:
             if len(s.connections) != 1:
                 wants = "1 connection: label: component() a -> b"
-                raise self.resolver.fail("E402", f"'{s.decl.name}: {kind}' needs {wants}, has {len(s.connections)}", s.span)
+                raise self.resolver.fail(
+                    "E402", f"'{s.decl.name}: {kind}' needs {wants}, has {len(s.connections)}", s.span
+                )
             ends = self._ends(s, s.connections[0])
             symbol = self._branch_symbol(s, s.decl.name, self._domain_of(s, ends), shape)
             self._enter_element(symbol, symbol)
@@ -174,7 +174,9 @@ class Instances(Statements):
             return
         connections = [c for c in s.connections if not isinstance(c, syntax.Bind)]
         if len(connections) != 2:
-            raise self.resolver.fail("E402", f"'{s.decl.name}: {kind}' needs 2 branches, has {len(connections)}", s.span)
+            raise self.resolver.fail(
+                "E402", f"'{s.decl.name}: {kind}' needs 2 branches, has {len(connections)}", s.span
+            )
         both = [self._ends(s, c) for c in connections]
         one, two = (
             self._branch_symbol(s, f"{s.decl.name}#{k}", self._domain_of(s, e), shape) for k, e in enumerate(both, 1)
@@ -191,7 +193,9 @@ class Instances(Statements):
         if args[0].name is None:
             raise self.resolver.fail("E404", "positional argument", args[0].span, help=f"{sides[0]} = ...")
         if args[0].name not in sides:
-            raise self.resolver.fail("E405", f"'{kind}' has no law '{args[0].name}'", args[0].span, help=", ".join(sides))
+            raise self.resolver.fail(
+                "E405", f"'{kind}' has no law '{args[0].name}'", args[0].span, help=", ".join(sides)
+            )
         return args[0].name, args[0].value, args[0].span
 
     def _branch_symbol(self, s: syntax.Instance, name: str, domain: DomainSymbol, shape: Shape) -> BranchSymbol:
@@ -287,7 +291,9 @@ class Instances(Statements):
             if isinstance(node, syntax.Name) and node.name in own and self.scope.symbols.get(node.name) is not None:
                 what = {"e": "effort", "f": "flow", "q": "displacement", "p": "momentum"}[node.name[0]]
                 message = f"'{node.name}' in the law of '{name}' is the element's own {what}; it hides the outer name"
-                self.report.warning("W101", message, self.place(node.span), help="rename the outer one, or write it as a let")
+                self.report.warning(
+                    "W101", message, self.place(node.span), help="rename the outer one, or write it as a let"
+                )
 
     # -- connections ---------------------------------------------------------------------------------------
 
@@ -303,15 +309,24 @@ class Instances(Statements):
                 self._is_displacement(value.node, connection.expr)
                 return Ends(None, None, value, self._domain_on(connection.expr, value) or domain)
             case _:
-                raise self.resolver.fail("E407", f"'{s.component.names[0]}' has no port or input '{connection.name.name}'", connection.span)
+                raise self.resolver.fail(
+                    "E407", f"'{s.component.names[0]}' has no port or input '{connection.name.name}'", connection.span
+                )
         found = [e for e in (plus, minus) if e is not None]
         domains = [e.domain for e in found if e.domain is not None] or ([domain] if domain else [])
         if not domains:
-            raise self.resolver.fail("E403", f"the domain of '{s.decl.name}' cannot be inferred", connection.span, help="connect a node or name the coordinate")
+            raise self.resolver.fail(
+                "E403",
+                f"the domain of '{s.decl.name}' cannot be inferred",
+                connection.span,
+                help="connect a node or name the coordinate",
+            )
         if any(d.name != domains[0].name for d in domains):
             message = f"'{s.decl.name}' joins {domains[0].name} and {domains[1].name}"
             raise self.resolver.fail("E401", message, connection.span, help="a gyrator or transformer couples domains")
-        plus, minus = (e if e is not None and e.domain is not None else End(None, (), domains[0]) for e in (plus, minus))
+        plus, minus = (
+            e if e is not None and e.domain is not None else End(None, (), domains[0]) for e in (plus, minus)
+        )
         if plus.node is not None and plus.node is minus.node and plus.at == minus.at:
             message = f"both ends of '{s.decl.name}' are node {plus.node.name}"
             raise self.resolver.fail("E413", message, connection.span)
@@ -358,7 +373,12 @@ class Instances(Statements):
             case UnknownSymbol() if symbol.kind == "q" and symbol.domain is not None:
                 if symbol.domain.common == "effort":
                     help_ = f"'on {self._text(e)}' instead of '->'"
-                    raise self.resolver.fail("E415", f"'{symbol.name}' is a coordinate of a common-effort domain, not a node", e.span, help=help_)
+                    raise self.resolver.fail(
+                        "E415",
+                        f"'{symbol.name}' is a coordinate of a common-effort domain, not a node",
+                        e.span,
+                        help=help_,
+                    )
                 node = NodeSymbol(symbol.name, symbol.family, symbol.domain, symbol.place)
                 return self._node_end(node, found.indices, found.change, e)
             case Unsupported():
@@ -378,7 +398,12 @@ class Instances(Statements):
 
     def _domain_of(self, s: syntax.Instance, ends: Ends) -> DomainSymbol:
         if ends.domain is None:
-            raise self.resolver.fail("E403", f"the domain of '{s.decl.name}' cannot be inferred", s.span, help="connect a node or name the coordinate")
+            raise self.resolver.fail(
+                "E403",
+                f"the domain of '{s.decl.name}' cannot be inferred",
+                s.span,
+                help="connect a node or name the coordinate",
+            )
         return ends.domain
 
     def _domain_on(self, e: syntax.Expr, value: Typed) -> DomainSymbol | None:
@@ -399,7 +424,6 @@ class Instances(Statements):
     # -- components ----------------------------------------------------------------------------------------
 
     def _component(self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol) -> None:
-        self._waiting.pop(id(symbol), None)
         chain = (*self.current.chain, self.current.component)
         if component.name in chain:
             around = (*chain[chain.index(component.name) :], component.name)
@@ -448,14 +472,18 @@ class Instances(Statements):
         for arg in s.args or ():
             if arg.name is None:
                 names = ", ".join(head.parameters)
-                raise self.resolver.fail("E404", "positional argument", arg.span, help=f"name it: {names}" if names else None)
+                raise self.resolver.fail(
+                    "E404", "positional argument", arg.span, help=f"name it: {names}" if names else None
+                )
             if arg.name in head.inputs:
                 head.given[arg.name] = arg.value
                 continue
             if arg.name not in head.parameters:
                 near = nearest(arg.name, (*head.parameters, *head.inputs))
                 listed = f"nearest: '{near}'" if near else f"it has {', '.join(head.parameters) or 'none'}"
-                raise self.resolver.fail("E405", f"'{component.name}' has no parameter '{arg.name}'", arg.span, help=listed)
+                raise self.resolver.fail(
+                    "E405", f"'{component.name}' has no parameter '{arg.name}'", arg.span, help=listed
+                )
             found[arg.name] = (arg.value, self.resolver.resolve(arg.value))
         return found
 
@@ -490,7 +518,9 @@ class Instances(Statements):
                 case _:
                     if len(head.branches) != 1:
                         wants = ", ".join((*head.ports, *(b for b in head.branches if b))) or "no connection"
-                        raise self.resolver.fail("E402", f"'{s.decl.name}: {component.name}' is connected by name: {wants}", connection.span)
+                        raise self.resolver.fail(
+                            "E402", f"'{s.decl.name}: {component.name}' is connected by name: {wants}", connection.span
+                        )
                     self._bind_branch(s, component, head, space, next(iter(head.branches)), connection, bound)
         for name in (*head.ports, *head.branches):
             if name not in bound:
@@ -499,7 +529,9 @@ class Instances(Statements):
                 raise self.resolver.fail("E408", f"{what} of '{s.decl.name}' is not connected", s.span, help=help_)
         for name, statement in head.inputs.items():
             if name not in inputs and statement.value is None:
-                raise self.resolver.fail("E414", f"input '{name}' of '{s.decl.name}' is not bound", s.span, help=f"{name} = ...")
+                raise self.resolver.fail(
+                    "E414", f"input '{name}' of '{s.decl.name}' is not bound", s.span, help=f"{name} = ..."
+                )
         return inputs
 
     def _bind(
@@ -525,7 +557,9 @@ class Instances(Statements):
             near = nearest(name, (*head.ports, *head.inputs, *head.branches))
             names = ", ".join((*head.ports, *head.inputs, *filter(None, head.branches)))
             help_ = f"nearest: '{near}'" if near else f"it has {names or 'none'}"
-            raise self.resolver.fail("E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_)
+            raise self.resolver.fail(
+                "E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_
+            )
 
     def _bind_port(self, s: syntax.Instance, head: Head, space: Space, name: str, value: syntax.Expr) -> None:
         word = head.ports[name].domain
@@ -534,7 +568,9 @@ class Instances(Statements):
         if isinstance(wanted, BundleSymbol):
             found = self.resolver.located(value)
             if found is None or not isinstance(found.symbol, BundleNode):
-                raise self.resolver.fail("E401", f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}", value.span)
+                raise self.resolver.fail(
+                    "E401", f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}", value.span
+                )
             members: dict[str, NodeSymbol | PortSymbol] = {}
             for member, inner in found.symbol.members.items():
                 if isinstance(inner, PortSymbol):
@@ -549,10 +585,10 @@ class Instances(Statements):
             message = f"'{word.name}' is not a domain"
             self.report.error("E202", message, Place(space.source, word.span))
             raise Failed
-        end = self.end(value, wanted)
-        assert end is not None
-        self._same_domain(s, f"port '{name}'", wanted, end, value)
-        space.scope.symbols[name] = PortSymbol(name, end, place)
+        bound_to = self.end(value, wanted)
+        assert bound_to is not None
+        self._same_domain(s, f"port '{name}'", wanted, bound_to, value)
+        space.scope.symbols[name] = PortSymbol(name, bound_to, place)
 
     def _same_domain(self, s: syntax.Instance, what: str, wanted: DomainSymbol, end: End, value: syntax.Expr) -> None:
         if end.domain.name != wanted.name:
@@ -571,6 +607,9 @@ class Instances(Statements):
     ) -> None:
         if name not in head.branches:
             raise self.resolver.fail("E407", f"'{component.name}' has no branch '{name}'", connection.span)
+        if name in bound:
+            message = f"'{s.decl.name}: {component.name}' needs 1 connection, has {len(s.connections)}"
+            raise self.resolver.fail("E402", message, connection.span)
         word = head.branches[name].domain
         wanted = space.scope.find(word.name)
         if not isinstance(wanted, DomainSymbol):
@@ -588,9 +627,7 @@ class Instances(Statements):
             space.bound.update(own_variables(symbol, space.prefix))
         bound.add(name)
 
-    def _bind_inputs(
-        self, s: syntax.Instance, space: Space, head: Head, inputs: dict[str, syntax.Expr]
-    ) -> None:
+    def _bind_inputs(self, s: syntax.Instance, space: Space, head: Head, inputs: dict[str, syntax.Expr]) -> None:
         sight = self.resolver.sight()
         for name, statement in head.inputs.items():
             with self.entering(space):
@@ -655,7 +692,9 @@ class Head:
                 case syntax.Port():
                     self.ports |= dict.fromkeys((d.name for d in statement.decls), statement)
                 case syntax.Branch():
-                    self.branches |= dict.fromkeys((d.name for d in statement.decls) if statement.decls else ("",), statement)
+                    self.branches |= dict.fromkeys(
+                        (d.name for d in statement.decls) if statement.decls else ("",), statement
+                    )
 
 
 def _terminal(end: End) -> Terminal:

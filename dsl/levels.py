@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sysdyn.dsl import syntax
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Place
-from sysdyn.dsl.resolve import Failed
 from sysdyn.dsl.symbols import ComponentSymbol
 
 if TYPE_CHECKING:
@@ -69,6 +69,8 @@ def _extended(
 
 def _label(statement: syntax.Statement) -> str | None:
     """The label under which a statement can be replaced."""
-    if isinstance(statement, (syntax.Instance, syntax.Param, syntax.Let, syntax.Output, syntax.Constraint, syntax.Input)):
+    if isinstance(
+        statement, (syntax.Instance, syntax.Param, syntax.Let, syntax.Output, syntax.Constraint, syntax.Input)
+    ):
         return statement.decl.name
     return None

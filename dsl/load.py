@@ -12,13 +12,14 @@ from pathlib import Path
 from sysdyn.dsl import checks, graph_checks, syntax
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.elaborate import Elaborator
 from sysdyn.dsl.files import FileScope
 from sysdyn.dsl.network import Network, Scene
 from sysdyn.dsl.parse import parse
 from sysdyn.dsl.parts import Parts
-from sysdyn.dsl.resolve import Failed, Resolver
+from sysdyn.dsl.resolve import Resolver
 from sysdyn.dsl.scenes import SceneReader
 from sysdyn.dsl.symbols import Space, nearest
 from sysdyn.dsl.units import Dimension
@@ -122,8 +123,9 @@ def _network(
     checks.run(elaborator, report, required=required)
     known = Values(elaborator.parts.parameters, reader.elements)
     checks.values(elaborator, known, report)
-    graph_checks.run(elaborator, known, _read(elaborator.parts), report)
-    if report.failed or any(d.code == "N608" for d in report):
+    if not report.failed and not _incomplete(report):
+        graph_checks.run(elaborator, known, _read(elaborator.parts), report)
+    if report.failed or _incomplete(report):
         return None
     return _result(elaborator, reader, read_scene)
 
@@ -155,6 +157,11 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         couplings=tuple(parts.couplings),
         read=_read(parts),
     )
+
+
+def _incomplete(report: Report) -> bool:
+    """Whether a part of the text was left out."""
+    return any(d.code == "N608" for d in report)
 
 
 def _read(parts: Parts) -> frozenset[str]:

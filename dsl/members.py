@@ -155,6 +155,10 @@ class Members(Names):
             return self._changed(self.value(whole.symbol, e.span), whole.change)
         base = self.located(e.base)
         if base is None:
+            inner = e.base.base if isinstance(e.base, syntax.Item) else e.base
+            outer = self.located(inner.base) if isinstance(inner, syntax.Member) else None
+            if outer is not None and isinstance(outer.symbol, InstanceSymbol) and isinstance(inner, syntax.Member):
+                self._instance(outer.symbol, outer, inner)  # says what the instance lacks
             root = _root(e.base)
             if root is not None and root.name not in self._bound and self.scope.find(root.name) is None:
                 raise self.unknown(root.name, root.span)
@@ -185,7 +189,10 @@ class Members(Names):
             case ConstraintSymbol():
                 return self._constraint_member(symbol, base, e)
             case NodeSymbol():
-                at = (*symbol.family.prefix, *self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e)))
+                at = (
+                    *symbol.family.prefix,
+                    *self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e)),
+                )
                 return self._changed(self.node_quantity(End(symbol, at, symbol.domain), e), base.change)
             case PortSymbol():
                 return self._changed(self.node_quantity(symbol.end, e), base.change)
@@ -222,7 +229,7 @@ class Members(Names):
         return self._changed(Typed(ex.var(family, kind, *at), dimension), base.change)
 
     def node_quantity(self, end: End, e: syntax.Member) -> Typed:
-        """e of a common-effort node, q and f of a common-flow node."""
+        """Member e of a common-effort node, q and f of a common-flow node."""
         domain = end.domain
         if domain.common == "effort":
             if e.name != "e":
@@ -241,7 +248,7 @@ class Members(Names):
         return Typed(ex.var(end.node.family.name, kind, *end.at), dimension)
 
     def branch_quantity(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, e: syntax.Member) -> Typed:
-        """e f q p of a branch, and the power it absorbs."""
+        """Members e f q p of a branch, and the power it absorbs."""
         family, domain = symbol.family, symbol.domain
         at = (*family.prefix, *at)
         if name not in BRANCH:
@@ -276,8 +283,10 @@ class Members(Names):
         self.quadratures.setdefault(name, found)
         return ex.var(name, "s", *at)
 
-    def _stored(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member) -> Node:
-        """T, T* of a kinetic and V, V* of a potential store: half the product where the law is linear, else by power."""
+    def _stored(
+        self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member
+    ) -> Node:
+        """Energies T, T*, V, V* of a store: half the product where the law is linear, else its power's integral."""
         family = symbol.family.name
         kind, other = ("kinetic", "f") if name.startswith("T") else ("potential", "e")
         law = self.laws.get(family)

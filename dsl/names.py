@@ -126,13 +126,19 @@ class Names(Context):
             case NodeSymbol() | PortSymbol() | BundleNode():
                 domain = symbol.domain if isinstance(symbol, NodeSymbol) else None
                 common = domain.common if domain else "effort"
-                help_ = f"write {symbol.name}.e (potential)" if common == "effort" else f"write {symbol.name}.q or {symbol.name}.f"
+                help_ = (
+                    f"write {symbol.name}.e (potential)"
+                    if common == "effort"
+                    else f"write {symbol.name}.q or {symbol.name}.f"
+                )
                 raise self.fail("E104", f"node '{symbol.name}' is not a value", span, help=help_)
             case ConstraintSymbol():
                 help_ = "write its member: multiplier, residual, on(...)"
                 raise self.fail("E104", f"constraint '{symbol.name}' is not a value", span, help=help_)
             case BranchSymbol() | TwoPortSymbol() | InstanceSymbol():
-                raise self.fail("E104", f"element '{symbol.name}' is not a value", span, help=f"a member: {symbol.name}.f")
+                raise self.fail(
+                    "E104", f"element '{symbol.name}' is not a value", span, help=f"a member: {symbol.name}.f"
+                )
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
                 raise self.fail("E104", f"'{symbol.name}' is not a value", span)
 
@@ -199,7 +205,9 @@ class Names(Context):
     def _declared(self, symbol: Definition, value: Value) -> None:
         if symbol.dimension is None or not isinstance(value, Typed) or value.dimension in (None, symbol.dimension):
             return
-        message = f"input '{symbol.name}' is declared {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
+        message = (
+            f"input '{symbol.name}' is declared {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
+        )
         raise self.fail("E207", message, symbol.expression.span)
 
     # -- elements of arrays --------------------------------------------------------------------------------
@@ -230,7 +238,9 @@ class Names(Context):
         plural = "index" if count == 1 else "indices"
         return self.fail("E805", f"'{name}' has {count or 'no'} {plural}, {given} given", span)
 
-    def own_element(self, symbol: ParameterSymbol | UnknownSymbol, indices: tuple[syntax.Index, ...], span: syntax.Span) -> Value:
+    def own_element(
+        self, symbol: ParameterSymbol | UnknownSymbol, indices: tuple[syntax.Index, ...], span: syntax.Span
+    ) -> Value:
         """`x[i]` of a parameter or unknown."""
         if len(indices) != len(symbol.shape):
             raise self.index_count(symbol.name, len(symbol.shape), len(indices), span)

@@ -8,11 +8,11 @@ from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
 from sysdyn.dsl.calls import walk
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Related
 from sysdyn.dsl.expression import Node
 from sysdyn.dsl.network import Parameter, Shape
 from sysdyn.dsl.parts import Frame, Nested
-from sysdyn.dsl.resolve import Failed
 from sysdyn.dsl.symbols import ParameterSymbol, Typed, Vector
 from sysdyn.dsl.unit_reading import read_unit
 from sysdyn.dsl.units import NONE, Dimension, Unit, si

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Place, Related, Report
 from sysdyn.dsl.expression import Node
 from sysdyn.dsl.network import (
@@ -28,7 +29,7 @@ from sysdyn.dsl.network import (
     Unknown,
     Work,
 )
-from sysdyn.dsl.resolve import Failed, Resolver
+from sysdyn.dsl.resolve import Resolver
 from sysdyn.dsl.symbols import ConstraintSymbol, Scope, Space, Symbol
 from sysdyn.dsl.unit_reading import read_unit
 from sysdyn.dsl.units import Unit
@@ -141,7 +142,9 @@ class Frame:
     def bounds(self, index: syntax.Index) -> tuple[Node, Node]:
         """`1..n`, `3` (for 1..3), or a loop variable, whose range it takes."""
         if isinstance(index, syntax.Range):
-            return self.resolver.whole_number(index.lower, "a bound"), self.resolver.whole_number(index.upper, "a bound")
+            return self.resolver.whole_number(index.lower, "a bound"), self.resolver.whole_number(
+                index.upper, "a bound"
+            )
         node = self.resolver.whole_number(index, "an index")
         inside = {ex.index(loop.index): loop for loop in self.resolver.loops}
         used = [n for n in ex.topological([node]) if n in inside]

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from sysdyn.dsl import syntax
 from sysdyn.dsl.arithmetic import Arithmetic
 from sysdyn.dsl.calls import Calls
-from sysdyn.dsl.context import Failed as Failed
 from sysdyn.dsl.context import Value
 from sysdyn.dsl.members import Members
 

@@ -8,13 +8,13 @@ from dataclasses import replace
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
+from sysdyn.dsl.context import Failed
 from sysdyn.dsl.diagnostics import Place, SourceText
 from sysdyn.dsl.elaborate import Elaborator
 from sysdyn.dsl.expression import Node
 from sysdyn.dsl.format import format_expression
 from sysdyn.dsl.members import Located
 from sysdyn.dsl.network import ElementSetting, Observation, Scene
-from sysdyn.dsl.resolve import Failed
 from sysdyn.dsl.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
 from sysdyn.dsl.unit_reading import read_unit
 from sysdyn.dsl.units import NONE, Dimension, Unit, si
@@ -131,7 +131,10 @@ class SceneReader:
         for item in items:
             self._check_setting(symbol, item, s)
         around = tuple(ex.substitute(n, found.change) for n in symbol.family.prefix)
-        at = (*around, *(self.resolver.whole_number(i, "an index") for i in found.indices if not isinstance(i, syntax.Range)))
+        at = (
+            *around,
+            *(self.resolver.whole_number(i, "an index") for i in found.indices if not isinstance(i, syntax.Range)),
+        )
         nodes = tuple(i.node for i in items)
         if symbol.truth:
             nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
@@ -141,7 +144,9 @@ class SceneReader:
                 raise self.resolver.index_count(symbol.name, len(symbol.shape), len(found.indices), s.target.span)
             self.elements.append(ElementSetting(parameter.name, at, nodes[0], place))
             return
-        if isinstance(value, Vector) and (len(parameter.shape) != 1 or not self.model.fits(parameter.shape, len(items))):
+        if isinstance(value, Vector) and (
+            len(parameter.shape) != 1 or not self.model.fits(parameter.shape, len(items))
+        ):
             message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
             raise self.resolver.fail("E805", message, s.value.span)
         self.model.parts.parameters[parameter.name] = replace(parameter, values=nodes, indices=(), place=place)

@@ -39,7 +39,9 @@ class Statements(Declarations):
             )
         left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
         dimension = self._sides(f"{s.kind} {s.decl.name}", left, right, s.right)
-        own = tuple(self.resolver.whole_number(i, "an index") for i in s.decl.indices if not isinstance(i, syntax.Range))
+        own = tuple(
+            self.resolver.whole_number(i, "an index") for i in s.decl.indices if not isinstance(i, syntax.Range)
+        )
         family = self.current.family(s.decl.name)
         at = (*family.prefix, *own)
         loops = {ex.index(loop.index) for loop in self.resolver.loops}
@@ -91,7 +93,11 @@ class Statements(Declarations):
     def _is_displacement(self, node: Node, where: syntax.Expr) -> None:
         others = [n for n in ex.variables(node) if n.op == "var" and n.data[1] not in ("q", "nq", "bq", "s")]
         if others:
-            what = f"the flow {others[0]}" if others[0].data[1] in ("f", "nf", "bf") else f"{others[0]}, which is no displacement"
+            what = (
+                f"the flow {others[0]}"
+                if others[0].data[1] in ("f", "nf", "bf")
+                else f"{others[0]}, which is no displacement"
+            )
             message = f"work on an expression that contains {what}"
             raise self.resolver.fail("E319", message, where.span, help="work is done on displacements: work E on q")
 

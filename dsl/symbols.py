@@ -10,10 +10,11 @@ from typing import Any
 from sysdyn.dsl import syntax
 from sysdyn.dsl.diagnostics import Place, SourceText
 from sysdyn.dsl.expression import Node
-from sysdyn.dsl.network import Domain as DomainSymbol
-from sysdyn.dsl.network import Loop, Shape
+from sysdyn.dsl.network import Domain, Loop, Shape
 from sysdyn.dsl.units import Dimension, Unit
 
+
+DomainSymbol = Domain
 
 @dataclass(frozen=True, slots=True)
 class Typed:

@@ -7,7 +7,7 @@ from fractions import Fraction
 from sysdyn.dsl import syntax
 from sysdyn.dsl.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.symbols import Scope, nearest
-from sysdyn.dsl.units import DEGREE_CELSIUS, NONE, Dimension, Unit, known, multiply, names
+from sysdyn.dsl.units import DEGREE_CELSIUS, NONE, Dimension, Unit, known, multiply, names, si_text
 
 
 def read_unit(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -> Unit | None:
@@ -32,7 +32,8 @@ def read_unit(unit: syntax.Unit, scope: Scope, source: SourceText, report: Repor
             )
             return None
         scale *= found[1] ** power
-    return Unit(dimension, scale, unit.text)
+    solved = any(factor.name.startswith("$") for factor in unit.factors)  # what the instance has made of $u
+    return Unit(dimension, scale, si_text(dimension) if solved else unit.text)
 
 
 def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: Place, report: Report) -> None:
@@ -45,6 +46,7 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: 
         )
         return
     message = f"'{factor.name}' is not a unit, in '{unit.text}'"
+    help_: str | None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
     if scope.find(factor.name) is not None and before:
         sign = "/" if factor.op == "/" else "*"

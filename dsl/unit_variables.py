@@ -82,7 +82,9 @@ def _solved(frame: Instances, s: syntax.Instance, names: set[str], equations: li
         rows = [_without(r, variable, exponents, value) for r in rows]
     wrong = next((r for r in rows if r[1]), None)
     if wrong is not None:
-        message = f"the unit variables of '{s.decl.name}' contradict each other at '{wrong[2]}' (off by {dim.show(wrong[1])})"
+        message = (
+            f"the unit variables of '{s.decl.name}' contradict each other at '{wrong[2]}' (off by {dim.show(wrong[1])})"
+        )
         raise frame.resolver.fail("E209", message, s.span)
     found: dict[str, Dimension] = {}
     for variable, exponents, value in reversed(solved):

@@ -136,12 +136,12 @@ def si_text(dimension: Dimension) -> str:
     return ".".join(above or ["1"]) + "".join(f"/{b}" for b in below)
 
 
-def _rank(item: tuple[str, Fraction]) -> tuple[int, str]:
+def _rank(item: tuple[str, Fraction | int]) -> tuple[int, str]:
     order = ("kg", "m", "s", "A", "K", "mol", "cd")
     return (order.index(item[0]) if item[0] in order else 9, item[0])
 
 
-def _factor(base: str, exponent: Fraction) -> str:
+def _factor(base: str, exponent: Fraction | int) -> str:
     if exponent == 1:
         return base
     return f"{base}^{exponent}" if exponent.denominator == 1 else f"{base}^({exponent})"

@@ -62,8 +62,8 @@ class Values:
 
     def bounds(self, node: Node, loops: Sequence[Loop]) -> tuple[float, float]:
         """Least and greatest value of an affine index over its loops (an empty loop gives inf, -inf)."""
-        low = {}
-        high = {}
+        low: dict[Node, float] = {}
+        high: dict[Node, float] = {}
         for loop in loops:
             me = ex.index(loop.index)
             low[me], high[me] = self.number(loop.first, low), self.number(loop.last, high)
