@@ -11,7 +11,7 @@ FORMULATIONS = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", 
 INDICES = ["auto", "3", "2", "2v", "1", "0"]
 
 
-class Setting(click.ParamType):
+class Setting(click.ParamType):  # type: ignore[type-arg]  # generic since click 8.3
     """NAME=VALUE as a pair of texts."""
 
     name = "NAME=VALUE"

@@ -25,7 +25,7 @@ SMOOTH = 600
 """Traces of fewer instants are interpolated: about one point a pixel."""
 COLOURS = ("#1f5fa8", "#d1495b", "#2f8f6b", "#e09f3e", "#7a4fa3", "#4aa5c4", "#8c5a3c", "#6b7280")
 STYLES = ("-", "--", ":", "-.")
-STYLE = {
+STYLE: dict[str, Any] = {
     "axes.edgecolor": "#9aa0a6",
     "axes.grid": True,
     "axes.labelcolor": "#30343b",
@@ -100,7 +100,7 @@ def picture(traces: Sequence[tuple[str, Trace]], names: Sequence[str], kind: str
     panels = panels_of([t for _, t in traces], names)
     columns = 1 if len(panels) <= 6 else 2
     rows = -(-len(panels) // columns)
-    with warnings.catch_warnings(), mpl.rc_context({**mpl.rcParamsDefault, **STYLE, "backend": "agg"}):
+    with warnings.catch_warnings(), mpl.rc_context(_style(mpl.rcParamsDefault)):
         warnings.simplefilter("ignore")  # names in scripts that the font lacks
         height = 1.0 + rows * max(1.9 if rows > 1 else 3.2, 2.6 - 0.2 * rows)
         figure = Figure(figsize=(7.2 * columns if columns == 1 else 11.0, height), layout="constrained")
@@ -122,6 +122,11 @@ def picture(traces: Sequence[tuple[str, Trace]], names: Sequence[str], kind: str
         none = {"Date": None} if kind == "svg" else {"Software": None}
         figure.savefig(data, format=kind, metadata=none)
     return data.getvalue()
+
+
+def _style(defaults: Any) -> Any:
+    """Matplotlib's own settings under ours: a person's configuration does not change a picture."""
+    return {**defaults, **STYLE, "backend": "agg"}
 
 
 def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:

@@ -9,6 +9,8 @@ from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Place, Related, Report
 from sysdyn.dsl.network import Expectation
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.implicit import undetermined
+from sysdyn.runtime.inertia import negative_inertia
 from sysdyn.runtime.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure import Structure, structure
 from sysdyn.runtime.system import System
@@ -33,6 +35,10 @@ def start(prepared: Prepared, t0: float, report: Report) -> Started | None:
         return None
     facts = structure(system, state)
     _structural(prepared, facts, report)
+    _inertia(prepared, system, state, report)
+    for name in undetermined(system, state):
+        place = next((u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place)
+        report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
     _statics(prepared, facts, report)
     return Started(system, state, facts)
 
@@ -93,6 +99,21 @@ def _structural(prepared: Prepared, facts: Structure, report: Report) -> None:
         report.error(
             "E516", message, prepared.network.place, help="inertia, stiffness, dissipation or a constraint is missing"
         )
+
+
+def _inertia(prepared: Prepared, system: System, state: ConsistentState, report: Report) -> None:
+    """E321: T* without a minimum leaves the motion undetermined forward in time."""
+    found = negative_inertia(system, state)
+    if found is None:
+        return
+    name, value = found
+    family = name.partition("[")[0].rstrip("'").removesuffix(".f")
+    places = {c.name: c.place for c in prepared.network.coordinates} | {b.name: b.place for b in prepared.network.branches}
+    places |= {n.name: n.place for n in prepared.network.nodes}
+    energies = [e.place for e in prepared.network.energies if e.function in ("T*", "T")]
+    where = energies[0] if len(energies) == 1 else places.get(family, prepared.network.place)
+    message = f"the inertia along {name} is negative ({value:g}): T* has no minimum"
+    report.error("E321", message, where, help="a positive mass, inertia or inductance")
 
 
 def _statics(prepared: Prepared, facts: Structure, report: Report) -> None:

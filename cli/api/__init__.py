@@ -35,7 +35,7 @@ class Module:
         self._prepared = prepared
         self._form = form
         self.manifest: dict[str, Any] = {**prepared.manifest, "index": index}
-        self._systems = {(): self._system(prepared.binding)}
+        self._systems: dict[tuple[tuple[str, float], ...], System] = {(): self._system(prepared.binding)}
         self.unknowns = self._systems[()].unknown_names
 
     def _system(self, binding: Binding) -> System:
