@@ -108,7 +108,7 @@ def _alone(context: Context, branch: BranchSymbol, kind: str, node: Node, span: 
         name, var_kind, _ = other.data
         if name != branch.family.name and var_kind in ("q", "nq", "bq", "p", "np", "bp"):
             what = "displacement" if var_kind.endswith("q") else "momentum"
-            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store works there, and the law loses it"
+            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store works there too"
             function = "T*" if kind == "kinetic" else "V"
             raise context.fail("E304", message, span, help=f"energy {function} = ... with ports for both")
 

@@ -670,11 +670,11 @@ def _show(node: Node, args: list[str]) -> str:
             family, kind, order = data
             base = str(family) + (f"[{', '.join(args)}]" if args else "")
             if kind in ("q", "f"):
-                return base + _PRIMES.get((kind, order), "")
+                return f"{base}{_PRIMES.get((kind, order), '')}"
             if kind[0] in "nb":  # of a node or branch
                 return f"{base}.{kind[1]}" + "'" * order
             suffix = {"p": ".p", "kappa": ".multiplier", "mu": ".multiplier"}.get(kind, "")
-            return base + suffix + "'" * order
+            return f"{base}{suffix}" + "'" * order
         case "sum":
             return _show_sum(node, args)
         case "mul":

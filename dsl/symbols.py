@@ -13,7 +13,6 @@ from sysdyn.dsl.expression import Node
 from sysdyn.dsl.network import Domain, Loop, Shape
 from sysdyn.dsl.units import Dimension, Unit
 
-
 DomainSymbol = Domain
 
 @dataclass(frozen=True, slots=True)
