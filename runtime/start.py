@@ -191,15 +191,29 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     return x
 
 
+def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Solution:
+    """Everything at once; magnitudes that proved wrong (currents of 1e-12 A at the guess) are taken anew."""
+    every = np.ones(starter.settled.rows, dtype=bool)
+    best = solve(_problem(starter, t, x, guess, rows=every, free=free), x)
+    for _ in range(3):
+        if best.residual < EXACT or not np.isfinite(best.residual):
+            break
+        again = solve(_problem(starter, t, best.x, guess, rows=every, free=free), best.x)
+        if not again.residual < best.residual:
+            break
+        best = again
+    return best
+
+
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> Solution:
     """What follows from the staged state; where nothing does, everything at once, then from perturbed points."""
     every = np.ones(starter.settled.rows, dtype=bool)
     x = _stages(starter, t, guess.copy(), guess, free)
-    best = solve(_problem(starter, t, x, guess, rows=every, free=free & starter.following(t, x)), x)
+    best = _rescaled(starter, t, x, guess, free & starter.following(t, x))
     if best.residual < EXACT:
         return best
     problem = _problem(starter, t, x, guess, rows=every, free=free)
-    best = solve(problem, x)
+    best = _rescaled(starter, t, x, guess, free)
     random = np.random.default_rng(20)
     for amplitude in _AMPLITUDES:
         if best.residual < EXACT:

@@ -161,3 +161,26 @@ def test_missing_fixed_values_are_counted():
     state = consistent_start(System(manifest, binding, load(module)), 0.0)
     assert state.freedom == 1
     assert "f_x" in state.guesses
+
+
+def test_junction_currents_of_1e_12_at_the_guess():
+    # seed system ebers_moll: the guess's currents are 1e-12 A, the start's 1.6e-3 A
+    made = models.small(
+        "1 2",
+        "0",
+        content="1000*f_1**2/2 + 4700*f_2**2/2",
+        work={"1": "1.6 - e_1", "2": "-10 - e_2"},
+        implicit=("1", "2"),
+        gamma={"emitter": "e_1 - s_e", "collector": "e_2 - s_c"},
+        states={
+            "e": "(f_1 - 1e-12*(exp(s_e/0.026) - 1) + 0.495*2e-12*(exp(s_c/0.026) - 1))/1e-7",
+            "c": "(f_2 + 0.99e-12*(exp(s_e/0.026) - 1) - 2e-12*(exp(s_c/0.026) - 1))/2e-8",
+        },
+        initial={"s_e": (0, True), "s_c": (-10, True), "e_2": (-10, False)},
+        intangible=("1", "2"),
+    )
+    system, state = started(made)
+    values = dict(zip(system.unknown_names, state.y, strict=True))
+    assert values["f_1"] == pytest.approx(1.6e-3, rel=1e-12)
+    assert values["e_2"] == pytest.approx(-10.0, rel=1e-12)
+    assert abs(values["f_2"]) < 1e-15
