@@ -38,6 +38,8 @@ def _file(console: Console, path: str) -> dict[str, object]:
         found.append(summary)
         if summary["ok"]:
             console.say(f"{path}: {target.name}: {_line(summary)}")
+    if not document.models and not document.scenes and not console.report.failed:
+        console.say(f"{path}: no model")
     return {"file": path, "models": list(document.models), "targets": found}
 
 

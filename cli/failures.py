@@ -53,6 +53,8 @@ def classify(error: BaseException) -> tuple[int, str]:
     if isinstance(error, OSError):
         name = f"{error.filename}: " if error.filename else ""
         return INPUT_OUTPUT, f"{name}{error.strerror or error}"
+    if isinstance(error, MemoryError):
+        return SOLVER, "there is no memory left"
     if type(error).__name__ == "TraceError":
         return INPUT_OUTPUT, str(error)
     return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} (SYSDYN_DEBUG=1 shows where; please report it)"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import INPUT_OUTPUT, classify
 from sysdyn.dsl.decoding import decode
 from sysdyn.dsl.diagnostics import SourceText
 from sysdyn.dsl.format import format_text
@@ -25,26 +26,36 @@ def command(console: Console, files: tuple[str, ...], check: bool, diff: bool) -
 
     A file whose text has syntax errors is left as it is.
     """
-    changed = []
+    changed, unread = [], False
     for name in files:
-        source = decode("<stdin>", sys.stdin.buffer) if name == "-" else SourceText.read(name)
-        tree, problems = parse(source)
-        console.report.extend(problems)
-        if any(d.severity == "error" for d in problems):
+        try:
+            differs = _one(console, name, check=check, diff=diff)
+        except OSError as error:
+            unread = True
+            console.complain(classify(error)[1], INPUT_OUTPUT)
             continue
-        text = format_text(tree)
-        if text != source.text:
+        if differs:
             changed.append(name)
-        if diff:
-            console.data("".join(_difference(source, text)))
-        elif name == "-" and not check:
-            console.data(text)
-        elif text != source.text and not check:
-            _replace(Path(name), text)
-    for name in changed:
-        console.say(f"{name}: {'not in the canonical layout' if check or diff else 'formatted'}")
+            console.say(f"{name}: {'not in the canonical layout' if check or diff else 'formatted'}")
     console.result = {"changed": changed}
-    return console.finish(1 if check and changed else 0)
+    return console.finish(INPUT_OUTPUT if unread else 1 if check and changed else 0)
+
+
+def _one(console: Console, name: str, *, check: bool, diff: bool) -> bool:
+    """Whether a file is in another layout; it is brought into the canonical one, unless that was not asked for."""
+    source = decode("<stdin>", sys.stdin.buffer) if name == "-" else SourceText.read(name)
+    tree, problems = parse(source)
+    console.report.extend(problems)
+    if any(d.severity == "error" for d in problems):
+        return False
+    text = format_text(tree)
+    if diff:
+        console.data("".join(_difference(source, text)))
+    elif name == "-" and not check:
+        console.data(text)
+    elif text != source.text and not check:
+        _replace(Path(name), text)
+    return text != source.text
 
 
 def _difference(source: SourceText, text: str) -> list[str]:

@@ -29,6 +29,8 @@ from sysdyn.runtime.simulate import Options, Outcome, Progress, simulate
 from sysdyn.runtime.trace import Parameter
 
 ACCURACY = 1e-4
+INSTANTS = 2e7
+"""Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
 LISTED = 1000
 """Elements of a parameter array that the trace lists: each is a data set of its own, about 0.5 kB and 60 us."""
 
@@ -143,8 +145,15 @@ def _options(
     every = value(scene.every) if scene.every is not None else None
     if every is not None and not every > 0.0:
         raise UsageError(f"the interval of the trace is {every:g} s: it must be positive")
+    if every is not None and (t1 - t0) / every > INSTANTS:
+        raise UsageError(f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants")
+    if wall is not None and not wall > 0.0:
+        raise UsageError(f"--max-wall {wall:g} s: it must be positive")
     accuracy, on = _accuracy(request, scene, prepared)
     solver = {name: value(node) for name, node in scene.solver_options}
+    method = request.method or scene.solver or "auto"
+    if method == "euler" and "step" not in solver:
+        raise UsageError("method euler needs a step: 'solver euler(step = 1 ms)' in the scene")
     steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), None)
     claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
     return Options(
@@ -158,7 +167,7 @@ def _options(
         accuracy_on=on,
         rtol=request.rtol,
         atol=request.atol,
-        method=request.method or scene.solver or "auto",
+        method=method,
         index=request.index or (f"{solver['index']:g}" if "index" in solver else "auto"),
         euler_step=solver.get("step"),
         max_steps=steps,

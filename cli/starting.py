@@ -37,7 +37,9 @@ def start(prepared: Prepared, t0: float, report: Report) -> Started | None:
     _structural(prepared, facts, report)
     _inertia(prepared, system, state, report)
     for name in undetermined(system, state):
-        place = next((u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place)
+        place = next(
+            (u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place
+        )
         report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
     _statics(prepared, facts, report)
     return Started(system, state, facts)
@@ -108,7 +110,9 @@ def _inertia(prepared: Prepared, system: System, state: ConsistentState, report:
         return
     name, value = found
     family = name.partition("[")[0].rstrip("'").removesuffix(".f")
-    places = {c.name: c.place for c in prepared.network.coordinates} | {b.name: b.place for b in prepared.network.branches}
+    places = {c.name: c.place for c in prepared.network.coordinates} | {
+        b.name: b.place for b in prepared.network.branches
+    }
     places |= {n.name: n.place for n in prepared.network.nodes}
     energies = [e.place for e in prepared.network.energies if e.function in ("T*", "T")]
     where = energies[0] if len(energies) == 1 else places.get(family, prepared.network.place)

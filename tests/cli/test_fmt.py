@@ -23,6 +23,13 @@ def test_in_place(tmp_path, capsys):
     assert [p.name for p in tmp_path.iterdir()] == ["model.sd"]
 
 
+def test_a_missing_file_does_not_stop_the_others(tmp_path, capsys):
+    path = write(tmp_path, UGLY)
+    assert run(["fmt", "missing.sd", path]) == 5
+    assert "missing.sd: No such file" in capsys.readouterr().err
+    assert (tmp_path / "model.sd").read_text() != UGLY
+
+
 def test_check_writes_nothing(tmp_path, capsys):
     path = write(tmp_path, UGLY)
     assert run(["fmt", "--check", path]) == 1
