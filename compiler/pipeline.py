@@ -1,6 +1,6 @@
 """Network -> CompiledModel: the list of arrows, each timed.
 
-energies -> integration -> lagrangian | hamiltonian -> program -> C or NumPy text
+primal -> energies -> integration -> lagrangian | hamiltonian -> program -> C or NumPy text
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from sysdyn.compiler.energies import EnergyModel
 from sysdyn.compiler.hamiltonian import hamiltonian
 from sysdyn.compiler.integration import integrate
 from sysdyn.compiler.lagrangian import lagrangian
+from sysdyn.compiler.primal import primal
 from sysdyn.compiler.program import Program
 from sysdyn.compiler.program_text import verify_program
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError
@@ -87,6 +88,8 @@ def compile_network(
 ) -> CompiledModel:
     """Lower a checked network; ModelError with everything the energies' rules found."""
     timings: list[Timing] = []
+    with _timed("primal", timings):
+        network, inverted = primal(network)
     with _timed("energies", timings):
         model = energies.energies(network)
         energies.verify_energies(model)
@@ -102,7 +105,7 @@ def compile_network(
         verify_program(program)
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
-    return CompiledModel(network, model, form, program, backend, text, (*notes, *found), tuple(timings))
+    return CompiledModel(network, model, form, program, backend, text, (*inverted, *notes, *found), tuple(timings))
 
 
 @contextmanager

@@ -1,0 +1,229 @@
+"""Initial conditions of a network as those of its coordinates; stores in series that start with different contents.
+
+In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + c, with c its own
+initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from sysdyn.compiler.primal.bounds import Box, shape_of
+from sysdyn.compiler.primal.incidence import PLUS, Element, Touch
+from sysdyn.compiler.primal.integrals import line
+from sysdyn.compiler.primal.laws import own
+from sysdyn.compiler.primal.potentials import Potentials
+from sysdyn.compiler.primal.reading import Piece, Ranges, Reader, touches_network
+from sysdyn.compiler.primal.series import Member
+from sysdyn.dsl.expression import (
+    Node,
+    both,
+    compare,
+    conditional,
+    const,
+    index,
+    is_const,
+    neg,
+    scale,
+    sub,
+    substitute,
+    var,
+    variables,
+)
+from sysdyn.dsl.network import Branch, Initial, Loop, Network, Parameter
+
+
+def charge(branch: Branch, effort: Node) -> Node | None:
+    """The displacement of a potential store at an effort; None where the law does not give it."""
+    if branch.kind != "potential" or branch.law is None:
+        return None
+    if branch.side == "q":
+        e = own(branch, "be")
+        return None if variables(branch.law) - {e} else substitute(branch.law, {e: effort})
+    q = own(branch, "bq")
+    straight = None if variables(branch.law) - {q} else line(branch.law, q)
+    return None if straight is None else straight.inverse(effort)
+
+
+def at_stores(network: Network, potentials: Potentials, reader: Reader) -> Iterator[Initial]:
+    """Initial conditions; those of a node's effort as those of a linear store between that node and ground."""
+    for initial in network.initials:
+        if initial.target.op == "var" and initial.target.data[1:] == ("ne", 0):
+            yield from _at_store(initial, potentials, reader)
+        else:
+            yield initial
+
+
+def _at_store(initial: Initial, potentials: Potentials, reader: Reader) -> Iterator[Initial]:
+    node = initial.target
+
+    def store(ranges: Ranges) -> Touch | None:
+        touches = potentials.known(reader, node.data[0], node.args, ranges).cell.touches
+        return next((t for t in touches if _between_ground(t)), None)
+
+    for loops, touch in reader.cut(initial.loops, initial.place, store):
+        if touch is None:
+            yield replace(initial, loops=loops)
+            continue
+        at = touch.loops_at(node.args)
+        target = var(touch.element.name, "be", *(a.at(at) for a in touch.element.at))
+        value = initial.value if touch.end == PLUS else neg(initial.value)
+        yield replace(initial, target=target, value=value, loops=loops)
+
+
+def _between_ground(touch: Touch) -> bool:
+    other = touch.element.ends[1 - touch.end].node
+    return not touch.free and other.startswith("#ground ") and charge(touch.element.branch, const(1.0)) is not None
+
+
+class Contents:
+    """Initial contents of potential stores: constants of followers, and the initial conditions that remain."""
+
+    def __init__(self, reader: Reader, members: Sequence[Member], initials: Sequence[Initial]) -> None:
+        self.reader = reader
+        self.initials = initials
+        self.parameters: list[Parameter] = []
+        self._given: dict[str, list[tuple[Initial, Box, Node]]] = {}
+        self._pinned: set[str] = set()
+        for initial in initials:
+            for part, box, content in self._contents(initial):
+                self._given.setdefault(part.target.data[0], []).append((part, box, content))
+        for element in dict.fromkeys(m.element for m in members if _follows(m)):
+            self._constant(element, [m for m in members if m.element is element and _follows(m)])
+
+    def _contents(self, initial: Initial) -> Iterator[tuple[Initial, Box, Node]]:
+        """The displacements that an initial condition gives to potential stores of series classes."""
+        target = initial.target
+        if target.op != "var" or target.data[1:] not in (("be", 0), ("bq", 0)) or variables(initial.value):
+            return
+
+        def found(ranges: Ranges) -> tuple[Box, Node] | None:
+            piece = self.reader.piece(target.data[0], target.args, ranges)
+            content = None if piece.member is None else self._charge(piece, initial)
+            held = {name: r.interval for name, r in ranges.items()}
+            box = tuple(a.over(held) for a in self.reader.affine(target.args, ranges))
+            return None if content is None else (box, content)
+
+        for loops, pair in self.reader.cut(initial.loops, initial.place, found):
+            if pair is not None:
+                yield replace(initial, loops=loops), *pair
+
+    def _charge(self, piece: Piece, initial: Initial) -> Node | None:
+        branch = piece.element.branch
+        if branch.kind != "potential":
+            return None
+        if initial.target.data[1] == "bq":
+            return initial.value
+        mark = index("#v")  # the value is over the statement's own loops: put in after the law's were replaced
+        found = charge(branch, mark)
+        if found is None:
+            return None
+        return substitute(self.reader.at_piece(found, piece, initial.target.args), {mark: initial.value})
+
+    def start(self, name: str, at: tuple[Node, ...]) -> Node:
+        """The initial content of a store: what the last statement about it says, else 0."""
+        value: Node = const(0.0)
+        for initial, box, content in self._given.get(name, []):
+            loops = [loop.index for loop in initial.loops]
+            places = [self.reader.sizes.affine(a, loops, initial.place) for a in initial.target.args]
+            pairs = zip(places, at, strict=True)
+            change = {index(a.loop): sub(node, a.offset.node) for a, node in pairs if a.loop is not None}
+            value = _within(box, at, substitute(content, change), value)
+        return value
+
+    def _constant(self, element: Element, members: Sequence[Member]) -> None:
+        """A parameter, unless it is zero by the text."""
+        counters = tuple(f"#c{k}" for k in range(len(element.at)))
+        at = tuple(index(name) for name in counters)
+        value: Node = const(0.0)
+        for m in members:
+            first = self.start(m.leader.name, m.leader_at(at))
+            value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
+        if is_const(value, 0.0):
+            return
+        taken, stem = {p.name for p in self.parameters}, f"{element.name}.content"
+        name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
+        unit, shape = element.branch.domain.displacement, shape_of(element.named)
+        self.parameters.append(Parameter(name, shape, unit, (value,), counters, element.branch.place))
+        self.reader.book.contents[element.number] = name
+
+    # -- initial conditions -------------------------------------------------------------------------------------
+
+    def resolved(self) -> Iterator[Initial]:
+        """The initial conditions of coordinates and other unknowns."""
+        for initial in self.initials:
+            if not touches_network(initial.target) and not touches_network(initial.value):
+                yield initial
+                continue
+            for loops, (kind, target, value) in self.reader.cut(
+                initial.loops,
+                initial.place,
+                lambda ranges, i=initial: self._one(i, ranges),  # type: ignore[misc]
+            ):
+                if kind == "pin":
+                    yield replace(initial, target=target, value=value, loops=loops)
+                elif kind == "run" and target.data[0] not in self._pinned:
+                    self._pinned.add(target.data[0])
+                    yield replace(initial, target=target, value=value, loops=self._without(loops, target))
+
+    def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
+        """The loops that the target still follows."""
+        used = {n.data for a in target.args for n in _leaves(a) if n.op == "index"}
+        return tuple(loop for loop in loops if loop.index in used)
+
+    def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
+        """(pin | run | drop, target, value) where one piece is read."""
+        target = initial.target
+        piece = None
+        if target.op == "var" and target.data[1] in ("be", "bq") and not variables(initial.value):
+            piece = self.reader.piece(target.data[0], target.args, ranges)
+        if piece is not None and piece.member is not None and self._charge(piece, initial) is not None:
+            m = piece.member
+            q = var(m.coordinate, "q", *m.indices(target.args))
+            first = self.start(m.leader.name, m.leader_at(target.args))
+            if m.leads:
+                content = self._charge(piece, initial)
+                assert content is not None
+                return "pin", q, content
+            own_leader = m.leader.number == m.element.number
+            return ("run", q, first) if own_leader or not self._given.get(m.leader.name) else ("drop", q, first)
+        if piece is not None and piece.member is None and (content := self._charge(piece, initial)) is not None:
+            moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
+            return "pin", *_pin(moved, content)
+        new, value = (self.reader.resolve(node, ranges) for node in (target, initial.value))
+        if target.op == "var" and target.data[1:] in _PINS and not variables(value):
+            return "pin", *_pin(new, value)
+        return "pin", new, value
+
+
+_PINS = frozenset((kind, 0) for kind in ("bf", "bq", "bp", "nf", "nq", "np"))
+
+
+def _pin(target: Node, value: Node) -> tuple[Node, Node]:
+    """An equation that is linear in one unknown as that unknown's value."""
+    unknowns = [n for n in variables(target) if n.op == "var"]
+    if len(unknowns) == 1 and not variables(target) - set(unknowns):
+        straight = line(target, unknowns[0])
+        if straight is not None:
+            return unknowns[0], straight.inverse(value)
+    return target, value
+
+
+def _follows(m: Member) -> bool:
+    return m.element.branch.kind == "potential" and not m.leads
+
+
+def _within(box: Box, at: tuple[Node, ...], value: Node, other: Node) -> Node:
+    """The value at indices in the box, the other elsewhere."""
+    pairs = list(zip(box, at, strict=True))
+    low = [compare("<=", i.first.node, node) for i, node in pairs]
+    high = [compare("<=", node, i.last.node) for i, node in pairs]
+    return conditional(both(*low, *high), value, other) if pairs else value
+
+
+def _leaves(node: Node) -> Iterator[Node]:
+    if not node.args:
+        yield node
+    for a in node.args:
+        yield from _leaves(a)
