@@ -8,7 +8,6 @@ from pathlib import Path
 import click
 from sysdyn.cli import targets
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import chosen
 from sysdyn.cli.prepare import Prepared, prepare
 from sysdyn.cli.starting import start
@@ -38,15 +37,15 @@ def command(
     explain: bool,
 ) -> int:
     """Compile the model of FILE: write DIR/residual.c (or .py) and DIR/manifest.json."""
-    if levels:
-        raise UsageError("--level is not supported yet (planned: levels)")
     document = targets.read(file, console.report)
     target = targets.one(document, file, model, scene, console.report)
     if target is None:
         return console.finish(1)
     with ex.fresh():
         required = target.scene is not None
-        network = load.network(target.document, target.model, target.scene, console.report, settings, required=required)
+        network = load.network(
+            target.document, target.model, target.scene, console.report, settings, levels=levels, required=required
+        )
         if network is None:
             return console.finish(1)
         if dump == "network":
@@ -64,8 +63,7 @@ def command(
             console.data(stages[dump]())
         if dump is None or folder is not None:
             _write(console, prepared, Path(folder or "."))
-    if not explain:  # notes on what was integrated are told on demand
-        console.report = type(console.report)(d for d in console.report if not d.code.startswith("N50"))
+    console.explain = explain
     return console.finish()
 
 

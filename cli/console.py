@@ -13,6 +13,8 @@ import click
 from sysdyn.cli.failures import envelope, plain
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Report
 
+ROUTINE = ("N501", "N601", "N602", "N603", "N604")
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -26,6 +28,7 @@ class Console:
         plain = bool(os.environ.get("NO_COLOR")) or not sys.stderr.isatty()
         self.color = color == "always" or (color == "auto" and not plain)
         self.report = Report()
+        self.explain = False
         self.result: dict[str, Any] = {}
         self._plain: list[dict[str, object]] = []
 
@@ -57,10 +60,14 @@ class Console:
             self._render(found)
         return code
 
+    def _routine(self, diagnostic: Diagnostic) -> bool:
+        """Notes on what the compiler did by rule: for --json, and for whoever asks by --explain."""
+        return diagnostic.code in ROUTINE and not self.explain
+
     def _render(self, found: Iterable[Diagnostic]) -> None:
         from sysdyn.dsl.render import render
 
-        shown = [d for d in found if not self.quiet or d.severity == "error"]
+        shown = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
         for diagnostic in shown:
             print(render(diagnostic, color=self.color), file=sys.stderr)
         errors = sum(d.severity == "error" for d in shown)

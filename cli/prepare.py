@@ -86,7 +86,7 @@ def _compiled(network: Network, formulation: str, backend: str, report: Report) 
         except build.BuildError as error:  # none there, or one that cannot build (no headers, no room)
             first = error.output.strip().splitlines()[:1]
             said = ": ".join([str(error), *first])
-            report.note("N602", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
+            report.note("N609", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
     compiled = compile_network(network, formulation, "numpy")
     return compiled, carrier.load(module_of(compiled.text)), "numpy"
 

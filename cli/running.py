@@ -89,7 +89,9 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     if target is None:
         return None
     with ex.fresh():
-        network = load.network(target.document, target.model, target.scene, report, request.settings)
+        network = load.network(
+            target.document, target.model, target.scene, report, request.settings, levels=request.levels
+        )
         if network is None or not _possible(request, network, report):
             return None
         prepared = prepare(network, report, formulation=request.formulation, backend=request.backend)
@@ -114,11 +116,10 @@ def _same(one: str, other: str) -> bool:
 def _possible(request: Request, network: Network, report: Report) -> bool:
     """What later issues build is refused by name."""
     wanted = request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
-    for what, asked in (("redundancy " + wanted, wanted != "error"), ("--level", bool(request.levels))):
-        if asked:
-            report.note("N608", f"{what} is not supported yet (planned: levels, four formulations)", network.place)
-            return False
-    return True
+    if wanted != "error":
+        message = f"redundancy {wanted} is not supported yet (planned: four formulations)"
+        report.note("N608", message, network.place)
+    return wanted == "error"
 
 
 def _options(

@@ -47,7 +47,6 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
         line.clear()
     if ran is None:
         return console.finish(1)
-    console.report = type(console.report)(d for d in console.report if not d.code.startswith("N50"))
     console.result = _result(ran)
     for text in (*shortened(described(ran.started.state)), *ran.outcome.warnings):
         console.say(text)

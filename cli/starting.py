@@ -11,6 +11,7 @@ from sysdyn.dsl.network import Expectation
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.implicit import undetermined
 from sysdyn.runtime.inertia import negative_inertia
+from sysdyn.runtime.order import order_and_manifold
 from sysdyn.runtime.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure import Structure, structure
 from sysdyn.runtime.system import System
@@ -41,7 +42,7 @@ def start(prepared: Prepared, t0: float, report: Report) -> Started | None:
             (u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place
         )
         report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
-    _statics(prepared, facts, report)
+    _statics(prepared, system, state, facts, report)
     return Started(system, state, facts)
 
 
@@ -120,7 +121,7 @@ def _inertia(prepared: Prepared, system: System, state: ConsistentState, report:
     report.error("E321", message, where, help="a positive mass, inertia or inductance")
 
 
-def _statics(prepared: Prepared, facts: Structure, report: Report) -> None:
+def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: Structure, report: Report) -> None:
     """`expect static`: claims about counts (E909)."""
     known = {
         "coordinates": facts.coordinates,
@@ -131,8 +132,16 @@ def _statics(prepared: Prepared, facts: Structure, report: Report) -> None:
         "redundant": facts.redundant,
         "index": facts.index,
     }
+    if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
+        tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
+        counted = order_and_manifold(system, state, tangible)
+        known |= {"order": counted[0], "manifold": counted[1]} if counted else {}
     for claim in prepared.network.statics:
         _static(prepared, claim, known, report)
+
+
+def _names(claim: Expectation) -> list[ex.Node]:
+    return [n for n in ex.topological([claim.left, claim.right]) if n.op == "param"]
 
 
 def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None], report: Report) -> None:
@@ -149,7 +158,7 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
 
     left, right = ex.evaluate([claim.left, claim.right], lookup)
     if missing:
-        message = f"static quantity '{missing[0]}' is not supported yet (planned: four formulations)"
+        message = f"static quantity '{missing[0]}' is not known for this model (too large, or undetermined)"
         report.note("N608", message, claim.place)
     elif not holds(claim.operator, left, right, 0.0):
         report.error(

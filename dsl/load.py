@@ -81,15 +81,16 @@ def network(
     report: Report,
     settings: Sequence[tuple[str, str]] = (),
     *,
+    levels: Sequence[tuple[str, str]] = (),
     required: bool = True,
 ) -> Network | None:
-    """The network of a model under a scene; settings are (name, value) of the command line.
+    """The network of a model under a scene; settings are (name, value), levels (path, name) of the command line.
 
     None where the report has errors, or N608: a network that lacks a part of the text
     is none.  required: parameters and inputs must have values.
     """
     with _deep():
-        return _network(document, model, scene, report, settings, required=required)
+        return _network(document, model, scene, report, settings, levels, required=required)
 
 
 def _network(
@@ -98,6 +99,7 @@ def _network(
     scene: syntax.Scene | None,
     report: Report,
     settings: Sequence[tuple[str, str]],
+    levels: Sequence[tuple[str, str]],
     *,
     required: bool,
 ) -> Network | None:
@@ -110,7 +112,11 @@ def _network(
         reader.levels(scene)
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_input)
+    for path, name in levels:
+        text = SourceText("--level", f"{path}={name}")
+        elaborator.levels[path] = (name, text.place(0, len(text.text)))
     elaborator.elements()
+    _unused_levels(elaborator, report)
     if scene is not None:
         reader.settings(scene)
     for source, statement in given:
@@ -128,6 +134,16 @@ def _network(
     if report.failed or _incomplete(report):
         return None
     return _result(elaborator, reader, read_scene)
+
+
+def _unused_levels(elaborator: Elaborator, report: Report) -> None:
+    """A level for a path that is no component is a mistake, not a wish."""
+    known = {space.path for space, _ in elaborator.bodies}
+    for path, (name, place) in elaborator.levels.items():
+        if path not in known and not report.failed:
+            near = nearest(path, known)
+            help_ = f"nearest: '{near}'" if near else None
+            report.error("E802", f"level {path} = {name}: there is no component '{path}'", place, help=help_)
 
 
 def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) -> Network:
