@@ -10,6 +10,11 @@ CHANGED = {
         {"M": 0.9, "w0": -0.5, "c": -0.1, "v_0": -0.4},
         {"w0": 0.42, "g": 3.7, "rho_0": -0.2, "v_0": 0.6},
     ],
+    "coulomb_planar": [  # friction has its law only while the particle moves
+        {"M": 1.3, "mu": 0.2},
+        {"mu": 0.4, "g": 3.7, "x_0": 0.5},
+        {"M": 2.6, "mu": 0.25, "y_0": -0.4},
+    ],
     "diode_circuit": [
         {"E": 3.5, "Rs": 17.0, "C": 1.2e-5},
         {"w": 200.0, "RL": 600.0, "a": 34.0, "v_0": 1.0},
