@@ -56,7 +56,7 @@ class Context:
         self.whole: set[str] = set()  # parameters used as sizes or indices
         self.inputs: set[str] = set()  # parameters that are inputs: no sizes
         self.branches: list[Branch] = []  # those found so far
-        self.laws: dict[str, Any] = {}  # of branches, by family (elements.LawOf)
+        self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
         self.constraints: dict[str, list[Constraint]] = {}

@@ -1,174 +1,221 @@
-"""Laws of elements: which edge of Paynter's diagram a law lies on, and what is wrong where it lies on none."""
+"""Elements between nodes: builtin one-ports and two-ports, and the branches that laws make."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
-from sysdyn.dsl.context import Context, Failed
+from sysdyn.dsl.calls import walk
+from sysdyn.dsl.connections import Connections, Ends
+from sysdyn.dsl.diagnostics import Place, Related, Report
 from sysdyn.dsl.expression import Node
-from sysdyn.dsl.members import branch_dimension
-from sysdyn.dsl.symbols import BranchSymbol, Typed
-
-ONE_PORTS = ("kinetic", "potential", "dissipator", "effort", "flow")
-TWO_PORTS = ("transformer", "gyrator")
-_EDGES = {frozenset("pf"): "kinetic", frozenset("qe"): "potential", frozenset("ef"): "dissipator"}
-_OTHER = {"kinetic": "pf", "potential": "qe", "dissipator": "ef"}
-
-
-@dataclass(frozen=True, slots=True)
-class LawOf:
-    """side = law of a branch, and the kind of element that it makes."""
-
-    kind: str
-    side: str
-    law: Node
+from sysdyn.dsl.laws import ONE_PORTS, law_of, own_variables, ratio_of
+from sysdyn.dsl.network import Branch, Coupling, Shape, Terminal
+from sysdyn.dsl.symbols import (
+    BranchSymbol,
+    DomainSymbol,
+    End,
+    Family,
+    Space,
+    TwoPortSymbol,
+    Typed,
+)
 
 
-def own_variables(branch: BranchSymbol, at: tuple[Node, ...], suffix: str = "") -> dict[str, Typed]:
-    """Variables e f q p of a branch under the names that its law uses."""
-    found = {}
-    for letter in "efqp":
-        node = ex.var(branch.family.name, f"b{letter}", *at)
-        found[f"{letter}{suffix}"] = Typed(node, branch_dimension(branch.domain, letter))
-    return found
+@dataclass(slots=True)
+class Pending:
+    """A law to be resolved when every name of the model is known."""
+
+    space: Space
+    loops: tuple[syntax.For, ...]
+    resolve: Callable[[], None]
 
 
-def law_of(
-    context: Context,
-    branch: BranchSymbol,
-    at: tuple[Node, ...],
-    side: str,
-    value: syntax.Expr,
-    wanted: str | None,
-    span: syntax.Span,
-) -> LawOf:
-    """Classify `side = value`; wanted: the kind that the author named (None in a component's law)."""
-    dimension = branch_dimension(branch.domain, side)
-    message = f"law of '{branch.name}': {side} is in {dim.show(dimension)}, the law in {{}}"
-    node = context.wanted(value, dimension, "E208", message)
-    own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
-    others = sorted(set(own) - {side})
-    if side in own or len(others) > 1:
-        names = ", ".join((side, *others))
-        raise context.fail(
-            "E303", f"the law must be solved for one port variable of its edge; it relates {names}", span
+class Elements(Connections):
+    """Elaborates builtin elements and component laws."""
+
+    def __init__(self, report: Report) -> None:
+        super().__init__(report)
+        self.pending: list[Pending] = []
+
+    def _builtin(self, s: syntax.Instance) -> None:
+        kind = s.component.names[0]
+        at, shape = self._label(s)
+        side, value, span = self._law_argument(s, kind)
+        if kind in ONE_PORTS:
+            if len(s.connections) != 1:
+                wants = "1 connection: label: component() a -> b"
+                raise self.resolver.fail(
+                    "E402", f"'{s.decl.name}: {kind}' needs {wants}, has {len(s.connections)}", s.span
+                )
+            ends = self._ends(s, s.connections[0])
+            symbol = self._branch_symbol(s, s.decl.name, self._domain_of(s, ends), shape)
+            self._enter_element(symbol, symbol)
+            self._later_law(symbol, at, side, value, kind, span, ends, s)
+            return
+        connections = [c for c in s.connections if not isinstance(c, syntax.Bind)]
+        if len(connections) != 2:
+            raise self.resolver.fail(
+                "E402", f"'{s.decl.name}: {kind}' needs 2 branches, has {len(connections)}", s.span
+            )
+        both = [self._ends(s, c) for c in connections]
+        one, two = (
+            self._branch_symbol(s, f"{s.decl.name}#{k}", self._domain_of(s, e), shape) for k, e in enumerate(both, 1)
         )
-    if not others:
-        return _source(context, branch, side, node, wanted, span)
-    kind = _EDGES.get(frozenset((side, others[0])))
-    if kind is None:
-        raise _off_diagram(context, side, others[0], span)
-    if wanted in ("effort", "flow"):
-        help_ = f"that is a {kind}: '{kind}({side} = ...)'"
-        raise context.fail(
-            "E315", f"source '{branch.name}': its law is a function of its own {others[0]}", span, help=help_
-        )
-    if wanted is not None and kind != wanted:
-        message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
-        raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
-    _alone(context, branch, kind, node, span)
-    return LawOf(kind, side, node)
+        self._enter_element(TwoPortSymbol(s.decl.name, (one, two), self.place(s.decl.span)), one)
+        self._later_ratio((one, two), at, (kind, side, value, span), (both[0], both[1]), s)
+
+    def _law_argument(self, s: syntax.Instance, kind: str) -> tuple[str, syntax.Expr, syntax.Span]:
+        sides = ("e", "f", "p", "q") if kind in ONE_PORTS else ("e1", "e2", "f1", "f2")
+        args = s.args or ()
+        if len(args) != 1:
+            help_ = f"{kind}({sides[0]} = ...)"
+            raise self.resolver.fail("E303", f"'{kind}' takes one law, {len(args)} given", s.span, help=help_)
+        if args[0].name is None:
+            raise self.resolver.fail("E404", "positional argument", args[0].span, help=f"{sides[0]} = ...")
+        if args[0].name not in sides:
+            raise self.resolver.fail(
+                "E405", f"'{kind}' has no law '{args[0].name}'", args[0].span, help=", ".join(sides)
+            )
+        return args[0].name, args[0].value, args[0].span
+
+    def _branch_symbol(self, s: syntax.Instance, name: str, domain: DomainSymbol, shape: Shape) -> BranchSymbol:
+        return BranchSymbol(name, self.current.family(name, shape), domain, self.place(s.decl.span))
+
+    def _enter_element(self, symbol: BranchSymbol | TwoPortSymbol, first: BranchSymbol) -> None:
+        """Enter a label; several loops over disjoint ranges may declare one."""
+        before = self.scope.symbols.get(symbol.name)
+        if type(before) is not type(symbol) or not first.family.shape:
+            self.enter(symbol)
+            return
+        assert isinstance(before, (BranchSymbol, TwoPortSymbol))
+        if isinstance(before, BranchSymbol) and isinstance(symbol, BranchSymbol):
+            self.scope.symbols[symbol.name] = _hull(before, symbol)
+        elif isinstance(before, TwoPortSymbol) and isinstance(symbol, TwoPortSymbol):
+            one, two = (_hull(a, b) for a, b in zip(before.branches, symbol.branches, strict=True))
+            self.scope.symbols[symbol.name] = TwoPortSymbol(symbol.name, (one, two), before.place)
+
+    def _later_law(
+        self,
+        symbol: BranchSymbol,
+        at: tuple[Node, ...],
+        side: str,
+        value: syntax.Expr,
+        kind: str | None,
+        span: syntax.Span,
+        ends: Ends,
+        s: syntax.Instance | syntax.Law,
+    ) -> None:
+        loops, bound = self.resolver.loops, self.resolver.sight()
+        whole = (*symbol.family.prefix, *at)
+
+        def resolve() -> None:
+            own = own_variables(symbol, whole)
+            self._hidden(value, own, symbol.name)
+            with self.resolver.inside(loops, bound), self.resolver.bound(own):
+                law = law_of(self.resolver, symbol, whole, side, value, kind, span)
+            self.resolver.laws[symbol.family.name] = law
+            self.parts.branches.append(
+                self._branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))
+            )
+
+        self.pending.append(Pending(self.current, (), resolve))
+
+    def _branch(
+        self,
+        symbol: BranchSymbol,
+        at: tuple[Node, ...],
+        loops: tuple,  # type: ignore[type-arg]
+        law: tuple[str, str | None, Node | None],
+        ends: Ends,
+        place: Place,
+    ) -> Branch:
+        kind, side, node = law
+        name = symbol.family.name
+        if ends.on is not None:
+            return Branch(name, at, loops, symbol.domain, kind, side, node, None, None, ends.on.node, place)
+        assert ends.plus is not None
+        assert ends.minus is not None
+        plus, minus = (_terminal(e) for e in (ends.plus, ends.minus))
+        return Branch(name, at, loops, symbol.domain, kind, side, node, plus, minus, None, place)
+
+    def _later_ratio(
+        self,
+        branches: tuple[BranchSymbol, BranchSymbol],
+        at: tuple[Node, ...],
+        law: tuple[str, str, syntax.Expr, syntax.Span],
+        ends: tuple[Ends, Ends],
+        s: syntax.Instance,
+    ) -> None:
+        loops, bound = self.resolver.loops, self.resolver.sight()
+        whole = (*branches[0].family.prefix, *at)
+        kind, side, value, span = law
+
+        def resolve() -> None:
+            own = {**own_variables(branches[0], whole, "1"), **own_variables(branches[1], whole, "2")}
+            self._hidden(value, own, s.decl.name)
+            with self.resolver.inside(loops, bound), self.resolver.bound(own):
+                ratio = ratio_of(self.resolver, branches, whole, kind, side, value, span)
+            place = self.place(s.span)
+            for symbol, end in zip(branches, ends, strict=True):
+                self.parts.branches.append(self._branch(symbol, whole, loops, ("port", None, None), end, place))
+            first, second = (b.family.name for b in branches)
+            self.parts.couplings.append(
+                Coupling(ratio.kind, first, second, whole, loops, ratio.side, ratio.ratio, place)
+            )
+
+        self.pending.append(Pending(self.current, (), resolve))
+
+    def _hidden(self, value: syntax.Expr, own: dict[str, Typed], name: str) -> None:
+        """W101: an element's own variable hides an outer name in its law."""
+        for node in walk(value):
+            if isinstance(node, syntax.Name) and node.name in own and self.scope.symbols.get(node.name) is not None:
+                what = {"e": "effort", "f": "flow", "q": "displacement", "p": "momentum"}[node.name[0]]
+                message = f"'{node.name}' in the law of '{name}' is the element's own {what}; it hides the outer name"
+                self.report.warning(
+                    "W101", message, self.place(node.span), help="rename the outer one, or write it as a let"
+                )
+
+    def law(self, s: syntax.Law) -> None:
+        """`law e = R*f`, `law b.e = ...`: the right edge of the diagram for a branch of the component."""
+        name, letter = "", None
+        if isinstance(s.left, syntax.Name):
+            letter = s.left.name
+        elif isinstance(s.left, syntax.Member) and isinstance(s.left.base, syntax.Name):
+            name, letter = s.left.base.name, s.left.name
+        symbol = self.scope.symbols.get(name)
+        if letter not in ("e", "f", "p", "q") or not isinstance(symbol, BranchSymbol):
+            message = "the law must be solved for one port variable of its edge"
+            raise self.resolver.fail("E303", message, s.left.span, help="'e = ...(f)'")
+        if name in self.current.laws:
+            related = (Related("the first law", self.current.laws[name]),)
+            message = f"branch '{name or self.current.path}' has two laws"
+            raise self.resolver.fail("E305", message, s.span, related=related)
+        self.current.laws[name] = self.place(s.span)
+        self._later_law(symbol, (), letter, s.right, None, s.span, self.current.ends[name], s)
+
+    def lawless(self, space: Space) -> None:
+        """Branches without a law stand in energies and constraints; E306 where they stand in nothing."""
+        for name, ends in space.ends.items():
+            symbol = space.scope.symbols[name]
+            if name in space.laws or not isinstance(symbol, BranchSymbol):
+                continue
+            where = self.place(symbol.place.span)
+            self.parts.branches.append(
+                self._branch(symbol, space.prefix, space.loops, ("field", None, None), ends, where)
+            )
 
 
-def _source(
-    context: Context, branch: BranchSymbol, side: str, node: Node, wanted: str | None, span: syntax.Span
-) -> LawOf:
-    """A law without a variable of its own branch: a source, or a store or dissipator that it degenerates to."""
-    if wanted in _OTHER:
-        if side not in _OTHER[wanted]:
-            raise context.fail("E323", f"'{branch.name}' is a {wanted}, but its law gives {side}", span)
-        return LawOf(wanted, side, node)
-    if side not in "ef" or (wanted is not None and wanted[0] != side):
-        raise context.fail(
-            "E303", f"a source gives its effort or its flow, not {side}", span, help="'e = ...' or 'f = ...'"
-        )
-    return LawOf("effort" if side == "e" else "flow", side, node)
+def _terminal(end: End) -> Terminal:
+    return Terminal(None, ()) if end.node is None else Terminal(end.node.family.name, end.at)
 
 
-def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> Failed:
-    pair = frozenset((side, other))
-    if pair == frozenset("pq"):
-        help_ = "write it as a dissipator: e = M(q)*f with M = dp/dq"
-        return context.fail("E302", "p-q is the diagonal of the diagram: a memristive law", span, help=help_)
-    requirement = "p' = e" if pair == frozenset("pe") else "q' = f"
-    message = (
-        f"a law must relate p-f, q-e or e-f; this one relates {side} and {other}, which {requirement} already fixes"
+def _hull(a: BranchSymbol, b: BranchSymbol) -> BranchSymbol:
+    """One symbol for two ranges of a label."""
+    shape = tuple(
+        (ex.call("min", first, other), ex.call("max", last, end))
+        for (first, last), (other, end) in zip(a.family.shape, b.family.shape, strict=True)
     )
-    return context.fail("E301", message, span)
-
-
-def _alone(context: Context, branch: BranchSymbol, kind: str, node: Node, span: syntax.Span) -> None:
-    """E304: the law of a store may not depend on another displacement or momentum."""
-    if kind == "dissipator":
-        return
-    for other in sorted((n for n in ex.variables(node) if n.op == "var"), key=lambda n: n.number):
-        name, var_kind, _ = other.data
-        if name != branch.family.name and var_kind in ("q", "nq", "bq", "p", "np", "bp"):
-            what = "displacement" if var_kind.endswith("q") else "momentum"
-            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store works there too"
-            function = "T*" if kind == "kinetic" else "V"
-            raise context.fail("E304", message, span, help=f"energy {function} = ... with ports for both")
-
-
-@dataclass(frozen=True, slots=True)
-class RatioOf:
-    """A two-port: side e or f of branch 1 = ratio * that of branch 2 (gyrator: e1 = ratio*f2)."""
-
-    kind: str
-    side: str
-    ratio: Node
-
-
-def ratio_of(
-    context: Context,
-    branches: tuple[BranchSymbol, BranchSymbol],
-    at: tuple[Node, ...],
-    kind: str,
-    side: str,
-    value: syntax.Expr,
-    span: syntax.Span,
-) -> RatioOf:
-    """The ratio of a transformer or gyrator from its one law (e1, f1, e2 or f2 = ...)."""
-    letter, number = side[0], int(side[1])
-    me, partner = branches[number - 1], branches[2 - number]
-    dimension = branch_dimension(me.domain, letter)
-    name = me.name.partition("#")[0]
-    message = f"law of '{name}': {side} is in {dim.show(dimension)}, the law in {{}}"
-    node = context.wanted(value, dimension, "E208", message)
-    far = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == partner.family.name}
-    near = [
-        n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")
-    ]
-    expected = letter if kind == "transformer" else {"e": "f", "f": "e"}[letter]
-    wrong = {"e": "f", "f": "e"}[expected]
-    if expected not in far:
-        if wrong in far:
-            other = "gyrator" if kind == "transformer" else "transformer"
-            message = f"{kind} '{name}' given as {side} against {wrong}{3 - number}: that is a {other}"
-            raise context.fail("E316", message, span, help=f"'{other}({side} = ...)'")
-        raise context.fail("E303", f"the law of '{name}' gives {side} from {expected}{3 - number}", span)
-    ratio = ex.derivative(node, far[expected])
-    rest = ex.substitute(node, {far[expected]: ex.const(0.0)})
-    own = [n for n in ex.variables(ratio) if n.op == "var" and n.data[0] in (me.family.name, partner.family.name)]
-    flows = [n for n in own if n.data[1] in ("be", "bf")]
-    if near or flows or not ex.is_const(rest, 0.0):
-        shown = (near or flows or [far[expected]])[0]
-        message = f"{kind} ratio of '{name}' depends on {shown}, a flow or effort of its own ports"
-        raise context.fail("E317", message, span, help="ratios may depend on displacements and signals")
-    return _normal(kind, letter, number, ratio)
-
-
-def _normal(kind: str, letter: str, number: int, ratio: Node) -> RatioOf:
-    """Written for branch 1: e1 f1 + e2 f2 = 0 turns the law of one side into that of the other."""
-    if kind == "transformer":
-        # e2 = r e1 gives f1 = -r f2; f2 = r f1 gives e1 = -r e2
-        if number == 2:
-            return RatioOf(kind, "f" if letter == "e" else "e", ex.neg(ratio))
-        return RatioOf(kind, letter, ratio)
-    # gyrator: e1 = r f2.  f1 = g e2 gives e2 = f1/g = -r f1; e2 = r f1 gives e1 = -r f2; f2 = g e1 gives e1 = f2/g
-    inverse = ex.div(ex.const(1.0), ratio)
-    forms = {("e", 1): ratio, ("f", 1): ex.neg(inverse), ("e", 2): ex.neg(ratio), ("f", 2): inverse}
-    return RatioOf(kind, "e", forms[letter, number])
+    return BranchSymbol(a.name, Family(a.family.name, a.family.prefix, a.family.around, shape), a.domain, a.place)

@@ -8,20 +8,17 @@ elaborated under the label's path.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import syntax
-from sysdyn.dsl.calls import walk
 from sysdyn.dsl.context import Failed
-from sysdyn.dsl.diagnostics import Place, Related
-from sysdyn.dsl.elements import ONE_PORTS, TWO_PORTS, law_of, own_variables, ratio_of
-from sysdyn.dsl.expression import Node
+from sysdyn.dsl.diagnostics import Place, Related, Report
+from sysdyn.dsl.elements import Elements
+from sysdyn.dsl.head import Head
+from sysdyn.dsl.laws import ONE_PORTS, TWO_PORTS, own_variables
 from sysdyn.dsl.levels import choose_level
-from sysdyn.dsl.network import Branch, Coupling, Shape, Terminal
 from sysdyn.dsl.parameters import Argument
 from sysdyn.dsl.parts import Nested, flatten
-from sysdyn.dsl.statements import Statements
 from sysdyn.dsl.symbols import (
     BranchSymbol,
     BundleNode,
@@ -36,9 +33,6 @@ from sysdyn.dsl.symbols import (
     PortSymbol,
     Scope,
     Space,
-    TwoPortSymbol,
-    Typed,
-    UnknownSymbol,
     Unsupported,
     nearest,
 )
@@ -47,37 +41,15 @@ from sysdyn.dsl.unit_variables import solve_units
 BUILTINS = (*ONE_PORTS, *TWO_PORTS)
 
 
-@dataclass(slots=True)
-class Pending:
-    """A law to be resolved when every name of the model is known."""
-
-    space: Space
-    loops: tuple[syntax.For, ...]
-    resolve: Callable[[], None]
-
-
-@dataclass(slots=True)
-class Ends:
-    """What a connection says of a branch: two ends, or an expression along which it acts."""
-
-    plus: End | None
-    minus: End | None
-    on: Typed | None
-    domain: DomainSymbol | None
-
-
-class Instances(Statements):
+class Instances(Elements):
     """Elaborates instances."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__(*args)  # type: ignore[arg-type]
-        self.pending: list[Pending] = []
+    def __init__(self, report: Report) -> None:
+        super().__init__(report)
         self.bodies: list[tuple[Space, list[Nested]]] = []
         self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
         self._waiting: dict[int, list[Callable[[], None]]] = {}  # instances not yet elaborated, by their symbol
         self.resolver.awaken = self._awaken
-
-    # -- frame ---------------------------------------------------------------------------------------------
 
     def announce(self, statements: Sequence[Nested]) -> None:
         """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
@@ -136,292 +108,6 @@ class Instances(Statements):
         """Another statement reads an instance that has not been elaborated yet."""
         for do in self._waiting.pop(id(symbol), ()):
             do()
-
-    def _label(self, s: syntax.Instance) -> tuple[tuple[Node, ...], Shape]:
-        """Indices of a label, and first and last of each; a `for` around must show in them."""
-        at = tuple(self.resolver.index(i) for i in s.decl.indices)
-        shape = []
-        for node, index in zip(at, s.decl.indices, strict=True):
-            if node.op == "index":
-                shape.append(self.bounds(index))
-            elif any(n.op == "index" for n in ex.topological([node])):
-                raise self.resolver.fail("E806", "a label is indexed by a loop variable or a number", index.span)
-            else:
-                shape.append((node, node))
-        used = set(at)
-        own = self.resolver.loops[len(self.current.loops) :]
-        if any(ex.index(loop.index) not in used for loop in own):
-            message = f"'{s.decl.name}' stands in a 'for': its label needs the loop variable"
-            raise self.resolver.fail("E106", message, s.decl.span, help=f"{s.decl.name}[{own[-1].index}]")
-        return at, tuple(shape)
-
-    # -- builtin elements ----------------------------------------------------------------------------------
-
-    def _builtin(self, s: syntax.Instance) -> None:
-        kind = s.component.names[0]
-        at, shape = self._label(s)
-        side, value, span = self._law_argument(s, kind)
-        if kind in ONE_PORTS:
-            if len(s.connections) != 1:
-                wants = "1 connection: label: component() a -> b"
-                raise self.resolver.fail(
-                    "E402", f"'{s.decl.name}: {kind}' needs {wants}, has {len(s.connections)}", s.span
-                )
-            ends = self._ends(s, s.connections[0])
-            symbol = self._branch_symbol(s, s.decl.name, self._domain_of(s, ends), shape)
-            self._enter_element(symbol, symbol)
-            self._later_law(symbol, at, side, value, kind, span, ends, s)
-            return
-        connections = [c for c in s.connections if not isinstance(c, syntax.Bind)]
-        if len(connections) != 2:
-            raise self.resolver.fail(
-                "E402", f"'{s.decl.name}: {kind}' needs 2 branches, has {len(connections)}", s.span
-            )
-        both = [self._ends(s, c) for c in connections]
-        one, two = (
-            self._branch_symbol(s, f"{s.decl.name}#{k}", self._domain_of(s, e), shape) for k, e in enumerate(both, 1)
-        )
-        self._enter_element(TwoPortSymbol(s.decl.name, (one, two), self.place(s.decl.span)), one)
-        self._later_ratio((one, two), at, (kind, side, value, span), (both[0], both[1]), s)
-
-    def _law_argument(self, s: syntax.Instance, kind: str) -> tuple[str, syntax.Expr, syntax.Span]:
-        sides = ("e", "f", "p", "q") if kind in ONE_PORTS else ("e1", "e2", "f1", "f2")
-        args = s.args or ()
-        if len(args) != 1:
-            help_ = f"{kind}({sides[0]} = ...)"
-            raise self.resolver.fail("E303", f"'{kind}' takes one law, {len(args)} given", s.span, help=help_)
-        if args[0].name is None:
-            raise self.resolver.fail("E404", "positional argument", args[0].span, help=f"{sides[0]} = ...")
-        if args[0].name not in sides:
-            raise self.resolver.fail(
-                "E405", f"'{kind}' has no law '{args[0].name}'", args[0].span, help=", ".join(sides)
-            )
-        return args[0].name, args[0].value, args[0].span
-
-    def _branch_symbol(self, s: syntax.Instance, name: str, domain: DomainSymbol, shape: Shape) -> BranchSymbol:
-        return BranchSymbol(name, self.current.family(name, shape), domain, self.place(s.decl.span))
-
-    def _enter_element(self, symbol: BranchSymbol | TwoPortSymbol, first: BranchSymbol) -> None:
-        """Enter a label; several loops over disjoint ranges may declare one."""
-        before = self.scope.symbols.get(symbol.name)
-        if type(before) is not type(symbol) or not first.family.shape:
-            self.enter(symbol)
-            return
-        assert isinstance(before, (BranchSymbol, TwoPortSymbol))
-        if isinstance(before, BranchSymbol) and isinstance(symbol, BranchSymbol):
-            self.scope.symbols[symbol.name] = _hull(before, symbol)
-        elif isinstance(before, TwoPortSymbol) and isinstance(symbol, TwoPortSymbol):
-            one, two = (_hull(a, b) for a, b in zip(before.branches, symbol.branches, strict=True))
-            self.scope.symbols[symbol.name] = TwoPortSymbol(symbol.name, (one, two), before.place)
-
-    def _later_law(
-        self,
-        symbol: BranchSymbol,
-        at: tuple[Node, ...],
-        side: str,
-        value: syntax.Expr,
-        kind: str | None,
-        span: syntax.Span,
-        ends: Ends,
-        s: syntax.Instance | syntax.Law,
-    ) -> None:
-        loops, bound = self.resolver.loops, self.resolver.sight()
-        whole = (*symbol.family.prefix, *at)
-
-        def resolve() -> None:
-            own = own_variables(symbol, whole)
-            self._hidden(value, own, symbol.name)
-            with self.resolver.inside(loops, bound), self.resolver.bound(own):
-                law = law_of(self.resolver, symbol, whole, side, value, kind, span)
-            self.resolver.laws[symbol.family.name] = law
-            self.parts.branches.append(
-                self._branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))
-            )
-
-        self.pending.append(Pending(self.current, (), resolve))
-
-    def _branch(
-        self,
-        symbol: BranchSymbol,
-        at: tuple[Node, ...],
-        loops: tuple,  # type: ignore[type-arg]
-        law: tuple[str, str | None, Node | None],
-        ends: Ends,
-        place: Place,
-    ) -> Branch:
-        kind, side, node = law
-        name = symbol.family.name
-        if ends.on is not None:
-            return Branch(name, at, loops, symbol.domain, kind, side, node, None, None, ends.on.node, place)
-        assert ends.plus is not None
-        assert ends.minus is not None
-        plus, minus = (_terminal(e) for e in (ends.plus, ends.minus))
-        return Branch(name, at, loops, symbol.domain, kind, side, node, plus, minus, None, place)
-
-    def _later_ratio(
-        self,
-        branches: tuple[BranchSymbol, BranchSymbol],
-        at: tuple[Node, ...],
-        law: tuple[str, str, syntax.Expr, syntax.Span],
-        ends: tuple[Ends, Ends],
-        s: syntax.Instance,
-    ) -> None:
-        loops, bound = self.resolver.loops, self.resolver.sight()
-        whole = (*branches[0].family.prefix, *at)
-        kind, side, value, span = law
-
-        def resolve() -> None:
-            own = {**own_variables(branches[0], whole, "1"), **own_variables(branches[1], whole, "2")}
-            self._hidden(value, own, s.decl.name)
-            with self.resolver.inside(loops, bound), self.resolver.bound(own):
-                ratio = ratio_of(self.resolver, branches, whole, kind, side, value, span)
-            place = self.place(s.span)
-            for symbol, end in zip(branches, ends, strict=True):
-                self.parts.branches.append(self._branch(symbol, whole, loops, ("port", None, None), end, place))
-            first, second = (b.family.name for b in branches)
-            self.parts.couplings.append(
-                Coupling(ratio.kind, first, second, whole, loops, ratio.side, ratio.ratio, place)
-            )
-
-        self.pending.append(Pending(self.current, (), resolve))
-
-    def _hidden(self, value: syntax.Expr, own: dict[str, Typed], name: str) -> None:
-        """W101: an element's own variable hides an outer name in its law."""
-        for node in walk(value):
-            if isinstance(node, syntax.Name) and node.name in own and self.scope.symbols.get(node.name) is not None:
-                what = {"e": "effort", "f": "flow", "q": "displacement", "p": "momentum"}[node.name[0]]
-                message = f"'{node.name}' in the law of '{name}' is the element's own {what}; it hides the outer name"
-                self.report.warning(
-                    "W101", message, self.place(node.span), help="rename the outer one, or write it as a let"
-                )
-
-    # -- connections ---------------------------------------------------------------------------------------
-
-    def _ends(self, s: syntax.Instance, connection: syntax.Connection, domain: DomainSymbol | None = None) -> Ends:
-        """Ends of a branch from `a -> b`, `a` (for a -> ground) or `on expr`."""
-        match connection:
-            case syntax.Across() | syntax.BindAcross():
-                plus, minus = self.end(connection.plus, domain), self.end(connection.minus, domain)
-            case syntax.Single():
-                plus, minus = self.end(connection.node, domain), None
-            case syntax.On():
-                value = self.resolver.scalar(connection.expr)
-                self._is_displacement(value.node, connection.expr)
-                return Ends(None, None, value, self._domain_on(connection.expr, value) or domain)
-            case _:
-                raise self.resolver.fail(
-                    "E407", f"'{s.component.names[0]}' has no port or input '{connection.name.name}'", connection.span
-                )
-        found = [e for e in (plus, minus) if e is not None]
-        domains = [e.domain for e in found if e.domain is not None] or ([domain] if domain else [])
-        if not domains:
-            raise self.resolver.fail(
-                "E403",
-                f"the domain of '{s.decl.name}' cannot be inferred",
-                connection.span,
-                help="connect a node or name the coordinate",
-            )
-        if any(d.name != domains[0].name for d in domains):
-            message = f"'{s.decl.name}' joins {domains[0].name} and {domains[1].name}"
-            raise self.resolver.fail("E401", message, connection.span, help="a gyrator or transformer couples domains")
-        plus, minus = (
-            e if e is not None and e.domain is not None else End(None, (), domains[0]) for e in (plus, minus)
-        )
-        if plus.node is not None and plus.node is minus.node and plus.at == minus.at:
-            message = f"both ends of '{s.decl.name}' are node {plus.node.name}"
-            raise self.resolver.fail("E413", message, connection.span)
-        return self._along(plus, minus, domains[0])
-
-    def _along(self, plus: End, minus: End, domain: DomainSymbol) -> Ends:
-        """A branch that hangs on a coordinate acts along an expression."""
-        coordinates = [e for e in (plus, minus) if e.node is not None and e.node.family.name in self._coordinate_names]
-        if not coordinates:
-            return Ends(plus, minus, None, domain)
-
-        def displacement(end: End) -> Node:
-            if end.node is None:
-                return ex.const(0.0)
-            kind = "q" if end.node.family.name in self._coordinate_names else "nq"
-            return ex.var(end.node.family.name, kind, *end.at)
-
-        node = ex.sub(displacement(plus), displacement(minus))
-        return Ends(None, None, Typed(node, domain.displacement.dimension), domain)
-
-    @property
-    def _coordinate_names(self) -> set[str]:
-        return {c.name for c in self.parts.coordinates}
-
-    def end(self, e: syntax.Expr, domain: DomainSymbol | None) -> End | None:
-        """One end: a node, a port, a coordinate of a common-flow domain, or ground (None without a domain)."""
-        if isinstance(e, syntax.Name) and e.name == "ground":
-            return None if domain is None else End(None, (), domain)
-        found = self.resolver.located(e)
-        symbol = None if found is None else found.symbol
-        if found is None or symbol is None:
-            root = e
-            while isinstance(root, (syntax.Item, syntax.Member)):
-                root = root.base
-            if isinstance(root, syntax.Name) and self.scope.find(root.name) is None:
-                raise self.resolver.unknown(root.name, root.span)
-            raise self.resolver.fail("E407", f"'{self._text(e)}' is no node", e.span)
-        match symbol:
-            case PortSymbol():
-                end = symbol.end
-                return End(end.node, tuple(ex.substitute(a, found.change) for a in end.at), end.domain)
-            case NodeSymbol():
-                return self._node_end(symbol, found.indices, found.change, e)
-            case UnknownSymbol() if symbol.kind == "q" and symbol.domain is not None:
-                if symbol.domain.common == "effort":
-                    help_ = f"'on {self._text(e)}' instead of '->'"
-                    raise self.resolver.fail(
-                        "E415",
-                        f"'{symbol.name}' is a coordinate of a common-effort domain, not a node",
-                        e.span,
-                        help=help_,
-                    )
-                node = NodeSymbol(symbol.name, symbol.family, symbol.domain, symbol.place)
-                return self._node_end(node, found.indices, found.change, e)
-            case Unsupported():
-                raise Failed
-        raise self.resolver.fail("E407", f"'{self._text(e)}' is no node", e.span)
-
-    def _node_end(
-        self, symbol: NodeSymbol, indices: tuple[syntax.Index, ...], change: dict[Node, Node], e: syntax.Expr
-    ) -> End:
-        if len(indices) != len(symbol.family.shape):
-            raise self.resolver.index_count(symbol.name, len(symbol.family.shape), len(indices), e.span)
-        at = (*symbol.family.prefix, *self.resolver.indices(symbol.name, symbol.family.shape, indices))
-        return End(symbol, tuple(ex.substitute(a, change) for a in at), symbol.domain)
-
-    def _text(self, e: syntax.Expr) -> str:
-        return self.source_text(e.span)[:60]
-
-    def _domain_of(self, s: syntax.Instance, ends: Ends) -> DomainSymbol:
-        if ends.domain is None:
-            raise self.resolver.fail(
-                "E403",
-                f"the domain of '{s.decl.name}' cannot be inferred",
-                s.span,
-                help="connect a node or name the coordinate",
-            )
-        return ends.domain
-
-    def _domain_on(self, e: syntax.Expr, value: Typed) -> DomainSymbol | None:
-        """Domain of one coordinate, branch or node; else the one domain whose displacement has that dimension."""
-        inner = e.expr if isinstance(e, syntax.Group) else e
-        found = self.resolver.located(inner.base if isinstance(inner, syntax.Member) and inner.name == "q" else inner)
-        if found is not None and isinstance(found.symbol, (UnknownSymbol, BranchSymbol, NodeSymbol)):
-            return found.symbol.domain
-        if found is not None and isinstance(found.symbol, PortSymbol):
-            return found.symbol.end.domain
-        domains = {}
-        for name in self.scope.names():
-            symbol = self.scope.find(name)
-            if isinstance(symbol, DomainSymbol) and symbol.displacement.dimension == value.dimension:
-                domains[name] = symbol
-        return next(iter(domains.values())) if len(domains) == 1 else None
-
-    # -- components ----------------------------------------------------------------------------------------
 
     def _component(self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol) -> None:
         chain = (*self.current.chain, self.current.component)
@@ -641,70 +327,3 @@ class Instances(Statements):
             space.scope.symbols[name] = Definition(
                 name, "input", value, (), dimension, here, place, value.span, bound=bound
             )
-
-    # -- laws of components --------------------------------------------------------------------------------
-
-    def law(self, s: syntax.Law) -> None:
-        """`law e = R*f`, `law b.e = ...`: the right edge of the diagram for a branch of the component."""
-        name, letter = "", None
-        if isinstance(s.left, syntax.Name):
-            letter = s.left.name
-        elif isinstance(s.left, syntax.Member) and isinstance(s.left.base, syntax.Name):
-            name, letter = s.left.base.name, s.left.name
-        symbol = self.scope.symbols.get(name)
-        if letter not in ("e", "f", "p", "q") or not isinstance(symbol, BranchSymbol):
-            message = "the law must be solved for one port variable of its edge"
-            raise self.resolver.fail("E303", message, s.left.span, help="'e = ...(f)'")
-        if name in self.current.laws:
-            related = (Related("the first law", self.current.laws[name]),)
-            message = f"branch '{name or self.current.path}' has two laws"
-            raise self.resolver.fail("E305", message, s.span, related=related)
-        self.current.laws[name] = self.place(s.span)
-        self._later_law(symbol, (), letter, s.right, None, s.span, self.current.ends[name], s)
-
-    def lawless(self, space: Space) -> None:
-        """Branches without a law stand in energies and constraints; E306 where they stand in nothing."""
-        for name, ends in space.ends.items():
-            symbol = space.scope.symbols[name]
-            if name in space.laws or not isinstance(symbol, BranchSymbol):
-                continue
-            where = self.place(symbol.place.span)
-            self.parts.branches.append(
-                self._branch(symbol, space.prefix, space.loops, ("field", None, None), ends, where)
-            )
-
-
-class Head:
-    """What a component asks of its user: parameters, inputs, ports, branches."""
-
-    def __init__(self, body: Sequence[Nested]) -> None:
-        self.parameters: dict[str, syntax.Param] = {}
-        self.inputs: dict[str, syntax.Input] = {}
-        self.ports: dict[str, syntax.Port] = {}
-        self.branches: dict[str, syntax.Branch] = {}
-        self.given: dict[str, syntax.Expr] = {}  # inputs among the arguments
-        for statement, _ in body:
-            match statement:
-                case syntax.Param():
-                    self.parameters[statement.decl.name] = statement
-                case syntax.Input():
-                    self.inputs[statement.decl.name] = statement
-                case syntax.Port():
-                    self.ports |= dict.fromkeys((d.name for d in statement.decls), statement)
-                case syntax.Branch():
-                    self.branches |= dict.fromkeys(
-                        (d.name for d in statement.decls) if statement.decls else ("",), statement
-                    )
-
-
-def _terminal(end: End) -> Terminal:
-    return Terminal(None, ()) if end.node is None else Terminal(end.node.family.name, end.at)
-
-
-def _hull(a: BranchSymbol, b: BranchSymbol) -> BranchSymbol:
-    """One symbol for two ranges of a label."""
-    shape = tuple(
-        (ex.call("min", first, other), ex.call("max", last, end))
-        for (first, last), (other, end) in zip(a.family.shape, b.family.shape, strict=True)
-    )
-    return BranchSymbol(a.name, Family(a.family.name, a.family.prefix, a.family.around, shape), a.domain, a.place)

@@ -16,7 +16,8 @@ from sysdyn.dsl.symbols import Space, Typed
 from sysdyn.dsl.units import NONE, Dimension, Unit, known, multiply, raised, si_text
 
 if TYPE_CHECKING:
-    from sysdyn.dsl.instances import Head, Instances
+    from sysdyn.dsl.head import Head
+    from sysdyn.dsl.instances import Instances
 
 Equation = tuple[dict[str, Fraction], Dimension, str]  # exponents of the variables, what is left, who says so
 
