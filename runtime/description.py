@@ -17,6 +17,8 @@ from sysdyn.runtime.failures import ContractError, RowLabel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Shape = tuple[tuple[int, int], ...]
+Index = tuple[int, int, int]
+"""(loop, slot, constant): the value is (loop variable or 0) + (ix[slot] or 0) + constant; loop, slot -1: none."""
 
 KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
 BASE = {
@@ -97,17 +99,17 @@ class RowFamily:
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A place in a family: index k = loop variable + ix[slot] + constant (loop, slot -1: none)."""
+    """A place in a family by its indices."""
 
     family: int
-    indices: tuple[tuple[int, int, int], ...]
+    indices: tuple[Index, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """One loop nest of a block: bounds as slots of ix, the entries it writes an iteration."""
+    """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration."""
 
-    loops: tuple[tuple[int, int], ...]
+    loops: tuple[tuple[Index, Index], ...]
     dy: tuple[tuple[Reference, Reference], ...]
     dyd: tuple[tuple[Reference, Reference], ...]
 
@@ -164,8 +166,20 @@ def _pairs(value: Any) -> tuple[tuple[Reference, Reference], ...]:
     return tuple((_reference(row), _reference(column)) for row, column in value)
 
 
+def _bound(value: Any, depth: int) -> Index:
+    """A loop's bound: a slot of ix, or an index that may follow a loop outside of it."""
+    if isinstance(value, int):
+        return (-1, value, 0)
+    loop, slot, constant = (int(part) for part in value)
+    if loop >= depth:
+        raise ContractError(f"a bound of loop {depth} follows loop {loop}")
+    return (loop, slot, constant)
+
+
 def _kernel(value: Mapping[str, Any]) -> Kernel:
-    loops = tuple((int(lo), int(hi)) for lo, hi in value.get("loops", ()))
+    loops = tuple(
+        (_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ()))
+    )
     return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())))
 
 

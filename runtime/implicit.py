@@ -7,7 +7,6 @@ where the unknown stands in a gamma and the slope there vanishes, Newton's itera
 from __future__ import annotations
 
 import numpy as np
-
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.system import System
 

@@ -7,7 +7,6 @@ coefficient of f (Hamilton, p - dT*/df).
 from __future__ import annotations
 
 import numpy as np
-
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.system import System

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.description import Ints, Kernel, Reference, Shape
+from sysdyn.runtime.description import Index, Ints, Kernel, Reference, Shape
 from sysdyn.runtime.failures import ContractError
 
 Longs = NDArray[np.int64]
@@ -43,12 +43,24 @@ class Pattern:
         return np.repeat(np.arange(self.unknowns), np.diff(self.column))
 
 
+def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:
+    """Value of an index in each iteration [number]."""
+    loop, slot, constant = index
+    value = np.full(number, constant + (int(ix[slot]) if slot >= 0 else 0), dtype=np.int64)
+    return value if loop < 0 else value + columns[loop]
+
+
 def _iterations(kernel: Kernel, ix: Ints) -> list[Longs]:
-    """Value of each loop variable in each iteration, last loop fastest."""
-    ranges = [np.arange(int(ix[lo]), int(ix[hi]) + 1, dtype=np.int64) for lo, hi in kernel.loops]
-    if not ranges:
-        return []
-    return [grid.ravel() for grid in np.meshgrid(*ranges, indexing="ij")]
+    """Value of each loop variable in each iteration, last loop fastest; inner bounds may follow outer loops."""
+    columns: list[Longs] = []
+    for first, last in kernel.loops:
+        number = columns[0].size if columns else 1
+        low = _value(first, columns, number, ix)
+        count = np.maximum(_value(last, columns, number, ix) - low + 1, 0)
+        start = np.cumsum(count) - count
+        inner = np.arange(int(count.sum()), dtype=np.int64) + np.repeat(low - start, count)
+        columns = [*(np.repeat(column, count) for column in columns), inner]
+    return columns
 
 
 def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: int, ix: Ints) -> Longs:
@@ -58,10 +70,8 @@ def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: i
         raise ContractError(
             f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
         )
-    for (loop, slot, constant), (first, last) in zip(reference.indices, shape, strict=True):
-        value = np.full(number, constant + (int(ix[slot]) if slot >= 0 else 0), dtype=np.int64)
-        if loop >= 0:
-            value += loops[loop]
+    for index, (first, last) in zip(reference.indices, shape, strict=True):
+        value = _value(index, loops, number, ix)
         if number and (value.min() < first or value.max() > last):
             raise ContractError(f"an index runs over {value.min()}..{value.max()} outside {first}..{last}")
         position = position * (last - first + 1) + (value - first)

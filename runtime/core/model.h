@@ -12,7 +12,7 @@
  *   r   [rows]              row family k begins at to[k]; a block ADDS to r
  *   v   [entries]           a block WRITES its Jacobian entries in the order its pattern lists them
  *
- * Blocks (missing ones have no rows; with T*, V, D, Q of the book and M = d2T*/df2)
+ * Blocks (missing ones have no rows; with T*, V, D, Q of the book and M = d2(T*)/df2)
  *   dynamics          Lagrange: M f' - Y;  Hamilton: p' - U (coordinates with momentum), -U (without)
  *   phi_reaction      Phi_q^T kappa, added to the rows of dynamics
  *   psi_reaction      Psi_f^T mu, added to the rows of dynamics
@@ -66,7 +66,8 @@ typedef void sd_entries(const sd_frame *frame, double t, const double *y, const 
  *             rows of observe also hold {"name", "stored": bool, "rate": bool}.
  *   blocks    {name: {"kernels": [{"loops": [[lo, hi], ...], "rows": [REF, ...], "dy": [[REF row, REF column], ...],
  *             "dyd": [...]}, ...]}}
- *             lo, hi: slots of ix (both ends included).  v runs kernel by kernel, iteration by iteration (last loop
+ *             lo, hi: slots of ix (both ends included), or an INDEX where a bound follows an outer loop of the same
+ *             nest (triangular sums).  v runs kernel by kernel, iteration by iteration (last loop
  *             fastest), entry by entry.  One place may occur several times: entries add up.
  *   REF       [family, [INDEX, ...]], INDEX = [loop or -1, offset slot of ix or -1, constant]:
  *             value = (loop variable or 0) + (ix[slot] or 0) + constant.

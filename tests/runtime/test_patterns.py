@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+from sysdyn.runtime.description import _kernel
+from sysdyn.runtime.failures import ContractError
+from sysdyn.runtime.patterns import places
+
+# x[i] in rows i, columns j; loops i = 1..n, j = 1..i (ix = 1, n)
+LOOPS = [[0, 1], [0, [0, -1, 0]]]
+
+
+def kernel(loops=LOOPS, outer=0, inner=1):
+    entry = [[0, [[outer, -1, 0]]], [0, [[inner, -1, 0]]]]
+    return _kernel({"loops": loops, "rows": [entry[0]], "dy": [entry]})
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 7])
+def test_bounds_that_follow_an_outer_loop(n):
+    ix, shapes = np.array([1, n], dtype=np.int32), [((1, n),)]
+    tables = np.zeros(1, dtype=np.int32), np.array([10], dtype=np.int32)
+    found = places([kernel()], "dy", ix, (shapes, shapes), tables)
+    expected = [(i - 1, 10 + j - 1) for i in range(1, n + 1) for j in range(1, i + 1)]
+    assert list(zip(found.row.tolist(), found.column.tolist(), strict=True)) == expected
+
+
+def test_an_empty_inner_loop_and_an_offset_bound():
+    # j = i + 1 .. n: the last i has none
+    ix, shapes = np.array([1, 3], dtype=np.int32), [((1, 3),)]
+    loops = [[0, 1], [[0, -1, 1], 1]]
+    tables = np.zeros(1, dtype=np.int32), np.zeros(1, dtype=np.int32)
+    found = places([kernel(loops)], "dy", ix, (shapes, shapes), tables)
+    assert list(zip(found.row.tolist(), found.column.tolist(), strict=True)) == [(0, 1), (0, 2), (1, 2)]
+
+
+def test_a_bound_follows_outer_loops_only():
+    with pytest.raises(ContractError, match="bound"):
+        kernel([[0, [1, -1, 0]], [0, 1]])
