@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 
 from sysdyn.dsl import dimensions as dim
@@ -27,6 +26,7 @@ from sysdyn.dsl.symbols import (
     TableSymbol,
     nearest,
 )
+from sysdyn.dsl.tables import read_table
 from sysdyn.dsl.unit_reading import read_unit
 from sysdyn.dsl.units import NONE, Unit, multiply
 
@@ -204,60 +204,12 @@ class FileScope:
     def _table(self, item: syntax.Table, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         heads = [(p.name, read_unit(p.unit, scope, source, self.report)) for p in item.params]
         result = read_unit(item.result, scope, source, self.report)
-        place = Place(source, item.name.span)
         units = [u for _, u in heads if u is not None]
         if result is None or len(units) != len(heads):
             return
-        if item.rows is None:
-            self.report.error("N608", "a table from a file is not supported yet (planned: libraries)", place)
-            return
-        yield TableSymbol(
-            item.name.name,
-            tuple((n, u.dimension) for (n, _), u in zip(heads, units, strict=True)),
-            result.dimension,
-            place,
-        )
-        table = self._points(item, units, result, place)
+        place = Place(source, item.name.span)
+        arguments = tuple((name, unit.dimension) for (name, _), unit in zip(heads, units, strict=True))
+        yield TableSymbol(item.name.name, arguments, result.dimension, place)
+        table = read_table(item, units, result, source, self.report)
         if table is not None:
             self.tables[table.name] = table
-
-    def _points(self, item: syntax.Table, units: list[Unit], result: Unit, place: Place) -> Table | None:
-        rows = item.rows or ()
-        columns = len(units) + 1
-        wrong = next((r for r in rows if len(r.numbers) != columns), None)
-        if wrong is not None:
-            message = f"a row of table {item.name.name} has {columns} numbers, {len(wrong.numbers)} given"
-            self.report.error("E206", message, Place(place.source, wrong.span))
-            return None
-        values = {
-            tuple(_scaled(n, u) for n, u in zip(r.numbers, units, strict=False)): _scaled(r.numbers[-1], result)
-            for r in rows
-        }
-        axes = tuple(tuple(sorted({key[k] for key in values})) for k in range(len(units)))
-        if len(units) == 1:
-            keys = [_scaled(r.numbers[0], units[0]) for r in rows]
-            if len(keys) < 2 or any(a >= b for a, b in pairwise(keys)):
-                message = f"the arguments of table {item.name.name} must increase from row to row, two rows at least"
-                self.report.error("E206", message, place)
-                return None
-        elif (
-            len(units) > 2 or len(values) != len(axes[0]) * len(axes[1]) or item.interpolation not in ("linear", "hold")
-        ):
-            message = f"table {item.name.name} must be a full grid of two arguments, linear or hold"
-            self.report.error("E206", message, place)
-            return None
-        if item.extrapolation == "extend":
-            self.report.error(
-                "W302",
-                f"table '{item.name.name}' is extrapolated ('extend') beyond its data",
-                place,
-                help="clamp or stop",
-            )
-        grid = tuple(values[key] for key in sorted(values))
-        return Table(item.name.name, item.interpolation, item.extrapolation or "clamp", axes, grid, place)
-
-
-def _scaled(number: syntax.Number, unit: Unit) -> float:
-    if unit.scale == 1 and not unit.offset:
-        return number.value
-    return float(Fraction(number.text.replace(" ", "")) * unit.scale + unit.offset)
