@@ -39,6 +39,16 @@ def test_diagnostics_are_what_check_prints(tmp_path):
         assert ran.stderr == block
 
 
+def test_the_network_example_runs(tmp_path):
+    from sysdyn.cli.main import run
+
+    (text,) = (block for block in BLOCKS if block.startswith("from std."))
+    (tmp_path / "lead.sd").write_text(text)
+    assert run(["fmt", "--check", str(tmp_path / "lead.sd")]) == 0
+    assert run(["check", "--strict", "-q", str(tmp_path / "lead.sd")]) == 0
+    assert run(["simulate", "-q", str(tmp_path / "lead.sd"), "-o", str(tmp_path / "lead.h5")]) == 0
+
+
 def test_the_python_example_runs(tmp_path, monkeypatch, capsys):
     (code,) = (block for block in BLOCKS if "from sysdyn.api" in block)
     (tmp_path / "models").symlink_to(ROOT / "models")

@@ -87,8 +87,8 @@ def compile_model(
 def simulate(path: str | Path, **options: Any) -> Trace:
     """Simulate a scene of a file; the options are those of the command (`until`, `set`, `accuracy`, `at`, ...).
 
-    set: a mapping of names to numbers or texts; at: instants or one text; output: the trace's file (a default as the
-    command's).  Returns the trace.
+    set: a mapping of names to numbers or texts; level: one of paths to levels; at: instants or one text; output: the
+    trace's file (a default as the command's).  Returns the trace.
     """
     report = Report()
     ran = run(_request(str(path), options), report)
@@ -104,6 +104,9 @@ def _request(path: str, options: dict[str, Any]) -> Request:
     settings = given.pop("set", None) or given.pop("settings", ())
     pairs: Iterable[tuple[str, Any]] = settings.items() if isinstance(settings, Mapping) else settings
     given["settings"] = tuple((name, _text(value)) for name, value in pairs)
+    level = given.pop("level", None)
+    if level is not None:
+        given["levels"] = tuple(level.items() if isinstance(level, Mapping) else level)
     for name in ("until", "max_wall"):
         if given.get(name) is not None:
             given[name] = _text(given[name])
