@@ -6,6 +6,7 @@ displacements (book 5.14), and coordinates of one style serve one family.
 
 from __future__ import annotations
 
+from sysdyn.compiler.reflection import unreflectable
 from sysdyn.dsl.diagnostics import Diagnostic, Place, Related
 from sysdyn.dsl.expression import Node, variables
 from sysdyn.dsl.network import Network
@@ -32,7 +33,8 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
     if co:
         return _complementary(network, wanted, place)
     if wanted in COMPLEMENTARY:
-        return "lagrangian", (_obstacle(network, wanted, place) or _planned(network, place),)
+        found = _obstacle(network, wanted, place) or unreflectable(network)
+        return wanted, ((found,) if found else ())
     if wanted == "auto":
         return ("hamiltonian" if any(e.function == "T" for e in network.energies) else "lagrangian"), ()
     return wanted, ()
@@ -44,12 +46,9 @@ def _complementary(network: Network, wanted: str, place: Place | None) -> tuple[
         message = f"{wanted} of a model with the cocoordinate '{name.name}'"
         related = (Related("a momentum coordinate", name.place),)
         return wanted, (Diagnostic("E603", message, place or name.place, "co_lagrangian, co_hamiltonian", related),)
-    return "lagrangian", (_planned(network, place or name.place),)
-
-
-def _planned(network: Network, place: Place | None) -> Diagnostic:
-    message = "the complementary formulations are not supported yet (planned: four formulations)"
-    return Diagnostic("N608", message, place or network.place)
+    if wanted == "auto":
+        return "co_hamiltonian" if any(e.function == "V" for e in network.energies) else "co_lagrangian", ()
+    return wanted, ()
 
 
 def _unknowns(node: Node, kind: str) -> list[Node]:

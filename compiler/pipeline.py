@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from sysdyn.compiler.lagrangian import lagrangian
 from sysdyn.compiler.primal import primal
 from sysdyn.compiler.program import Program
 from sysdyn.compiler.program_text import verify_program
+from sysdyn.compiler.reflection import reflect
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError
 from sysdyn.dsl.network import Network
 
@@ -35,6 +36,7 @@ FORMULATIONS: dict[str, Callable[[EnergyModel], DescriptorForm]] = {
     "lagrangian": lagrangian,
     "hamiltonian": hamiltonian,
 }
+"""The primal arrows; `co_` before a name says that they lower the network's reflection."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +90,9 @@ def compile_network(
 ) -> CompiledModel:
     """Lower a checked network; ModelError with everything the energies' rules found."""
     timings: list[Timing] = []
+    reflected = formulation.startswith("co_")
     with _timed("primal", timings):
-        network, inverted = primal(network)
+        network, inverted = primal(reflect(network) if reflected else network)
     with _timed("energies", timings):
         model = energies.energies(network)
         energies.verify_energies(model)
@@ -98,7 +101,7 @@ def compile_network(
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
     with _timed("descriptor", timings):
-        form = FORMULATIONS[formulation](model)
+        form = replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation)
         descriptor.verify_descriptor(form)
     with _timed("program", timings):
         program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))

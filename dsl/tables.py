@@ -80,7 +80,7 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
     path = (folder / item.file).resolve()
     if not path.is_relative_to(folder):
         help_ = "put the file beside the model"
-        report.error("E206", f"table {item.name.name}: '{item.file}' lies outside the model's folder", place, help=help_)
+        report.error("E206", f"table {item.name.name}: '{item.file}' is outside the model's folder", place, help=help_)
         raise Failed
     try:
         if path.stat().st_size > MAX_BYTES:

@@ -1,0 +1,316 @@
+"""Network -> its reflection on Paynter's diagram: the complementary formulations are the primal ones of the reflection.
+
+Effort and flow, momentum and displacement, kinetic and potential stores, common-effort and common-flow nodes, T* and
+V*, T and V, D and G change places (book, chapter 5).  What the primal arrows then call a displacement is a momentum,
+and Lagrange's equations of the reflection are the co-Lagrangian equations of the network: one lowering serves both.
+
+Signs carry over: a branch a -> b has e = e(a) - e(b) at common-effort and f = f(a) - f(b) at common-flow nodes.  An
+energy or content written over one node, or over the difference of two, is the element between them.  A displacement
+that no potential store holds has no place in the complementary family; where it is traced, its quadrature is added, and
+initial positions become initial contents of the stores between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from sysdyn.dsl import expression as ex
+from sysdyn.dsl.diagnostics import Diagnostic, Place
+from sysdyn.dsl.expression import Node
+from sysdyn.dsl.network import (
+    Branch,
+    Coordinate,
+    Coupling,
+    Domain,
+    Dynamic,
+    Energy,
+    Initial,
+    Loop,
+    Network,
+    Shape,
+    State,
+    Terminal,
+)
+
+_KINDS = {"be": "bf", "bf": "be", "bq": "bp", "bp": "bq", "ne": "nf", "nf": "ne"}
+_FUNCTIONS = {"T*": "V*", "V*": "T*", "T": "V", "V": "T", "D": "G", "G": "D"}
+_ELEMENTS = {"kinetic": "potential", "potential": "kinetic", "effort": "flow", "flow": "effort"}
+_SIDES = {"e": "f", "f": "e", "p": "q", "q": "p"}
+
+
+def reflect(network: Network) -> Network:
+    """The reflected network; written momentum coordinates become displacement coordinates.
+
+    The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
+    displacement or flow of a node or branch.
+    """
+    network = _with_contents(as_elements(network))
+    read = frozenset(_read(network))  # quadratures for traces change nothing in the model
+    network = _with_positions(network)
+    return replace(
+        network,
+        coordinates=tuple(_coordinate(c) for c in network.coordinates),
+        energies=tuple(
+            replace(e, function=_FUNCTIONS[e.function], expression=_node(e.expression)) for e in network.energies
+        ),
+        works=tuple(replace(w, effort=_node(w.effort), on=_node(w.on)) for w in network.works),
+        constraints=tuple(replace(c, expression=_node(c.expression)) for c in network.constraints),
+        dynamics=tuple(replace(d, expression=_node(d.expression)) for d in network.dynamics),
+        initials=tuple(replace(i, target=_node(i.target)) for i in network.initials),
+        observations=tuple(replace(o, expression=_node(o.expression)) for o in network.observations),
+        expectations=tuple(
+            replace(e, left=_node(e.left), right=_node(e.right), within=None if e.within is None else _node(e.within))
+            for e in network.expectations
+        ),
+        nodes=tuple(replace(n, domain=_domain(n.domain)) for n in network.nodes),
+        branches=tuple(_branch(b) for b in network.branches),
+        couplings=tuple(_coupling(c) for c in network.couplings),
+        read=read,
+    )
+
+
+def _node(root: Node) -> Node:
+    """The expression with the quantities of nodes and branches reflected."""
+    change = {}
+    for node in ex.topological([root]):
+        if node.op == "var" and node.data[1] in _KINDS:
+            family, kind, order = node.data
+            change[node] = ex.var(family, _KINDS[kind], *node.args, order=order)
+    return ex.substitute(root, change) if change else root
+
+
+def _domain(domain: Domain) -> Domain:
+    return replace(
+        domain,
+        effort=domain.flow,
+        flow=domain.effort,
+        momentum=domain.displacement,
+        displacement=domain.momentum,
+        common="flow" if domain.common == "effort" else "effort",
+    )
+
+
+def _coordinate(c: Coordinate) -> Coordinate:
+    """A momentum coordinate's units stand already where the primal arrows look for those of a displacement."""
+    return replace(c, complementary=not c.complementary)
+
+
+def _energy(e: Energy) -> Energy:
+    return replace(e, function=_FUNCTIONS[e.function], expression=_node(e.expression))
+
+
+def _branch(b: Branch) -> Branch:
+    law = None if b.law is None else _node(b.law)
+    side = None if b.side is None else _SIDES[b.side]
+    return replace(b, domain=_domain(b.domain), kind=_ELEMENTS.get(b.kind, b.kind), side=side, law=law)
+
+
+def _coupling(c: Coupling) -> Coupling:
+    ratio = _node(c.ratio)
+    if c.kind == "transformer":
+        return replace(c, side=_SIDES[c.side], ratio=ratio)
+    # e1 = r f2 reads f1 = r e2 in the reflection: e2 = f1/r and with e1 f1 + e2 f2 = 0 e1 = -f2/r
+    return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), ratio)))
+
+
+def _read(network: Network) -> Iterable[str]:
+    """Common-flow nodes whose flow an equation reads: common-effort nodes of the reflection."""
+    roots = [c.expression for c in network.constraints] + [d.expression for d in network.dynamics]
+    roots += [b.law for b in network.branches if b.law is not None] + [c.ratio for c in network.couplings]
+    roots += [n for w in network.works for n in (w.effort, w.on)]
+    return (n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] == "nf")
+
+
+# -- displacements -----------------------------------------------------------------------------------------
+
+
+def _with_positions(network: Network) -> Network:
+    """Quadratures q' = f for displacements that traces and expectations read and no potential store holds."""
+    roots = [o.expression for o in network.observations]
+    roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
+    held = {b.name for b in network.branches if b.kind == "potential"}
+    wanted: dict[tuple[str, str], None] = {}
+    for node in ex.topological(roots):
+        if node.op == "var" and (node.data[1] == "nq" or (node.data[1] == "bq" and node.data[0] not in held)):
+            wanted.setdefault((node.data[0], node.data[1]))
+    nodes = {n.name: (n.shape, n.domain, n.place) for n in network.nodes}
+    for name, kind in wanted:
+        if kind == "nq":
+            shape, domain, place = nodes[name]
+            loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(shape))
+            network = _with_position(
+                network, (name, kind), (shape, loops, tuple(ex.index(x.index) for x in loops)), domain, place
+            )
+        else:
+            for b in network.branches:
+                if b.name == name:
+                    shape = tuple((loop.first, loop.last) for loop in b.loops)
+                    network = _with_position(network, (name, kind), (shape, b.loops, b.at), b.domain, b.place)
+    # positions have been read; as initial values they have become contents of stores
+    kept = tuple(i for i in network.initials if not _is_position(i.target, held))
+    return replace(network, initials=kept)
+
+
+def _is_position(node: Node, held: set[str]) -> bool:
+    return node.op == "var" and (node.data[1] == "nq" or (node.data[1] == "bq" and node.data[0] not in held))
+
+
+def _with_position(
+    network: Network,
+    what: tuple[str, str],
+    family: tuple[Shape, tuple[Loop, ...], tuple[Node, ...]],
+    domain: Domain,
+    place: Place,
+) -> Network:
+    """One dynamic variable NAME.q for a displacement var(name, kind)."""
+    name = f"{what[0]}.q"
+    shape, loops, at = family
+    state = ex.var(name, "s", *at)
+    starts = []
+    for initial in network.initials:
+        if initial.target.op == "var" and initial.target.data[:2] == what:
+            starts.append(replace(initial, target=ex.var(name, "s", *initial.target.args), fixed=True))
+    if not starts:
+        starts = [Initial(state, ex.const(0.0), True, loops, place)]
+
+    def read(root: Node) -> Node:
+        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] == what]
+        return ex.substitute(root, {n: ex.var(name, "s", *n.args, order=n.data[2]) for n in found}) if found else root
+
+    rate = ex.var(what[0], "nf" if what[1] == "nq" else "bf", *at)
+    return replace(
+        network,
+        states=(*network.states, State(name, shape, domain.displacement, place)),
+        dynamics=(*network.dynamics, Dynamic(state, rate, loops, place)),
+        initials=(*network.initials, *starts),
+        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
+        expectations=tuple(
+            replace(e, left=read(e.left), right=read(e.right), within=None if e.within is None else read(e.within))
+            for e in network.expectations
+        ),
+    )
+
+
+# -- written energies as elements --------------------------------------------------------------------------
+
+_STORES = {
+    "V": ("potential", "nq", "bq", "e"),
+    "T*": ("kinetic", "nf", "bf", "p"),
+    "D": ("dissipator", "nf", "bf", "e"),
+}
+
+
+def as_elements(network: Network) -> Network:
+    """Energies and contents over one node, or over the difference of two, as the branches that they are."""
+    if not network.nodes:
+        return network
+    nodes = {n.name: n.domain for n in network.nodes}
+    kept, made = [], []
+    for number, energy in enumerate(network.energies):
+        pieces = _pieces(energy.expression)
+        found = [_element(energy, piece, f"{energy.function} {number}.{k}", nodes) for k, piece in enumerate(pieces)]
+        branches = [b for b in found if b is not None]
+        if len(branches) == len(pieces):
+            made += branches
+        else:
+            kept.append(energy)
+    return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
+
+
+def _pieces(root: Node) -> list[Node]:
+    """The summands of an expression; a factor before a sum is carried to its terms."""
+    if root.op == "mul":
+        sums = [(e, a) for e, a in zip(root.data, root.args, strict=True) if e == 1.0 and a.op == "sum"]
+        if len(sums) == 1:
+            rest = ex.product(1.0, ((e, a) for e, a in zip(root.data, root.args, strict=True) if a is not sums[0][1]))
+            return [ex.mul(rest, piece) for piece in _pieces(sums[0][1])]
+    if root.op != "sum":
+        return [root]
+    found = [ex.scale(c, p) for c, a in zip(root.data[1], root.args, strict=True) for p in _pieces(a)]
+    return [*found, ex.const(root.data[0])] if root.data[0] else found
+
+
+def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
+    """The branch whose law is the slope of an energy over u = x(a) - x(b), or None."""
+    store = _STORES.get(energy.function)
+    if store is None:
+        return None
+    kind, node_kind, own_kind, side = store
+    used = sorted((n for n in ex.variables(piece) if n.op == "var"), key=lambda n: n.number)
+    if not 1 <= len(used) <= 2 or any(n.data[1] != node_kind or n.data[2] for n in used):
+        return None
+    a, b = used[0], used[-1] if len(used) == 2 else None
+    slope = ex.derivative(piece, a)
+    if b is not None and not ex.is_const(ex.add(slope, ex.derivative(piece, b)), 0.0):
+        return None
+    at = tuple(ex.index(loop.index) for loop in energy.loops)
+    own = ex.var(name, own_kind, *at)
+    law = ex.substitute(slope, {a: own} if b is None else {a: own, b: ex.const(0.0)})
+    minus = Terminal(None, ()) if b is None else Terminal(b.data[0], b.args)
+    plus = Terminal(a.data[0], a.args)
+    return Branch(name, at, energy.loops, nodes[a.data[0]], kind, side, law, plus, minus, None, energy.place)
+
+
+def _with_contents(network: Network) -> Network:
+    """Initial positions of common-flow nodes as initial displacements of the potential stores between them."""
+    given: dict[tuple[str, tuple[Node, ...]], Initial] = {}
+    for initial in network.initials:
+        if initial.target.op == "var" and initial.target.data[1] == "nq":
+            given[initial.target.data[0], initial.target.args] = initial
+    written = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] in ("bq", "be")}
+    added = []
+    for b in network.branches:
+        if b.kind != "potential" or b.domain.common != "flow" or b.name in written or b.on is not None:
+            continue
+        ends = [_start(t, given, b) for t in (b.plus, b.minus)]
+        value = ex.sub(ends[0][0], ends[1][0])
+        target = ex.var(b.name, "bq", *b.at)
+        added.append(Initial(target, value, ends[0][1] and ends[1][1], b.loops, b.place))
+    return replace(network, initials=(*network.initials, *added))
+
+
+def _start(
+    terminal: Terminal | None, given: dict[tuple[str, tuple[Node, ...]], Initial], branch: Branch
+) -> tuple[Node, bool]:
+    """The initial position of a terminal over the branch's loops, and whether it is fixed; 0 where none is written."""
+    if terminal is None or terminal.node is None:
+        return ex.const(0.0), True
+    for (name, at), initial in given.items():
+        if name == terminal.node:
+            change = {}
+            fits = True
+            for own, asked in zip(at, terminal.at, strict=True):
+                if own.op == "index":
+                    change[own] = asked
+                elif own is not asked:
+                    fits = False
+            if fits:
+                return ex.substitute(initial.value, change), initial.fixed
+    return ex.const(0.0), True
+
+
+def unreflectable(network: Network) -> Diagnostic | None:
+    """The first statement that reads a displacement or flow where only momenta and efforts may stand (E602)."""
+    network = as_elements(network)
+    help_ = "formulation lagrangian, hamiltonian"
+    statements = [(f"energy {e.function}", (e.expression,), e.place) for e in network.energies]
+    statements += [("work", (w.effort, w.on), w.place) for w in network.works]
+    statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in network.constraints]
+    laws = [(f"law of {b.name}", (b.law,), b.place) for b in network.branches if b.law is not None]
+    moduli = [(f"ratio of {c.first.partition('#')[0]}", (c.ratio,), c.place) for c in network.couplings]
+    for what, roots, place in statements:
+        for node in ex.topological(roots):
+            if node.op == "var" and node.data[1] in ("nq", "nf", "np", "bq", "bf", "bp", "ne", "be"):
+                message = f"{what} is written in {node}: it has no counterpart in the complementary family"
+                return Diagnostic("E602", message, place, help_)
+    for what, roots, place in (*laws, *moduli):
+        own = what.removeprefix("law of ")
+        for node in ex.topological(roots):
+            if node.op == "var" and node.data[1] in ("nq", "bq") and node.data[0] != own:
+                return Diagnostic("E602", f"{what} depends on displacement {node}", place, help_)
+    wrong = next((b for b in network.branches if b.on is not None), None)
+    if wrong is not None:
+        message = f"'{wrong.name}' acts along an expression of displacements"
+        return Diagnostic("E602", message, wrong.place, help_)
+    return None
