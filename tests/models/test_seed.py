@@ -12,7 +12,7 @@ from sysdyn.runtime.trace import Trace
 
 ALLOWED = 1e-5
 """Of each variable's largest magnitude, at an accuracy of 1e-6."""
-INTEGRATION = ("q10", "q20", "q30")
+INTEGRATION = ("q10", "q20", "q30", "q40")
 """Constants of integration: by default what the initial values make them."""
 FACTORS = (0.8, 1.3, 0.7, 1.5, 1.1)
 SEED = ROOT / "models" / "seed"
