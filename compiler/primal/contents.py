@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.primal.bounds import Box, shape_of
+from sysdyn.compiler.primal.bounds import Box, Interval, shape_of
 from sysdyn.compiler.primal.incidence import PLUS, Element, Touch
 from sysdyn.compiler.primal.integrals import line
 from sysdyn.compiler.primal.laws import own
@@ -82,10 +82,11 @@ class Contents:
 
     def __init__(self, reader: Reader, members: Sequence[Member], initials: Sequence[Initial]) -> None:
         self.reader = reader
+        self.members = members
         self.initials = initials
         self.parameters: list[Parameter] = []
         self._given: dict[str, list[tuple[Initial, Box, Node]]] = {}
-        self._pinned: set[str] = set()
+        self._pinned: set[Node] = set()
         for initial in initials:
             for part, box, content in self._contents(initial):
                 self._given.setdefault(part.target.data[0], []).append((part, box, content))
@@ -129,8 +130,16 @@ class Contents:
             places = [self.reader.sizes.affine(a, loops, initial.place) for a in initial.target.args]
             pairs = zip(places, at, strict=True)
             change = {index(a.loop): sub(node, a.offset.node) for a, node in pairs if a.loop is not None}
-            value = _within(box, at, substitute(content, change), value)
+            own_value = substitute(content, change)
+            if any(n.op == "index" for a in at for n in _leaves(a)):
+                value = _within(box, at, own_value, value)
+            elif all(i.holds(k) for i, k in zip(box, self._point(at, initial), strict=True)):
+                value = own_value
         return value
+
+    def _point(self, at: tuple[Node, ...], initial: Initial) -> Box:
+        bounds = [self.reader.sizes.bound(a, initial.place) for a in at]
+        return tuple(Interval(b, b) for b in bounds)
 
     def _constant(self, element: Element, members: Sequence[Member]) -> None:
         """A parameter, unless it is zero by the text."""
@@ -163,9 +172,14 @@ class Contents:
             ):
                 if kind == "pin":
                     yield replace(initial, target=target, value=value, loops=loops)
-                elif kind == "run" and target.data[0] not in self._pinned:
-                    self._pinned.add(target.data[0])
+                elif kind == "class" and target not in self._pinned:
+                    self._pinned.update(() if target.args else (target,))
                     yield replace(initial, target=target, value=value, loops=self._without(loops, target))
+
+    def _led(self, coordinate: str) -> bool:
+        """Whether a statement gives the content of a leader of the coordinate's classes."""
+        leaders = [m for m in self.members if m.leads and m.coordinate == coordinate]
+        return any(_meet(m.box, box) for m in leaders for _, box, _ in self._given.get(m.element.name, []))
 
     def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
         """The loops that the target still follows."""
@@ -173,7 +187,7 @@ class Contents:
         return tuple(loop for loop in loops if loop.index in used)
 
     def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
-        """(pin | run | drop, target, value) where one piece is read."""
+        """Where one piece is read: (pin | class | drop, target, value); class: the coordinate of the store's class."""
         target = initial.target
         piece = None
         if target.op == "var" and target.data[1] in ("be", "bq") and not variables(initial.value):
@@ -182,12 +196,11 @@ class Contents:
             m = piece.member
             q = var(m.coordinate, "q", *m.indices(target.args))
             first = self.start(m.leader.name, m.leader_at(target.args))
-            if m.leads:
+            if m.leads and len(m.index) == len(target.args):
                 content = self._charge(piece, initial)
                 assert content is not None
                 return "pin", q, content
-            own_leader = m.leader.number == m.element.number
-            return ("run", q, first) if own_leader or not self._given.get(m.leader.name) else ("drop", q, first)
+            return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
         if piece is not None and piece.member is None and (content := self._charge(piece, initial)) is not None:
             moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
             return "pin", *_pin(moved, content)
@@ -212,6 +225,10 @@ def _pin(target: Node, value: Node) -> tuple[Node, Node]:
 
 def _follows(m: Member) -> bool:
     return m.element.branch.kind == "potential" and not m.leads
+
+
+def _meet(a: Box, b: Box) -> bool:
+    return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))
 
 
 def _within(box: Box, at: tuple[Node, ...], value: Node, other: Node) -> Node:

@@ -1,6 +1,7 @@
 """Networks of nodes and branches for tests, without text; and their poles by way of the oracle."""
 
 import itertools
+import types
 
 import numpy as np
 from catalogue import ONE, PLACE
@@ -18,6 +19,9 @@ from sysdyn.dsl.network import (
     Observation,
     Terminal,
 )
+from sysdyn.runtime.carrier import load
+from sysdyn.runtime.simulate import Options, simulate
+from sysdyn.runtime.trace import Trace
 
 
 def domain(name, common, pseudo=False):
@@ -79,7 +83,7 @@ class Net:
     def V(self, name, value, plus, minus=None, **more):
         self.branch(name, "effort", "e", value, plus, minus, **more)
 
-    def I(self, name, value, plus, minus=None, **more):  # noqa: E743
+    def I(self, name, value, plus, minus=None, **more):  # noqa: E743, RUF100
         self.branch(name, "flow", "f", value, plus, minus, **more)
 
     def couple(self, kind, name, ratio, first, second, side="f", of=(None, None), loops=()):
@@ -305,3 +309,132 @@ class Tableau:
 
 def every(*extents):
     return itertools.product(*(range(first, last + 1) for first, last in extents))
+
+
+LETTER = {"kinetic": "L", "potential": "C", "dissipator": "R", "effort": "V", "flow": "I", "port": "port"}
+OWN = {("kinetic", "p"): "bf", ("potential", "q"): "be", ("potential", "e"): "bq", ("dissipator", "e"): "bf"}
+
+
+def unrolled(net, **sizes):
+    """The Tableau of a Net, element by element; linear laws whose own variable is that of `Net.R`, `L`, `C`, `V`, `I`."""
+    found = Tableau()
+
+    def number(root, at):
+        return x.evaluate([root], lambda n: at[n.data] if n.op == "index" else sizes[n.data])[0]
+
+    def whole(nodes, at):
+        return ",".join(str(round(number(n, at))) for n in nodes)
+
+    def places(loops, at):
+        if not loops:
+            yield at
+            return
+        first, last = (round(number(b, at)) for b in (loops[0].first, loops[0].last))
+        for k in range(first, last + 1):
+            yield from places(loops[1:], {**at, loops[0].index: k})
+
+    for b in net.branches:
+        value = 0.0
+        slope = None
+        if (b.kind, b.side) in OWN:
+            slope = x.derivative(b.law, x.var(b.name, OWN[b.kind, b.side], *b.at))
+        for at in places(b.loops, {}):
+            value = 0.0 if slope is None else number(slope, at)
+            ends = [None if t.node is None else f"{t.node}[{whole(t.at, at)}]" for t in (b.plus, b.minus)]
+            found.element(f"{b.name}[{whole(b.at, at)}]", LETTER[b.kind], value, *ends, b.domain.common)
+    for c in net.couplings:
+        for at in places(c.loops, {}):
+            index = whole(c.at, at)
+            found.couple(c.kind, number(c.ratio, at), f"{c.first}[{index}]", f"{c.second}[{index}]")
+    return found
+
+
+def null_vector(a, e, s):
+    """The vector of the pencil at a simple pole; None where the pole is not simple enough to compare vectors."""
+    _, sizes, vectors = np.linalg.svd(a + s * e)
+    return vectors[-1].conj() if len(sizes) < 2 or sizes[-2] > 1e-5 else None
+
+
+def solve(network, end, path, formulation="lagrangian", accuracy=1e-6, **more):
+    """The trace of a network from 0 to `end`, and the outcome."""
+    with x.fresh():
+        model = compiled(network(), formulation)
+        b = model.bind()
+        arrays = {k: getattr(b, k) for k in ("p", "ix", "shapes", "row_shapes", "offsets")}
+        arrays["initial"] = [s.to_json() for s in b.initial]
+        module = types.ModuleType("generated")
+        exec(compile(model.text, "generated", "exec"), module.__dict__)  # noqa: S102
+        options = Options(path / "t.h5", 0.0, end, accuracy=accuracy, every=end / 20, **more)
+        outcome = simulate(model.manifest(b), arrays, load(module), options)
+        return Trace.open(path / "t.h5"), outcome
+
+
+def read_all(tableau):
+    """Observations of every effort and flow of a Tableau made by `unrolled`: name -> node."""
+
+    def split(text):
+        name, _, at = text.rstrip("]").partition("[")
+        return name, tuple(x.const(int(k)) for k in at.split(",") if k)
+
+    found = {}
+    for text, common in tableau.nodes.items():
+        name, at = split(text)
+        found[f"n {text}"] = x.var(name, "ne" if common == "effort" else "nf", *at)
+    for text in tableau.elements:
+        name, at = split(text)
+        found[f"e {text}"] = x.var(name, "be", *at)
+        found[f"f {text}"] = x.var(name, "bf", *at)
+    return found
+
+
+def readings(model, oracle, y, yd):
+    """Values of the observations at complex y, yd of a model that is linear, less those at rest."""
+    size = int(oracle.at[-1])
+
+    def at(y, yd):
+        r = oracle.rows("observe", 0.0, np.append(y, np.zeros(size - len(y))), np.append(yd, np.zeros(size - len(y))))
+        rows = {e.label: oracle.to[k] for k, e in enumerate(model.form.rows) if e.block == "observe"}
+        return {name: r[k] for name, k in rows.items()}
+
+    rest, real, imaginary = at(0 * y.real, 0 * y.real), at(y.real, yd.real), at(y.imag, yd.imag)
+    return {name: real[name] - rest[name] + 1j * (imaginary[name] - rest[name]) for name in rest}
+
+
+def vectors_agree(model, tableau, number=3):
+    """Largest relative difference of all efforts and flows in the modes of the model and of the tableau."""
+    a, e, oracle = pencil(model)
+    b, d = tableau.pencil()
+    names = [f"n {n}" for n in tableau.nodes]
+    names += [f"{kind} {n}" for kind in "ef" for n in tableau.elements]
+    floating = floating_nodes(tableau)
+    worst = 0.0
+    for s in finite_poles(b, d)[:number]:
+        mine, theirs = null_vector(a, e, s), null_vector(b, d, s)
+        if mine is None or theirs is None:
+            continue
+        seen = readings(model, oracle, mine, s * mine)
+        kept = [k for k, name in enumerate(names) if name[2:] not in floating or name[0] != "n"]
+        u, v = np.array([seen[names[k]] for k in kept]), theirs[kept]
+        u = u * (np.vdot(u, v) / np.vdot(u, u))
+        worst = max(worst, np.abs(u - v).max() / np.abs(v).max())
+        for n, (_, _, plus, minus, common) in tableau.elements.items():
+            across = "e" if common == "effort" else "f"
+            ends = [seen[f"n {m}"] if m is not None else 0.0 for m in (plus, minus)]
+            gap = abs(ends[0] - ends[1] - seen[f"{across} {n}"])
+            worst = max(worst, gap / max(abs(value) for value in seen.values()))
+    return worst
+
+
+def floating_nodes(tableau):
+    """Common-effort nodes of components without ground: their efforts are known up to a constant."""
+    seen = {None}
+    while True:
+        more = {
+            n
+            for _, _, a, b, common in tableau.elements.values()
+            if common == "effort" and (a in seen) != (b in seen)
+            for n in (a, b)
+        }
+        if more <= seen:
+            return {n for n, common in tableau.nodes.items() if common == "effort"} - seen
+        seen |= more

@@ -1,7 +1,8 @@
 """Random networks of electrical, translational and rotational parts, as a Net and as a Tableau."""
 
 import numpy as np
-from networks import ELECTRICAL, ROTATION, TRANSLATION, Net, Tableau
+from networks import ELECTRICAL, ROTATION, TRANSLATION, Net, Tableau, unrolled
+from sysdyn.dsl import expression as x
 
 
 class Sketch:
@@ -122,3 +123,90 @@ def sketch(seed):
         found.read = {n for n in common if rng.random() < 0.1}
         if found.tableau().regular():
             return found
+
+
+class Arrays:
+    """Random statements over loops: chains, ladders, taps, buses, grids; some of them unusual."""
+
+    def __init__(self, seed):
+        self.rng = rng = np.random.default_rng(seed)
+        self.sizes = {"n": int(rng.integers(3, 7)), "m": int(rng.integers(2, 4)), "k": 2}
+        self.net = Net()
+        n, m, k = (x.param(name) for name in "nmk")
+        self.families = {"a": (), "b": (), "v": ((0, n),), "w": ((1, n),), "z": ((1, n),), "u": ((1, n), (1, m))}
+        self.hubs = [(), (x.const(0),), (n,), (k,), (x.const(1),)]
+        for name, shape in self.families.items():
+            self.net.node(name, ELECTRICAL, *shape)
+        for number in range(int(rng.integers(3, 9))):
+            self.statement(number)
+
+    def pick(self, items):
+        return items[self.rng.integers(len(items))]
+
+    def numeric(self, node, at):
+        look = {**self.sizes, **at}
+        return round(x.evaluate([node if isinstance(node, x.Node) else x.const(node)], lambda n: look[n.data])[0])
+
+    def statement(self, number):
+        """One branch statement that stays inside its node families."""
+        rng, n, m, k = self.rng, x.param("n"), x.param("m"), x.param("k")
+        depth = int(rng.choice((0, 1, 1, 1, 1, 2)))
+        along = self.pick([(1, n), (2, n), (1, x.sub(n, x.const(1))), (k, n), (1, k)])
+        loops = (("i", *along), ("j", 1, m))[:depth]
+        if rng.random() < 0.1 and depth:
+            loops = (("i", 1, n), ("j", 2, m))[:depth]
+        ends = []
+        for _ in range(40):
+            ends = [self.terminal(depth), self.terminal(depth)]
+            if ends[0] != ends[1] and any(e is not None for e in ends) and all(self.inside(e, loops) for e in ends):
+                break
+        else:
+            return
+        if rng.random() < 0.15 and ends[0] is not None:
+            ends[1] = None
+        kind = self.pick("RRRLCV" if depth == 0 else "RRRLC")
+        if ends[0] is None:
+            ends.reverse()
+        value = x.const(float(rng.uniform(0.5, 2.0)))
+        if depth:
+            value = x.mul(value, x.linear(1.0, ((0.3, x.index("i")),)))
+        if kind == "V":
+            value = x.time()
+        getattr(self.net, kind)(f"{kind}{number}", value, *ends, loops=loops)
+
+    def terminal(self, depth):
+        rng = self.rng
+        if rng.random() < 0.12:
+            return None
+        i = x.add(x.index("i"), x.const(int(rng.choice((-1, 0, 0, 1)))))
+        j = x.add(x.index("j"), x.const(int(rng.choice((-1, 0, 0)))))
+        name = self.pick("abvwz" if depth < 2 else "vwuuuu") if depth else self.pick("abvwu")
+        if name in "ab":
+            return name
+        fixed = self.pick([x.const(1), x.param("n"), x.param("k")])
+        if name == "u":
+            if depth == 2:
+                return (name, i, j)
+            return (name, i if depth else fixed, self.pick([x.const(1), x.param("m")]))
+        return (name, i if depth and rng.random() < 0.85 else fixed)
+
+    def inside(self, end, loops):
+        if end is None or isinstance(end, str):
+            return True
+        name, *at = end
+        for k, node in enumerate(at):
+            low, high = (self.numeric(b, {}) for b in self.families[name][k])
+            for side in (1, 2):
+                values = {loop[0]: self.numeric(loop[side], {}) for loop in loops}
+                if not low <= self.numeric(node, values) <= high:
+                    return False
+        return True
+
+
+def arrays(seed):
+    """Random statements over loops with a regular tableau; inside an expression block."""
+    for k in range(200):
+        found = Arrays((seed, k))
+        if found.net.branches and unrolled(found.net, **found.sizes).regular():
+            return found
+    raise AssertionError(seed)
