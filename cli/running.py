@@ -252,7 +252,9 @@ def _parameters(prepared: Prepared) -> Iterator[Parameter]:
 def _ran(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
     failure = None
     try:
-        outcome = simulate(prepared.manifest, prepared.arrays, prepared.carrier, options)
+        outcome = simulate(
+            prepared.manifest, prepared.arrays, prepared.carrier, options, start=started.state, facts=started.facts
+        )
     except ValueError as error:
         raise UsageError(str(error)) from error
     except SolverFailure as error:

@@ -92,6 +92,17 @@ class Linear(c.Structure):
     ]
 
 
+class Stepper(c.Structure):
+    """sd_stepper."""
+
+    _fields_ = [
+        ("self", _P),
+        ("system", _P),
+        ("n", _I),
+        *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "start"]],
+    ]
+
+
 class Bdf(c.Structure):
     """sd_bdf."""
 
@@ -154,9 +165,11 @@ class Bdf(c.Structure):
         ("rejected_steps", _L),
         ("newton_failures", _L),
         ("newton_iterations", _L),
+        ("taken", _L),
         ("cause", _I),
         ("bad_row", _I),
         ("bad_column", _I),
+        ("stepper", Stepper),
     ]
 
 
@@ -200,7 +213,7 @@ class Run(c.Structure):
     """sd_run."""
 
     _fields_ = [
-        ("bdf", _P),
+        ("stepper", _P),
         ("settle", _P),
         ("written", _I),
         ("observed", _I),
@@ -226,6 +239,7 @@ class Run(c.Structure):
         ("next", _I),
         ("pending", _I),
         ("started", _I),
+        ("fresh", _I),
         *[(name, _D) for name in ["stored", "dissipated", "supplied", "step_dissipated", "step_supplied"]],
         *[(name, _D) for name in ["t_from", "power_dissipated", "power_supplied"]],
         *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "memory"]],
@@ -256,6 +270,7 @@ def _load() -> Any:
         "sd_bdf_new": (c.POINTER(Bdf), [_P, _P]),
         "sd_bdf_free": (None, [_P]),
         "sd_bdf_start": (None, [_P, _D, _P, _P, _D]),
+        "sd_bdf_stepper": (_P, [_P]),
         "sd_bdf_step": (c.c_int, [_P]),
         "sd_bdf_dense": (None, [_P, _D, _P, _P]),
         "sd_settle_new": (c.POINTER(Settle), [_P, _P, _I]),
@@ -263,6 +278,7 @@ def _load() -> Any:
         "sd_settle_point": (c.c_int, [_P, _D, _P, _P]),
         "sd_run_new": (c.POINTER(Run), [_P, _P, _I, _I, _I]),
         "sd_run_free": (None, [_P]),
+        "sd_run_restart": (None, [_P, _D, _D, _P, _P, _P, _P]),
         "sd_run_advance": (c.c_int, [_P, _L, _D]),
     }
     for name, (result, arguments) in signatures.items():

@@ -10,14 +10,16 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from sysdyn.runtime import core_library as lib
-from sysdyn.runtime.description import Floats, Ints
+from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel, SolverFailure
 from sysdyn.runtime.ordering import column_order
+from sysdyn.runtime.request import LONGEST, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.restart import Restart
 from sysdyn.runtime.scales import magnitudes
+from sysdyn.runtime.segments import Segment, segments
 from sysdyn.runtime.settled import Settler
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.structure import DENSE, null_place
@@ -29,72 +31,8 @@ CHUNK_STEPS = 1 << 20
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
-LONGEST = 0.05
-"""Longest step as part of the span: short events of sources are met, and the dense output stays honest."""
-
-TRACE, STEP, COMPARED = 1, 2, 4
-"""Kinds of rows (their second column, a sum)."""
-
 Sink = Callable[[Floats], None]
 Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What an integration shall do.
-
-    t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
-    (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
-    absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; magnitude [unknowns as
-    written] known from an earlier run (else tracked); fixed_step [s]: no error test (with max_order 1 the
-    implicit Euler method); h_max [s]: longest step, None: LONGEST of the span.
-    """
-
-    t_end: float
-    instants: Floats
-    instant_kinds: Ints | None = None
-    every_step: bool = True
-    sample_steps: bool = False
-    rtol: float = 1e-6
-    atol: float | None = None
-    max_steps: int | None = None
-    max_wall: float | None = None
-    magnitude: Floats | None = None
-    index: int = 3
-    max_order: int = lib.MAX_ORDER
-    fixed_step: float | None = None
-    h_max: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Statistics:
-    """Deterministic counters of one or more runs."""
-
-    steps: int = 0
-    rejected_steps: int = 0
-    residual_evaluations: int = 0
-    jacobian_evaluations: int = 0
-    factorisations: int = 0
-    newton_failures: int = 0
-
-    def __add__(self, other: Statistics) -> Statistics:
-        return Statistics(*(getattr(self, name) + getattr(other, name) for name in self.__slots__))
-
-
-@dataclass(frozen=True, slots=True)
-class Finished:
-    """An integration that reached its end.
-
-    magnitude [unknowns as written]: largest |y| met; largest [observed]: of the values and of the terms of their
-    expressions; cpu [s].
-    """
-
-    reached: float
-    statistics: Statistics
-    magnitude: Floats
-    largest: Floats
-    cpu: float
-    unsettled: int
 
 
 class Integration:
@@ -105,13 +43,16 @@ class Integration:
         self.cpu = 0.0
         self.y, self.yd = start.for_form(system)
         jy, jyd = system.jacobian(start.t, self.y, self.yd)
-        self._start_rate = self.yd
+        self._start_rate = self.yd.copy()
+        self._restart: Restart | None = None
         # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, jyd, request.index)
         self.magnitude = self._magnitudes()
         self._linear(jy, jyd)
         self.settler = self._settler()
+        stops = None if request.fixed_step else request.stops
+        self.segments = segments(start.t, request.t_end, stops)
         self._stepper()
         self._driver()
 
@@ -148,7 +89,7 @@ class Integration:
         self._atol = None if request.atol is None else np.full(self.system.unknowns, request.atol)
         bdf = self.bdf.contents
         bdf.max_order = request.max_order
-        bdf.rtol, bdf.t_end = request.rtol, request.t_end
+        bdf.rtol, bdf.t_end = request.rtol, self.segments[0].end
         bdf.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
         bdf.fixed_h = request.fixed_step or 0.0
         bdf.atol = lib.pointer(self._atol)
@@ -162,7 +103,11 @@ class Integration:
         self.observed = system.observed_rows("observe")[1]
         self.width = lib.ROW_HEAD + 2 * self.observed
         self.run_ = lib.core.sd_run_new(
-            self.bdf, self.settler.core, system.form.written, system.form.extended, self.observed
+            lib.core.sd_bdf_stepper(self.bdf),
+            self.settler.core,
+            system.form.written,
+            system.form.extended,
+            self.observed,
         )
         if not self.run_:
             raise MemoryError
@@ -252,11 +197,27 @@ class Integration:
             bdf.newton_failures,
         )
 
-    def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
-        """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
+    def _cross(self, segment: Segment) -> None:
+        """Restarts behind the instant at which a segment ended."""
+        n, bdf = self.system.form.written, self.bdf.contents
+        y, yd = (np.zeros(self.system.form.extended) for _ in range(2))
+        lib.core.sd_bdf_dense(self.bdf, bdf.t, lib.pointer(y), lib.pointer(yd))
+        y, yd, _ = self.settler.settle(bdf.t, y[:n], yd[:n])
+        if self._restart is None:
+            self._restart = Restart(self.settler, self.roles.state[:n])
+        found = self._restart.across(segment.begin, y, yd)
+        if found is None:
+            raise self._failure("newton")
+        self.y[:], self._start_rate[:] = 0.0, 0.0
+        self.y[:n], self._start_rate[:n] = found
+        self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
+        bdf.t_end = segment.end
+        pointers = (lib.pointer(item) for item in (self.y, self.yd, y, yd))
+        lib.core.sd_run_restart(self.run_, segment.begin, segment.label, *pointers)
+
+    def _advance(self, sink: Sink, progress: Progress | None, began: float) -> None:
+        """To the end of a segment."""
         request, bdf = self.request, self.bdf.contents
-        began = time.monotonic()
-        self.system.core.residual_evaluations = self.system.core.jacobian_evaluations = 0
         while True:
             left = CHUNK_STEPS if request.max_steps is None else request.max_steps - bdf.steps
             before = time.process_time()
@@ -267,14 +228,27 @@ class Integration:
             self.settler.system.failure.check()
             if progress is not None:
                 progress(bdf.t)
-            if state == 1:
-                break
             if state == 3:
                 raise self._failure(lib.CAUSES[bdf.cause])
             if request.max_steps is not None and bdf.steps >= request.max_steps and bdf.t < request.t_end:
                 raise self._failure("max_steps")
-            if request.max_wall is not None and time.monotonic() - began > request.max_wall:
+            late = request.max_wall is not None and time.monotonic() - began > request.max_wall
+            if late and bdf.t < request.t_end:
                 raise self._failure("max_wall")
+            if state == 1:
+                break
+
+    def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
+        """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
+        began = time.monotonic()
+        self.system.core.residual_evaluations = self.system.core.jacobian_evaluations = 0
+        bdf = self.bdf.contents
+        for segment in self.segments:
+            if segment is not self.segments[0]:
+                before = time.process_time()
+                self._cross(segment)
+                self.cpu += time.process_time() - before
+            self._advance(sink, progress, began)
         return Finished(
             bdf.t,
             self.statistics(),

@@ -81,16 +81,22 @@ class _Linear:
         i, j, v = self.entries
         aim = -r
         np.add.at(aim, i, v * u[j])
-        # rows of equal size: a row of small coefficients must not pass for a redundant one
-        size = np.zeros(self.shape[0])
-        np.add.at(size, i, v * v)
-        size = np.where(size > 0.0, np.sqrt(size), 1.0)
-        v, aim = v / size[i], aim / size
-        if max(self.shape) <= SINGULAR_VALUES:
-            a = np.zeros(self.shape)
-            np.add.at(a, (i, j), v)
-            return np.asarray(np.linalg.lstsq(a, aim, rcond=RANK)[0], dtype=np.float64)
-        return _saddle_point(self.shape, (i, j, v), aim)
+        return least_norm(self.shape, (i, j, v), aim)
+
+
+def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value)."""
+    i, j, v = entries
+    # rows of equal size: a row of small coefficients must not pass for a redundant one
+    size = np.zeros(shape[0])
+    np.add.at(size, i, v * v)
+    size = np.where(size > 0.0, np.sqrt(size), 1.0)
+    v, aim = v / size[i], aim / size
+    if max(shape) <= SINGULAR_VALUES:
+        a = np.zeros(shape)
+        np.add.at(a, (i, j), v)
+        return np.asarray(np.linalg.lstsq(a, aim, rcond=RANK)[0], dtype=np.float64)
+    return _saddle_point(shape, (i, j, v), aim)
 
 
 def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:

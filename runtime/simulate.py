@@ -21,7 +21,8 @@ from sysdyn.runtime.accuracy import Achieved, Sampled, control
 from sysdyn.runtime.carrier import Carrier
 from sysdyn.runtime.description import Description, Floats, Ints, describe, element
 from sysdyn.runtime.failures import SolverFailure
-from sysdyn.runtime.integrate import COMPARED, STEP, TRACE, Finished, Integration, Request, Statistics
+from sysdyn.runtime.integrate import Integration
+from sysdyn.runtime.request import COMPARED, STEP, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure import Structure, structure
 from sysdyn.runtime.system import System
@@ -41,7 +42,8 @@ class Options:
     every: interval of the trace (None: accepted steps); at: further instants of the trace; sampled_at: instants of
     samples alone; accuracy relative to the largest value of each traced quantity, accuracy_on: (name, accuracy) of
     single ones (the others are then free if `accuracy` is None); rtol, atol: the solver's own, switch the control
-    off; euler_step: of method "euler"; sample_steps: hand the sides of expects back at accepted steps too.
+    off; euler_step: of method "euler"; stops: ascending instants at which the text jumps or has kinks: a step ends and
+    the integration restarts there; sample_steps: hand the sides of expects back at accepted steps too.
     """
 
     output: str | Path
@@ -57,6 +59,7 @@ class Options:
     method: str = "auto"
     index: str = "auto"
     euler_step: float | None = None
+    stops: Floats | None = None
     max_steps: int | None = None
     max_wall: float | None = None
     sample_steps: bool = False
@@ -203,6 +206,7 @@ class _Runs:
             max_wall=left,
             magnitude=magnitude,
             index=self.index,
+            stops=options.stops,
             max_order=1 if self.method == "euler" else lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
@@ -365,8 +369,13 @@ def simulate(
     binding: Mapping[str, Any] | None,
     carrier: Carrier,
     options: Options,
+    *,
+    start: ConsistentState | None = None,
+    facts: Structure | None = None,
 ) -> Outcome:
     """Simulates a bound model into a trace file.
+
+    start: a consistent state at t_start that is already known, facts: the structure there (else both are found).
 
     Raises InconsistentStart, TraceError, ValueError (options that make no sense); a SolverFailure is raised with
     `partial`, the Outcome up to it, after the trace was closed with final = 0.
@@ -374,8 +383,8 @@ def simulate(
     description = manifest if isinstance(manifest, Description) else describe(manifest, binding or {})
     method = choose_method(options)
     written = System.of(description, carrier, "3")
-    start = consistent_start(written, options.t_start)
-    facts = structure(written, start)
+    start = start or consistent_start(written, options.t_start)
+    facts = facts or structure(written, start)
     form, index, warnings = choose_index(options.index, facts)
     system = written if form == "3" else written.another(form)
     name = {"3": str(facts.index), "2": "2"}.get(form, form)

@@ -18,11 +18,15 @@ from sysdyn.runtime.system import System
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """test [unknowns]: -1 left out, 0 tested, 1 tested with h; power [unknowns]: of h in Newton's norm."""
+    """test [unknowns]: -1 left out, 0 tested, 1 tested with h; power [unknowns]: of h in Newton's norm.
+
+    state [unknowns]: carry the state; differential [unknowns]: their derivative occurs.
+    """
 
     test: Ints
     power: Ints
     state: NDArray[np.bool_]
+    differential: NDArray[np.bool_]
 
 
 def roles(system: System, jyd: Floats, index: int) -> Roles:
@@ -46,4 +50,4 @@ def roles(system: System, jyd: Floats, index: int) -> Roles:
         test[kinds == "f"] = 0
     if (test < 0).all():
         test[:] = 0
-    return Roles(test.astype(np.int32), power, state)
+    return Roles(test.astype(np.int32), power, state, differential)

@@ -14,6 +14,21 @@
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
 
+static int step(void *bdf)
+{
+    return sd_bdf_step(bdf);
+}
+
+static void dense(const void *bdf, double t, double *y, double *yd)
+{
+    sd_bdf_dense(bdf, t, y, yd);
+}
+
+static void start(void *bdf, double t, const double *y, const double *yd, double h)
+{
+    sd_bdf_start(bdf, t, y, yd, h);
+}
+
 sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
 {
     sd_bdf *bdf = calloc(1, sizeof *bdf);
@@ -39,7 +54,14 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     bdf->linear = linear;
     bdf->n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
+    bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->y, bdf->yd, &bdf->taken,
+                                step, dense, start};
     return bdf;
+}
+
+sd_stepper *sd_bdf_stepper(sd_bdf *bdf)
+{
+    return &bdf->stepper;
 }
 
 void sd_bdf_free(sd_bdf *bdf)
@@ -76,6 +98,7 @@ static void set_newton_weights(sd_bdf *bdf)
 void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h)
 {
     bdf->t = t;
+    bdf->taken = 0;
     bdf->tested = 0;
     for (int32_t i = 0; i < bdf->n; i++)
         bdf->tested += bdf->test[i] >= 0;
@@ -211,7 +234,7 @@ static int correct(sd_bdf *bdf)
     bdf->fresh_jacobian = 0;
     set_newton_weights(bdf);
     for (;;) {
-        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->steps == 0 || bdf->fresh_jacobian < 0;
+        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->taken == 0 || bdf->fresh_jacobian < 0;
         if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {
             memcpy(bdf->y, bdf->predicted, (size_t)bdf->n * sizeof(double));
             memcpy(bdf->yd, bdf->predicted_d, (size_t)bdf->n * sizeof(double));
@@ -234,7 +257,7 @@ static int correct(sd_bdf *bdf)
 static void reduce(sd_bdf *bdf, double ratio)
 {
     bdf->h *= ratio;
-    if (bdf->steps == 0) {
+    if (bdf->taken == 0) {
         bdf->psi[0] = bdf->h;
         for (int32_t i = 0; i < bdf->n; i++)
             bdf->phi[1][i] *= ratio;
@@ -247,7 +270,7 @@ static void fit_end(sd_bdf *bdf)
     double left = bdf->t_end - bdf->t, h = bdf->h;
     if (h >= left * (1.0 - 1e-12))
         h = left;
-    else if (2.0 * h > left && bdf->steps > 0 && !(bdf->fixed_h > 0.0))
+    else if (2.0 * h > left && bdf->taken > 0 && !(bdf->fixed_h > 0.0))
         h = 0.5 * left;
     if (h != bdf->h)
         reduce(bdf, h / bdf->h);
@@ -314,7 +337,7 @@ void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
     double delta = t - bdf->t, c = 1.0, d = 0.0, gamma = bdf->psi[0] != 0.0 ? delta / bdf->psi[0] : 0.0;
     memcpy(y, bdf->phi[0], (size_t)n * sizeof *y);
     memset(yd, 0, (size_t)n * sizeof *yd);
-    if (bdf->steps == 0)
+    if (bdf->taken == 0)
         k = 0;
     for (int32_t j = 1; j <= k; j++) {
         d = d * gamma + c / bdf->psi[j - 1];
@@ -325,6 +348,6 @@ void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
             yd[i] += d * bdf->phi[j][i];
         }
     }
-    if (bdf->steps == 0)
+    if (bdf->taken == 0)
         memcpy(yd, bdf->yd, (size_t)n * sizeof *yd);
 }

@@ -16,19 +16,9 @@
 
 #include "assembly.h"
 #include "linear.h"
+#include "stepper.h"
 
 #define SD_MAX_ORDER 5
-
-enum sd_cause {
-    SD_FINE = 0,
-    SD_NEWTON = 1,     /* Newton's iteration does not converge */
-    SD_ERROR_TEST = 2, /* the local error stays too large */
-    SD_SINGULAR = 3,   /* the matrix is singular: row, column */
-    SD_NONFINITE = 4,  /* the residual is not finite: row */
-    SD_STEP = 5,       /* the step size fell below what t resolves */
-    SD_STOPPED = 6,    /* a callback of the caller failed */
-    SD_MEMORY = 7
-};
 
 typedef struct sd_bdf {
     sd_system *system;
@@ -49,12 +39,15 @@ typedef struct sd_bdf {
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations;
+    int64_t taken;            /* steps since the last start */
     int32_t cause, bad_row, bad_column;
+    sd_stepper stepper;
 } sd_bdf;
 
 /* A stepper without its problem set; the caller fills the public fields, then calls sd_bdf_start. */
 sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear);
 void sd_bdf_free(sd_bdf *bdf);
+sd_stepper *sd_bdf_stepper(sd_bdf *bdf);
 void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h);
 /* one accepted step, or the cause of failure */
 int sd_bdf_step(sd_bdf *bdf);

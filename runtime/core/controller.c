@@ -61,13 +61,14 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
     int32_t k = bdf->order, order_change = k - bdf->order_used;
     double error = bdf->error_next, h = bdf->h, h_next = h;
     bdf->steps++;
+    bdf->taken++;
     bdf->order_used = k;
     bdf->h_used = h;
     if (order_next == k - 1 || k == bdf->max_order)
         bdf->rising = 0;
     if (bdf->rising) {
         /* at the start: order and step rise together */
-        if (bdf->steps > 1) {
+        if (bdf->taken > 1) {
             bdf->order = k + 1;
             h_next = 2.0 * h;
         }

@@ -9,18 +9,18 @@
 
 #define POLL 4 /* steps between two looks at the clock */
 
-sd_run *sd_run_new(sd_bdf *bdf, sd_settle *settle, int32_t written, int32_t extended, int32_t observed)
+sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed)
 {
     sd_run *run = calloc(1, sizeof *run);
     if (!run)
         return NULL;
-    size_t n = (size_t)(extended > bdf->n ? extended : bdf->n) + 8, m = (size_t)observed + 8;
+    size_t n = (size_t)(extended > stepper->n ? extended : stepper->n) + 8, m = (size_t)observed + 8;
     run->memory = calloc(4 * n + 2 * m, sizeof(double));
     if (!run->memory) {
         free(run);
         return NULL;
     }
-    run->bdf = bdf;
+    run->stepper = stepper;
     run->settle = settle;
     run->written = written;
     run->observed = observed;
@@ -59,29 +59,29 @@ static void integrate(sd_run *run, double to, double *dissipated, double *suppli
         return;
     }
     for (int k = -1; k <= 1; k += 2) {
-        sd_bdf_dense(run->bdf, middle + k * inner * half, run->aux, run->aux_d);
+        run->stepper->dense(run->stepper->self, middle + k * inner * half, run->aux, run->aux_d);
         audit(run, middle + k * inner * half, run->aux, run->aux_d, out);
         sum[0] += out[2];
         sum[1] += out[3];
     }
-    sd_bdf_dense(run->bdf, to, run->aux, run->aux_d);
+    run->stepper->dense(run->stepper->self, to, run->aux, run->aux_d);
     audit(run, to, run->aux, run->aux_d, end);
     *dissipated = half / 6.0 * (run->power_dissipated + 5.0 * sum[0] + end[2]);
     *supplied = half / 6.0 * (run->power_supplied + 5.0 * sum[1] + end[3]);
 }
 
-/* one output row at an instant of the last step */
-static void emit(sd_run *run, double t, double kind, int at_step)
+/* one output row at an instant of the last step, written as of `label` */
+static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
     double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
     double out[4], end[4] = {0.0, 0.0, 0.0, 0.0}, dissipated = 0.0, supplied = 0.0;
-    if (!run->started) {
-        memcpy(run->point, run->bdf->y, (size_t)run->bdf->n * sizeof(double));
-        memcpy(run->point_d, run->start_rate, (size_t)run->bdf->n * sizeof(double));
+    if (run->fresh) {
+        memcpy(run->point, run->stepper->y, (size_t)run->stepper->n * sizeof(double));
+        memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
     } else {
         if (!at_step)
             integrate(run, t, &dissipated, &supplied, end);
-        sd_bdf_dense(run->bdf, t, run->point, run->point_d);
+        run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
     }
     if (run->settle)
         sd_settle_point(run->settle, t, run->point, run->point_d);
@@ -92,7 +92,7 @@ static void emit(sd_run *run, double t, double kind, int at_step)
         run->stored = out[0] + out[1];
     double energy = out[0] + out[1] - run->stored + dissipated - supplied;
     double constraints = run->settle ? run->settle->constraints : 0.0;
-    double head[SD_ROW_HEAD] = {t, kind, out[0], out[1], dissipated, supplied, energy, constraints};
+    double head[SD_ROW_HEAD] = {label, kind, out[0], out[1], dissipated, supplied, energy, constraints};
     double behind[6] = {energy, out[0], out[1], dissipated, supplied, constraints};
     memcpy(row, head, sizeof head);
     for (int k = 0; k < 6; k++)
@@ -129,42 +129,79 @@ static double kind_here(const sd_run *run, int asked)
 /* rows of the last step that are still to be written; 1: no room left */
 static int drain(sd_run *run)
 {
-    double t = run->bdf->t;
+    double t = *run->stepper->t;
     while (run->pending) {
         if (run->rows >= run->room)
             return 1;
         int asked = run->next < run->instants && run->instant[run->next] <= t;
         if (asked && run->instant[run->next] < t) {
             double kind = (double)run->instant_kind[run->next];
-            emit(run, run->instant[run->next++], kind, 0);
+            double instant = run->instant[run->next++];
+            emit(run, instant, instant, kind, 0);
             continue;
         }
         double kind = kind_here(run, asked);
         run->next += asked;
         if (kind > 0.0)
-            emit(run, t, kind, 1);
+            emit(run, t, t, kind, 1);
         run->pending = 0;
     }
     return 0;
 }
 
+/* The point started from, which `emit` has put into run->point: powers there; rows asked for, as of `label` where the
+ * instant is not earlier. */
+static void rows_of_start(sd_run *run, double label)
+{
+    double out[4], t = *run->stepper->t;
+    int32_t before = run->rows;
+    while (run->next < run->instants && run->instant[run->next] < label) {
+        double kind = (double)run->instant_kind[run->next];
+        emit(run, t, run->instant[run->next++], kind, 1);
+    }
+    int asked = run->next < run->instants && run->instant[run->next] <= t;
+    double kind = kind_here(run, asked);
+    emit(run, t, label, kind, 1);
+    run->next += asked;
+    while (run->next < run->instants && run->instant[run->next] <= t)
+        run->next++; /* between label and t there is nothing new */
+    if (kind == 0.0 && run->rows > before) {
+        run->rows--; /* nobody asked for it */
+        run->rows_written--;
+    }
+    audit(run, t, run->point, run->point_d, out);
+    run->power_dissipated = out[2];
+    run->power_supplied = out[3];
+    run->t_from = t;
+    run->fresh = 0;
+}
+
 /* the start: energies, powers and the first row */
 static int begin(sd_run *run)
 {
-    double out[4];
     if (run->rows >= run->room)
         return 1;
-    run->t_from = run->bdf->t;
-    int asked = run->next < run->instants && run->instant[run->next] <= run->bdf->t;
-    emit(run, run->bdf->t, kind_here(run, asked), 1);
-    run->next += asked;
-    audit(run, run->bdf->t, run->point, run->point_d, out);
-    run->power_dissipated = out[2];
-    run->power_supplied = out[3];
-    if (run->row[(size_t)(run->rows - 1) * (size_t)(SD_ROW_HEAD + 2 * run->observed) + 1] == 0.0)
-        run->rows--; /* nobody asked for it */
+    run->fresh = 1;
+    rows_of_start(run, *run->stepper->t);
     run->started = 1;
     return 0;
+}
+
+void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
+                    const double *before_d)
+{
+    double old[4], new[4];
+    size_t written = (size_t)run->written * sizeof(double);
+    memcpy(run->aux, before, written);
+    memcpy(run->aux_d, before_d, written);
+    audit(run, *run->stepper->t, run->aux, run->aux_d, old);
+    memcpy(run->aux, y, written);
+    memcpy(run->aux_d, yd, written);
+    audit(run, t, run->aux, run->aux_d, new);
+    run->supplied += (new[0] + new[1]) - (old[0] + old[1]);
+    run->stepper->start(run->stepper->self, t, y, yd, 0.0);
+    run->fresh = 1;
+    rows_of_start(run, label);
 }
 
 /* quadratures over the step just accepted */
@@ -174,7 +211,7 @@ static void measure(sd_run *run, double from)
     run->t_from = from;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
-    integrate(run, run->bdf->t, &dissipated, &supplied, end);
+    integrate(run, *run->stepper->t, &dissipated, &supplied, end);
     run->dissipated += dissipated;
     run->supplied += supplied;
     /* powers at the start of the next step are kept apart until the rows of this one are written */
@@ -196,18 +233,18 @@ int sd_run_advance(sd_run *run, int64_t steps, double seconds)
     for (int64_t k = 0; k < steps; k++) {
         if (run->pending && drain(run))
             return SD_FULL;
-        if (*run->bdf->system->stop)
+        if (*run->stepper->system->stop)
             return SD_FAILED;
-        if (run->bdf->t >= run->bdf->t_end)
+        if (*run->stepper->t >= *run->stepper->t_end)
             return SD_FINISHED;
-        double from = run->bdf->t;
-        if (run->audit && run->bdf->steps > 0) {
-            sd_bdf_dense(run->bdf, from, run->aux, run->aux_d);
+        double from = *run->stepper->t;
+        if (run->audit && *run->stepper->taken > 0) { /* else they are those of the start */
+            run->stepper->dense(run->stepper->self, from, run->aux, run->aux_d);
             audit(run, from, run->aux, run->aux_d, out);
             run->power_dissipated = out[2];
             run->power_supplied = out[3];
         }
-        if (sd_bdf_step(run->bdf))
+        if (run->stepper->step(run->stepper->self))
             return SD_FAILED;
         measure(run, from);
         if (drain(run))
@@ -215,5 +252,5 @@ int sd_run_advance(sd_run *run, int64_t steps, double seconds)
         if (k % POLL == POLL - 1 && now() > until)
             return SD_RUNNING;
     }
-    return run->bdf->t >= run->bdf->t_end && !run->pending ? SD_FINISHED : SD_RUNNING;
+    return *run->stepper->t >= *run->stepper->t_end && !run->pending ? SD_FINISHED : SD_RUNNING;
 }

@@ -6,19 +6,20 @@
  * derivatives (settle.h), so multipliers and accelerations are as exact as positions.
  * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt, the integrals by the 4-point
  * Gauss-Lobatto rule (exact to degree 5) on the dense output of each accepted step.
+ * Where an integration restarts after a jump, what T + V gained there was supplied by the impulses that forced it.
  */
 #ifndef SYSDYN_RUN_H
 #define SYSDYN_RUN_H
 
-#include "bdf.h"
 #include "settle.h"
+#include "stepper.h"
 
 #define SD_ROW_HEAD 8
 
 enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3 };
 
 typedef struct sd_run {
-    sd_bdf *bdf;
+    sd_stepper *stepper;
     sd_settle *settle;
     int32_t written;                  /* unknowns as written: y of blocks observe, audit */
     int32_t observed;
@@ -28,11 +29,11 @@ typedef struct sd_run {
     const double *instant;            /* [instants] ascending, within the span */
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
-    const double *start_rate;         /* [unknowns] yd at the start, also of what the stepper does not differentiate */
+    const double *start_rate;         /* [unknowns] yd at the (re)start, also of what the stepper does not differentiate */
     double *row;                      /* [room][SD_ROW_HEAD + 2 observed] */
     int32_t room;
     /* progress */
-    int32_t rows, next, pending, started;
+    int32_t rows, next, pending, started, fresh;   /* fresh: at a point started from, no step yet */
     double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
     double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
     double t_from, power_dissipated, power_supplied;
@@ -41,8 +42,12 @@ typedef struct sd_run {
     double first_energy;
 } sd_run;
 
-sd_run *sd_run_new(sd_bdf *bdf, sd_settle *settle, int32_t written, int32_t extended, int32_t observed);
+sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed);
 void sd_run_free(sd_run *run);
+/* goes on from y, yd [n] at t with the row of the instant `label`; before [written], before_d: the point at the end of the
+ * last step */
+void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
+                    const double *before_d);
 /* steps until `steps` more are taken, `seconds` are over, the rows are full, the end or a failure */
 int sd_run_advance(sd_run *run, int64_t steps, double seconds);
 

@@ -1,0 +1,36 @@
+/* What the driver of an integration asks of a method: steps, values within the last step, a start.
+ *
+ * Every method (bdf.h, radau.h) holds one of these about itself; run.c knows methods by nothing else.
+ */
+#ifndef SYSDYN_STEPPER_H
+#define SYSDYN_STEPPER_H
+
+#include "assembly.h"
+
+enum sd_cause {
+    SD_FINE = 0,
+    SD_NEWTON = 1,     /* Newton's iteration does not converge */
+    SD_ERROR_TEST = 2, /* the local error stays too large */
+    SD_SINGULAR = 3,   /* the matrix is singular: row, column */
+    SD_NONFINITE = 4,  /* the residual is not finite: row */
+    SD_STEP = 5,       /* the step size fell below what t resolves */
+    SD_STOPPED = 6,    /* a callback of the caller failed */
+    SD_MEMORY = 7
+};
+
+typedef struct sd_stepper {
+    void *self;
+    sd_system *system;
+    int32_t n;
+    const double *t, *t_end;
+    const double *y, *yd;      /* [n] the last accepted point, or the one started from */
+    const int64_t *taken;      /* steps since the last start */
+    /* one accepted step, or the cause of failure (enum sd_cause) */
+    int (*step)(void *self);
+    /* y, yd [n] at any t within the last step */
+    void (*dense)(const void *self, double t, double *y, double *yd);
+    /* from (t, y, yd) with step h (0: chosen) */
+    void (*start)(void *self, double t, const double *y, const double *yd, double h);
+} sd_stepper;
+
+#endif
