@@ -296,6 +296,6 @@ def _without_points(link: Link) -> Link:
     points = {k: i.first for k, i in enumerate(link.box) if i.size == 1}
 
     def fixed(end: End) -> End:
-        return End(end.item, tuple((None, points[k].plus(c)) if k in points else (k, c) for k, c in end.at))  # type: ignore[index]
+        return End(end.item, tuple((None, points[k].plus(c)) if k in points else (k, c) for k, c in end.at))
 
     return Link(link.box, fixed(link.a), fixed(link.b), link.sign)

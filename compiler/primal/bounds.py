@@ -139,7 +139,7 @@ class Sizes:
 
     def __init__(self, network: Network) -> None:
         self._parameters = {p.name: p for p in network.parameters}
-        self._settings = {(e.name, e.at): e for e in network.elements}
+        self._settings = tuple(reversed(network.elements))
         self._found: dict[Node, float] = {}
 
     def value(self, node: Node) -> float:
@@ -181,9 +181,9 @@ class Sizes:
             raise ModelError([Diagnostic("E807", f"{to_text(node)} is not known before the start", None)])
         parameter = self._parameters[node.data]
         at = tuple(const(round(self.value(a))) for a in node.args)
-        setting = next((e for (name, own), e in self._settings.items() if name == node.data and self._same(own, at)), 0)
-        if setting:
-            return self.value(setting.value)
+        for setting in self._settings:
+            if setting.name == node.data and self._same(setting.at, at):
+                return self.value(setting.value)
         if parameter.indices:
             change = {index(name): value for name, value in zip(parameter.indices, at, strict=True)}
             return self.value(substitute(parameter.values[0], change))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 from sysdyn.compiler.primal.balances import balances
 from sysdyn.compiler.primal.bounds import Sizes
@@ -74,7 +75,7 @@ def _node_coordinates(network: Network) -> Iterator[Coordinate]:
             )
 
 
-def _statements(network: Network, said: Laws, nodes: tuple[Constraint, ...], reader: Reader) -> dict:  # type: ignore[type-arg]
+def _statements(network: Network, said: Laws, nodes: tuple[Constraint, ...], reader: Reader) -> dict[str, Any]:
     """All statements in coordinates, those of the text first."""
     return {
         "energies": tuple(r for e in (*network.energies, *said.energies) for r in _energy(e, reader)),

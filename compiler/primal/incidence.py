@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sysdyn.compiler.primal.bounds import Affine, Box, Interval, Sizes, between, box_holds, box_size
+from sysdyn.compiler.primal.bounds import Affine, Bound, Box, Interval, Sizes, between, box_holds, box_size
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place
 from sysdyn.dsl.expression import Node, index, sub
 from sysdyn.dsl.network import Branch, Domain, Network, NodeFamily, Terminal
@@ -120,7 +120,7 @@ def _element(number: int, branch: Branch, sizes: Sizes) -> Iterator[Element]:
     for name in loops:
         if sum(a.loop == name for a in at) != 1:
             raise unrolled(f"{branch.name} is not indexed once by {name}", branch.place)
-    ends = ()
+    ends: tuple[Contact, ...] = ()
     if branch.on is None:
         pair = (branch.plus, branch.minus)
         ends = tuple(_contact(t, branch, loops, sizes) for t in pair if t is not None)
@@ -168,16 +168,16 @@ class Incidence:
                 raise ModelError([Diagnostic("E805", text, e.branch.place)])
         sides: list[list[Interval]] = []
         for d, whole in enumerate(box):
-            cuts = {}
+            cuts: dict[int, Bound] = {}
             for interval in (whole, *(reach[d] for _, _, reach in reaches)):
                 for cut in (interval.first, interval.last.plus(1)):
                     cuts.setdefault(cut.value, cut)
             sides.append(between(cuts))
         found = []
-        for at in itertools.product(*sides):
-            touches = tuple(_touch(e, k) for e, k, reach in reaches if box_holds(reach, at))
+        for part in itertools.product(*sides):
+            touches = tuple(_touch(e, k) for e, k, reach in reaches if box_holds(reach, part))
             if touches:
-                found.append(NodeCell(name, family.domain, at, touches, family.place))
+                found.append(NodeCell(name, family.domain, part, touches, family.place))
         self.cells[name] = tuple(found)
 
     def all_cells(self) -> Iterator[NodeCell]:

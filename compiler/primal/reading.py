@@ -1,8 +1,8 @@
 """Quantities of branches and nodes replaced by coordinates, multipliers and implicit unknowns.
 
-A family may be cut into pieces that read differently.  An expression whose index runs over several pieces is resolved
-on the first one after its loop (or its sum) was cut there: `resolve` raises `_StraddleError` with the cut, and whoever owns
-the loop cuts it.  Bounds stay symbolic, so a statement becomes as many loops as there are pieces, whatever their size.
+A family may be cut into pieces that read differently.  Where an index runs over several pieces, `resolve` raises
+`_StraddleError` with the cut, and whoever owns the loop (a statement or a sum) cuts it there and begins again.  Bounds
+stay symbolic, so a statement becomes as many loops as there are pieces, whatever their size.
 """
 
 from __future__ import annotations

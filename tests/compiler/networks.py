@@ -19,9 +19,6 @@ from sysdyn.dsl.network import (
     Observation,
     Terminal,
 )
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.simulate import Options, simulate
-from sysdyn.runtime.trace import Trace
 
 
 def domain(name, common, pseudo=False):
@@ -99,8 +96,7 @@ class Net:
         watched = [Observation(text, n, ONE, text, PLACE) for text, n in parts.pop("observe", {}).items()]
         sizes = tuple(parameter(n, v, whole=n in ("n", "m", "k")) for n, v in parts.pop("params", {}).items())
         start = tuple(
-            Initial(target, node(value), True, ranges(loops), PLACE)
-            for target, value, *loops in parts.pop("init", ())
+            Initial(target, node(value), True, ranges(loops), PLACE) for target, value, *loops in parts.pop("init", ())
         )
         return blank(
             parameters=sizes,
@@ -316,7 +312,7 @@ OWN = {("kinetic", "p"): "bf", ("potential", "q"): "be", ("potential", "e"): "bq
 
 
 def unrolled(net, **sizes):
-    """The Tableau of a Net, element by element; linear laws whose own variable is that of `Net.R`, `L`, `C`, `V`, `I`."""
+    """The Tableau of a Net, element by element; laws are linear, in the variable that `Net.R`, `L`, `C` use."""
     found = Tableau()
 
     def number(root, at):
@@ -357,6 +353,10 @@ def null_vector(a, e, s):
 
 def solve(network, end, path, formulation="lagrangian", accuracy=1e-6, **more):
     """The trace of a network from 0 to `end`, and the outcome."""
+    from sysdyn.runtime.carrier import load
+    from sysdyn.runtime.simulate import Options, simulate
+    from sysdyn.runtime.trace import Trace
+
     with x.fresh():
         model = compiled(network(), formulation)
         b = model.bind()

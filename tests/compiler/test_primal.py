@@ -293,10 +293,92 @@ def test_a_flow_source_of_time_is_a_flow_constraint(tmp_path):
 
     found, _ = primal(network())
     assert {(c.kind, c.name) for c in found.constraints} == {("psi", "S.law"), ("psi", "a")}
-    trace, outcome = solve(network, 4.0, tmp_path)
+    trace, _ = solve(network, 4.0, tmp_path)
     expected = reduced(lambda t, v: [(np.sin(2 * t) - v[0] / 2) / 0.5], [0.3], 4.0)[0]
     assert trace["a"].values[-1] == pytest.approx(expected, abs=1e-5)
     assert trace["S"].values[-1] == pytest.approx(-expected, abs=1e-5)
+
+
+def test_a_source_controlled_by_a_read_node(tmp_path):
+    """Seed, transactor_vccs: the control port is a voltage, whose node keeps its row."""
+
+    def network():
+        net = Net()
+        for name in "abd":
+            net.node(name)
+        net.read.add("b")
+        net.V("V", sine(1.0, 4.0), "a")
+        net.R("R1", 1.0, "a", "b")
+        net.C("C1", 0.5, "b")
+        net.I("G", x.mul(x.const(0.7), of("b", "ne")), None, "d", of=ELECTRICAL)
+        net.C("C2", 0.3, "d")
+        net.R("R2", 2.0, "d")
+        start = [(of("C1", "be"), 0.0), (of("C2", "be"), 0.0)]
+        return net.network(observe={"v1": of("b", "ne"), "v2": of("d", "ne")}, init=start)
+
+    trace, _ = solve(network, 5.0, tmp_path)
+    v1, v2 = reduced(
+        lambda t, v: [(np.sin(4 * t) - v[0]) / 0.5, (0.7 * v[0] - v[1] / 2.0) / 0.3], [0.0, 0.0], 5.0
+    )
+    assert trace["v1"].values[-1] == pytest.approx(v1, abs=1e-5)
+    assert trace["v2"].values[-1] == pytest.approx(v2, abs=1e-5)
+
+
+def test_a_law_that_reads_the_effort_of_a_kinetic_store(tmp_path):
+    """Its momentum becomes a state: no law holds the rate of a flow."""
+
+    def network():
+        net = Net()
+        for name in "abd":
+            net.node(name)
+        net.V("V", sine(1.0, 4.0), "a")
+        net.R("R1", 1.0, "a", "b")
+        net.L("L", 0.5, "b")
+        net.V("G", x.scale(3.0, of("L", "be")), "d")
+        net.R("R2", 2.0, "d", None)
+        net.C("C2", 0.3, "d")
+        start = [(of("L", "bf"), 0.0)]
+        watched = {"L": of("L", "be"), "f": of("L", "bf"), "p": of("L", "bp"), "d": of("d", "ne")}
+        return net.network(observe=watched, init=start)
+
+    found, _ = primal(network())
+    assert [s.name for s in found.states] == ["L.p"]
+    assert [u.name for u in found.unknowns] == ["L.e"]
+    trace, _ = solve(network, 2.0, tmp_path)
+    f = reduced(lambda t, f: [(np.sin(4 * t) - f[0]) / 0.5], [0.0], 2.0)[0]
+    assert trace["f"].values[-1] == pytest.approx(f, abs=1e-5)
+    assert trace["p"].values[-1] == pytest.approx(0.5 * f, abs=1e-5)
+    assert trace["d"].values[-1] == pytest.approx(3 * (np.sin(8.0) - f), abs=1e-4)
+
+
+def test_laws_that_move_with_time_or_place(tmp_path):
+    """A resistance of time, a transformer whose ratio is a function of the displacement of a mass."""
+
+    def network():
+        net = Net()
+        net.node("a", HYDRAULIC)
+        net.node("x", TRANSLATION)
+        ratio = x.linear(1.0, ((0.5, x.call("sin", of("x", "nq"))),))
+        net.L("L", 0.5, "a")
+        net.branch("R", "dissipator", "e", lambda f: x.mul(x.linear(1.0, ((0.5, x.time()),)), f), "a")
+        net.couple("transformer", "X", ratio, ("a", None), ("x", None))
+        net.L("M", 2.0, "x")
+        net.C("K", 0.25, "x")
+        start = [(of("L", "bf"), 1.0), (of("x", "nq"), 0.2), (of("x", "nf"), 0.5)]
+        return net.network(observe={"f": of("L", "bf"), "x": of("x", "nq")}, init=start)
+
+    trace, outcome = solve(network, 2.0, tmp_path)
+
+    def rhs(t, y):
+        f, q, v = y
+        n = 1 + 0.5 * np.sin(q)
+        e = -(1 + 0.5 * t) * (f + n * v)  # flows into L, R and the transformer add up to zero; f1 = n v
+        return [e / 0.5, v, (n * e - 4 * q) / 2.0]
+
+    expected = reduced(rhs, [1.0, 0.2, 0.5], 2.0)
+    assert trace["f"].values[-1] == pytest.approx(expected[0], abs=2e-5)
+    assert trace["x"].values[-1] == pytest.approx(expected[1], abs=2e-5)
+    assert abs(outcome.samples.energy[-1]) < 1e-4
 
 
 def test_heat_leaves_no_trace_in_the_audit(tmp_path):

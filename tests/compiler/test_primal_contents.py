@@ -179,8 +179,8 @@ def test_springs_and_nodes_of_mechanisms():
     net.L("N", 2.0, "y")
     net.C("K", 0.25, None, "x", of=TRANSLATION)
     net.C("J", 0.5, "y", "x")
-    start = [(of("x", "nq"), 1.0), (of("y", "nf"), 2.0), (of("y", "np"), 3.0), (of("K", "be"), 4.0), (of("M", "bp"), 6.0)]
-    start.append((of("J", "be"), 1.0))
+    start = [(of("x", "nq"), 1.0), (of("y", "nf"), 2.0), (of("y", "np"), 3.0)]
+    start += [(of("K", "be"), 4.0), (of("M", "bp"), 6.0), (of("J", "be"), 1.0)]
     found = pinned(starting(net, *start))
     targets = [t for t, _, _ in found]
     assert targets == ["x", "y'", "y.p", "x", "x'", "y - x"]
@@ -200,7 +200,8 @@ def test_the_charge_of_a_tank_starts_its_constraint(tmp_path):
         net.R("R", 2.0, "a", "b")
         net.C("B", 0.25, "b")
         net.R("S", 1.0, "b")
-        return starting(net, (of("a", "ne"), 3.0), (of("b", "ne"), 1.0), observe={"a": of("a", "ne"), "b": of("b", "ne")})
+        watched = {"a": of("a", "ne"), "b": of("b", "ne")}
+        return starting(net, (of("a", "ne"), 3.0), (of("b", "ne"), 1.0), observe=watched)
 
     trace, _ = solve(network, 1.0, tmp_path)
     matrix = np.array([[-1 / 1.0, 1 / 1.0], [1 / 0.5, -(0.5 + 1.0) / 0.25]])
