@@ -7,7 +7,7 @@ import math
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.prepare import Prepared, place_at, prepare
 from sysdyn.cli.starting import Started, start
 from sysdyn.cli.targets import Target
+from sysdyn.compiler.instants import instants
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl import load
@@ -103,6 +104,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         started = start(prepared, options.t_start, report)
         if started is None or report.failed:
             return None
+        options = replace(options, stops=_stops(prepared, options, report))
         return _ran(target, prepared, started, options, report)
 
 
@@ -181,6 +183,15 @@ def _options(
         attributes=_attributes(target, prepared),
         parameters=tuple(_parameters(prepared)),
     )
+
+
+def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
+    """Instants at which the text jumps or has kinks in time."""
+    tables = prepared.network.tables
+    found = instants(prepared.compiled.form, prepared.binding, options.t_start, options.t_end, tables)
+    if found.note:
+        report.note("N608", found.note, prepared.network.place)
+    return found.times
 
 
 def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:
