@@ -185,8 +185,10 @@ class Sizes:
             if setting.name == node.data and self._same(setting.at, at):
                 return self.value(setting.value)
         if parameter.indices:
-            change = {index(name): value for name, value in zip(parameter.indices, at, strict=True)}
-            return self.value(substitute(parameter.values[0], change))
+            change = {index(name): value for name, value in zip(parameter.indices, at, strict=False)}
+            rest = len(parameter.indices)
+            place = self._position(parameter, at, rest) if len(parameter.values) > 1 else 0
+            return self.value(substitute(parameter.values[place], change))
         if len(parameter.values) == 1:
             return self.value(parameter.values[0])
         return self.value(parameter.values[self._position(parameter, at)])
@@ -194,9 +196,10 @@ class Sizes:
     def _same(self, own: Sequence[Node], at: Sequence[Node]) -> bool:
         return all(self.value(a) == b.data for a, b in zip(own, at, strict=True))
 
-    def _position(self, parameter: Parameter, at: Sequence[Node]) -> int:
+    def _position(self, parameter: Parameter, at: Sequence[Node], start: int = 0) -> int:
+        """Row-major place of an element, of its indices from `start` on."""
         place = 0
-        for (first, last), k in zip(parameter.shape, at, strict=True):
+        for (first, last), k in zip(parameter.shape[start:], at[start:], strict=True):
             low, high = self.value(first), self.value(last)
             if not low <= k.data <= high:
                 text = f"{parameter.name}: index {k.data:g} outside {low:g}..{high:g}"

@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.primal.bounds import Box, Interval, shape_of
-from sysdyn.compiler.primal.incidence import PLUS, Element, Touch
+from sysdyn.compiler.primal.bounds import Box, Interval, shape_of, union
+from sysdyn.compiler.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.primal.integrals import line
 from sysdyn.compiler.primal.laws import own
-from sysdyn.compiler.primal.potentials import Potentials
 from sysdyn.compiler.primal.reading import Piece, Ranges, Reader, touches_network
 from sysdyn.compiler.primal.series import Member
 from sysdyn.dsl.expression import (
@@ -46,21 +45,26 @@ def charge(branch: Branch, effort: Node) -> Node | None:
     return None if straight is None else straight.inverse(effort)
 
 
-def at_stores(network: Network, potentials: Potentials, reader: Reader) -> Iterator[Initial]:
+def at_stores(network: Network, incidence: Incidence, reader: Reader) -> Iterator[Initial]:
     """Initial conditions; those of a node's effort as those of a linear store between that node and ground."""
     for initial in network.initials:
         if initial.target.op == "var" and initial.target.data[1:] == ("ne", 0):
-            yield from _at_store(initial, potentials, reader)
+            yield from _at_store(initial, incidence.cells.get(initial.target.data[0], ()), reader)
         else:
             yield initial
 
 
-def _at_store(initial: Initial, potentials: Potentials, reader: Reader) -> Iterator[Initial]:
+def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Reader) -> Iterator[Initial]:
     node = initial.target
 
+    boxes: dict[Touch | None, list[Box]] = {}
+    for cell in cells:
+        touch = next((t for t in cell.touches if _between_ground(t)), None)
+        boxes.setdefault(touch, []).append(cell.box)
+    places = [(box, touch) for touch, found in boxes.items() for box in union(found)]
+
     def store(ranges: Ranges) -> Touch | None:
-        touches = potentials.known(reader, node.data[0], node.args, ranges).cell.touches
-        return next((t for t in touches if _between_ground(t)), None)
+        return places[reader.locate(node.data[0], node.args, [box for box, _ in places], ranges)][1]
 
     for loops, touch in reader.cut(initial.loops, initial.place, store):
         if touch is None:
@@ -123,9 +127,9 @@ class Contents:
         return substitute(self.reader.at_piece(found, piece, initial.target.args), {mark: initial.value})
 
     def start(self, name: str, at: tuple[Node, ...]) -> Node:
-        """The initial content of a store: what the last statement about it says, else 0."""
+        """The initial content of a store: what the last statement about it says (before all guesses), else 0."""
         value: Node = const(0.0)
-        for initial, box, content in self._given.get(name, []):
+        for initial, box, content in sorted(self._given.get(name, []), key=lambda g: g[0].fixed):
             loops = [loop.index for loop in initial.loops]
             places = [self.reader.sizes.affine(a, loops, initial.place) for a in initial.target.args]
             pairs = zip(places, at, strict=True)

@@ -36,7 +36,7 @@ def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...]]:
     said = laws(network, incidence.elements, sizes)
     potentials = Potentials(nodes.efforts)
     reader = Reader(sizes, Book(_pieces(incidence.elements, classes), said.efforts, said.momenta, potentials.read))
-    contents = Contents(reader, classes.members, tuple(at_stores(network, potentials, reader)))
+    contents = Contents(reader, classes.members, tuple(at_stores(network, incidence, reader)))
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),

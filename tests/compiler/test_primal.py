@@ -317,9 +317,7 @@ def test_a_source_controlled_by_a_read_node(tmp_path):
         return net.network(observe={"v1": of("b", "ne"), "v2": of("d", "ne")}, init=start)
 
     trace, _ = solve(network, 5.0, tmp_path)
-    v1, v2 = reduced(
-        lambda t, v: [(np.sin(4 * t) - v[0]) / 0.5, (0.7 * v[0] - v[1] / 2.0) / 0.3], [0.0, 0.0], 5.0
-    )
+    v1, v2 = reduced(lambda t, v: [(np.sin(4 * t) - v[0]) / 0.5, (0.7 * v[0] - v[1] / 2.0) / 0.3], [0.0, 0.0], 5.0)
     assert trace["v1"].values[-1] == pytest.approx(v1, abs=1e-5)
     assert trace["v2"].values[-1] == pytest.approx(v2, abs=1e-5)
 

@@ -164,6 +164,20 @@ def test_node_efforts_pin_the_store_to_ground():
     assert number(value, i=4.0) == pytest.approx(-0.7 * 4.0)
 
 
+def test_node_efforts_without_a_store_are_equations():
+    """c[n + 1] has a source, the nodes before it have stores."""
+    net = Net()
+    n = x.param("n")
+    net.node("c", ELECTRICAL, (1, x.add(n, x.const(1))))
+    net.V("V", 2.0, ("c", x.add(n, x.const(1))))
+    net.R("R", 1.0, ("c", i(1)), ("c", i()), loops=(("i", 1, n),))
+    net.C("C", 0.5, ("c", i()), loops=(("i", 1, n),))
+    start = [(of("c", "ne", i()), 4.0, ("i", 1, x.add(n, x.const(1))))]
+    found = pinned(net.network(params={"n": 5.0}, init=start))
+    assert [t for t, _, _ in found] == ["C[i]", "2"]
+    assert [number(v) for _, v, _ in found] == [2.0, 4.0]
+
+
 def test_other_targets_are_equations():
     net = pair()
     guess = x.add(of("R", "be"), of("a", "ne"))
