@@ -214,8 +214,7 @@ class Likeness:
             if (right[0], right[1]) < (left[0], left[1]):
                 left, right = right, left
             self._parent[right] = left, of_left * of_right * sign
-            moved = {(left if root == right else root, axis, k) for root, axis, k in self._collapsed}
-            self._collapsed = moved
+            self._collapsed = {(left if root == right else root, axis, k) for root, axis, k in self._collapsed}
 
     def _unite(self, links: Sequence[Link]) -> None:
         """Equals first, then runs inside cells, then what reaches from cell to cell."""

@@ -14,6 +14,7 @@ from sysdyn.compiler.primal.balances import MULTIPLIER, WALK, ZERO, Effort
 from sysdyn.compiler.primal.bounds import Affine, Bound, Interval
 from sysdyn.compiler.primal.incidence import PLUS, Touch, unrolled
 from sysdyn.compiler.primal.reading import Range, Ranges, Reader
+from sysdyn.dsl.diagnostics import Diagnostic, ModelError
 from sysdyn.dsl.expression import Node, add, const, index, linear, neg, reduction, sub, var
 
 
@@ -56,6 +57,8 @@ class Potentials:
     def known(self, reader: Reader, name: str, at: tuple[Node, ...], ranges: Ranges) -> Effort:
         """How the effort of a node is read."""
         found = self.efforts.get(name, [])
+        if not found:
+            raise ModelError([Diagnostic("E409", f"node {name} touches no element: it has no effort", reader.place)])
         return found[reader.locate(name, at, [e.box for e in found], ranges)]
 
     def _raw(self, reader: Reader, effort: Effort, at: tuple[Node, ...], ranges: Ranges) -> Node:

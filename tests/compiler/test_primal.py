@@ -460,6 +460,27 @@ def test_definitions_in_a_circle_are_refused():
         primal(net.network(observe={"e": of("A", "be")}))
 
 
+def test_odd_networks_are_no_crash():
+    net = lead()
+    net.node("lonely")
+    net.node("ring")
+    net.R("Z", 1.0, "ring", "ring")
+    model = compiled(net.network())
+    assert len(poles(model)) == 1
+    with pytest.raises(ModelError, match=r"E409.*lonely"):
+        primal(net.network(observe={"e": of("lonely", "ne")}))
+    with pytest.raises(ModelError, match=r"E102.*momentum"):
+        primal(net.network(observe={"p": of("R1", "bp")}))
+    bare = Net()
+    bare.node("x", TRANSLATION)
+    assert [c.name for c in primal(bare.network())[0].coordinates] == ["x"]
+    empty = Net()
+    empty.node("v", ELECTRICAL, (1, x.param("n")))
+    empty.R("R", 1.0, ("v", x.index("i")), loops=(("i", 1, x.param("n")),))
+    found, _ = primal(empty.network(params={"n": 0.0}))
+    assert not found.coordinates
+
+
 def test_antiderivatives_are_exact():
     v, c = x.var("v", "f"), x.param("c")
     size = x.call("abs", v)
