@@ -74,23 +74,25 @@ def _shrink(power: float, step: float) -> float:
     return float(SAFETY * ratio / (1.0 - ratio))
 
 
-def control(run: Run, target: Floats) -> Achieved:
+def control(run: Run, target: Floats, finest: float = FINEST) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
+
+    finest: the smallest tolerance that makes sense for the method.
 
     Raises SolverFailure where the first runs fail.
     """
     wanted = float(np.min(target, initial=1e-4))
-    tolerance = float(np.clip(wanted, FINEST / RATIO, COARSEST))
+    tolerance = float(np.clip(wanted, finest / RATIO, COARSEST))
     try:
         last = run(tolerance, None)
     except SolverFailure as failure:
         if failure.cause in ("max_steps", "max_wall"):
             raise
-        tolerance = max(1e-2 * tolerance, FINEST / RATIO)
+        tolerance = max(1e-2 * tolerance, finest / RATIO)
         last = run(tolerance, None)
     before: float | None = None
     power, last_step = POWER, 0.0
-    tolerance = max(RATIO * tolerance, FINEST)
+    tolerance = max(RATIO * tolerance, finest)
     estimate, relative = np.inf, np.inf
     for number in range(2, RUNS + 1):
         try:
@@ -109,10 +111,10 @@ def control(run: Run, target: Floats) -> Achieved:
         estimate, relative = over * shrink, apart * shrink
         if estimate <= 1.0:
             return Achieved(relative, True, number, now.tolerance)
-        if now.tolerance <= FINEST:
+        if now.tolerance <= finest:
             return Achieved(relative, False, number, now.tolerance)
         before, last, last_step = over, now, step
         # the tolerance at which the next run should do, with the estimate's own safety
         drop = np.clip((1.0 / (1.5 * estimate)) ** (1.0 / max(power, CREDIT)), 1e-3, 0.2)
-        tolerance = max(float(drop) * now.tolerance, FINEST)
+        tolerance = max(float(drop) * now.tolerance, finest)
     return Achieved(relative, False, RUNS, last.tolerance)

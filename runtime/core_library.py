@@ -1,7 +1,4 @@
-"""The stepping core as ctypes sees it: the structures of runtime/core/*.h and the functions' signatures.
-
-The layouts mirror the headers field by field; a test compares their sizes with the compiler's.
-"""
+"""The stepping core as ctypes sees it: its functions' signatures, and its structures under their own names."""
 
 from __future__ import annotations
 
@@ -11,241 +8,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import _core  # type: ignore[attr-defined]
+from sysdyn.runtime.core_structures import (
+    CAUSES,
+    MAX_ORDER,
+    ROW_HEAD,
+    ROWS,
+    STAGES,
+    Bdf,
+    Call,
+    Frame,
+    Linear,
+    Radau,
+    Run,
+    Settle,
+    Stepper,
+    System,
+)
 
-MAX_ORDER = 5
-ROW_HEAD = 8
-CAUSES = ("", "newton", "error_test", "singular", "nonfinite", "step_too_small", "stopped", "memory")
-
-ROWS = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p, c.c_void_p)
-"""sd_rows and sd_entries: frame, t, y, yd, out."""
+__all__ = [
+    "CAUSES",
+    "MAX_ORDER",
+    "ROWS",
+    "ROW_HEAD",
+    "STAGES",
+    "Bdf",
+    "Call",
+    "Frame",
+    "Linear",
+    "Radau",
+    "Run",
+    "Settle",
+    "Stepper",
+    "System",
+    "core",
+    "pointer",
+    "reader",
+]
 
 _D, _I, _L, _P = c.c_double, c.c_int32, c.c_int64, c.c_void_p
-_ORDERS = _D * (MAX_ORDER + 2)
-
-
-class Frame(c.Structure):
-    """sd_frame."""
-
-    _fields_ = [("p", _P), ("ix", _P), ("at", _P), ("to", _P)]
-
-
-class Call(c.Structure):
-    """sd_call."""
-
-    _fields_ = [
-        ("rows", _P),
-        ("dy", _P),
-        ("dyd", _P),
-        ("frame", Frame),
-        ("n_dy", _I),
-        ("n_dyd", _I),
-        ("slot_dy", _P),
-        ("slot_dyd", _P),
-    ]
-
-
-class System(c.Structure):
-    """sd_system."""
-
-    _fields_ = [
-        ("unknowns", _I),
-        ("rows", _I),
-        ("entries", _I),
-        ("calls", _I),
-        ("kinematics", _I),
-        ("column", _P),
-        ("row", _P),
-        ("call", _P),
-        ("k_row", _P),
-        ("k_q", _P),
-        ("k_f", _P),
-        ("k_slot_q", _P),
-        ("k_slot_f", _P),
-        ("v", _P),
-        ("stop", _P),
-        ("residual_evaluations", _L),
-        ("jacobian_evaluations", _L),
-    ]
-
-
-class Linear(c.Structure):
-    """sd_linear."""
-
-    _fields_ = [
-        ("n", _I),
-        ("entries", _I),
-        ("column", _P),
-        ("row", _P),
-        ("row_scale", _P),
-        ("column_scale", _P),
-        ("scaled", _P),
-        ("dense", _P),
-        ("pivot", _P),
-        ("sparse", _P),
-        ("work", _P),
-        ("work2", _P),
-        ("smallest", _D),
-        ("bad_row", _I),
-        ("bad_column", _I),
-        ("factorisations", _L),
-        ("pivotings", _L),
-    ]
-
-
-class Stepper(c.Structure):
-    """sd_stepper."""
-
-    _fields_ = [
-        ("self", _P),
-        ("system", _P),
-        ("n", _I),
-        *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "start"]],
-    ]
-
-
-class Bdf(c.Structure):
-    """sd_bdf."""
-
-    _fields_ = [
-        ("system", _P),
-        ("linear", _P),
-        ("n", _I),
-        ("max_order", _I),
-        ("tested", _I),
-        ("rtol", _D),
-        ("t_end", _D),
-        ("h_max", _D),
-        ("fixed_h", _D),
-        ("atol", _P),
-        ("magnitude", _P),
-        ("test", _P),
-        ("power", _P),
-        ("track", _I),
-        ("t", _D),
-        ("h", _D),
-        ("h_used", _D),
-        ("cj", _D),
-        ("cj_factored", _D),
-        ("contraction", _D),
-        ("order", _I),
-        ("order_used", _I),
-        ("ns", _I),
-        ("rising", _I),
-        ("fresh_jacobian", _I),
-        ("jacobian_age", _I),
-        ("ready", _I),
-        ("psi", _ORDERS),
-        ("alpha", _ORDERS),
-        ("beta", _ORDERS),
-        ("sigma", _ORDERS),
-        ("gamma", _ORDERS),
-        ("phi", _P * (MAX_ORDER + 2)),
-        *[
-            (name, _P)
-            for name in (
-                [
-                    "y",
-                    "yd",
-                    "ee",
-                    "weight",
-                    "newton_weight",
-                    "delta",
-                    "predicted",
-                    "predicted_d",
-                    "scale",
-                    "jy",
-                    "jyd",
-                    "g",
-                    "memory",
-                ]
-            )
-        ],
-        ("error_next", _D),
-        ("steps", _L),
-        ("rejected_steps", _L),
-        ("newton_failures", _L),
-        ("newton_iterations", _L),
-        ("taken", _L),
-        ("cause", _I),
-        ("bad_row", _I),
-        ("bad_column", _I),
-        ("stepper", Stepper),
-    ]
-
-
-class Settle(c.Structure):
-    """sd_settle."""
-
-    _fields_ = [
-        ("system", _P),
-        ("linear", _P),
-        ("unknowns", _I),
-        ("rates", _I),
-        ("rows", _I),
-        *[
-            (name, _P)
-            for name in [
-                "rate",
-                "slot_y",
-                "slot_y_t",
-                "slot_yd",
-                "slot_yd_t",
-                "slot_x",
-                "slot_r",
-                "weight",
-                "scale",
-            ]
-        ],
-        ("constraint", _P),
-        ("k_q", _P),
-        ("k_f", _P),
-        ("kinematics", _I),
-        *[(name, _P) for name in ["jy", "jyd", "matrix", "row_scale", "r", "x", "x0", "step", "memory"]],
-        ("ready", _I),
-        ("residual", _D),
-        ("constraints", _D),
-        ("calls", _L),
-        ("failures", _L),
-    ]
-
-
-class Run(c.Structure):
-    """sd_run."""
-
-    _fields_ = [
-        ("stepper", _P),
-        ("settle", _P),
-        ("written", _I),
-        ("observed", _I),
-        *[
-            (name, _P)
-            for name in [
-                "audit",
-                "observe",
-                "observe_rate",
-                "observe_scale",
-                "audit_at",
-                "instant",
-                "instant_kind",
-            ]
-        ],
-        ("instants", _I),
-        ("every_step", _I),
-        ("sample_steps", _I),
-        ("start_rate", _P),
-        ("row", _P),
-        ("room", _I),
-        ("rows", _I),
-        ("next", _I),
-        ("pending", _I),
-        ("started", _I),
-        ("fresh", _I),
-        *[(name, _D) for name in ["stored", "dissipated", "supplied", "step_dissipated", "step_supplied"]],
-        *[(name, _D) for name in ["t_from", "power_dissipated", "power_supplied"]],
-        *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "memory"]],
-        ("rows_written", _L),
-        ("first_energy", _D),
-    ]
 
 
 def pointer(array: NDArray[Any] | None) -> int | None:
@@ -273,6 +73,13 @@ def _load() -> Any:
         "sd_bdf_stepper": (_P, [_P]),
         "sd_bdf_step": (c.c_int, [_P]),
         "sd_bdf_dense": (None, [_P, _D, _P, _P]),
+        "sd_linear_z_new": (_P, [_I, _P, _P, _P]),
+        "sd_linear_z_free": (None, [_P]),
+        "sd_radau_new": (c.POINTER(Radau), [_P, _P, _P]),
+        "sd_radau_free": (None, [_P]),
+        "sd_radau_stepper": (_P, [_P]),
+        "sd_radau_start": (None, [_P, _D, _P, _P, _D]),
+        "sd_radau_dense": (None, [_P, _D, _P, _P]),
         "sd_settle_new": (c.POINTER(Settle), [_P, _P, _I]),
         "sd_settle_free": (None, [_P]),
         "sd_settle_point": (c.c_int, [_P, _D, _P, _P]),

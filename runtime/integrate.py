@@ -15,6 +15,7 @@ import numpy as np
 from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel, SolverFailure
+from sysdyn.runtime.methods import Method
 from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.request import LONGEST, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.restart import Restart
@@ -83,27 +84,29 @@ class Integration:
 
     def _stepper(self) -> None:
         request = self.request
-        self.bdf = lib.core.sd_bdf_new(c.byref(self.system.core), self.linear)
-        if not self.bdf:
-            raise MemoryError
+        self.method = Method(request.method, self.system, self.linear, self._order)
         self._atol = None if request.atol is None else np.full(self.system.unknowns, request.atol)
-        bdf = self.bdf.contents
-        bdf.max_order = request.max_order
-        bdf.rtol, bdf.t_end = request.rtol, self.segments[0].end
-        bdf.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
-        bdf.fixed_h = request.fixed_step or 0.0
-        bdf.atol = lib.pointer(self._atol)
-        bdf.magnitude = lib.pointer(self.magnitude)
-        bdf.test, bdf.power = lib.pointer(self.roles.test), lib.pointer(self.roles.power)
-        bdf.track = 1
-        lib.core.sd_bdf_start(self.bdf, self.start.t, lib.pointer(self.y), lib.pointer(self.yd), 0.0)
+        self._smooth = self.roles.differential.astype(np.int32)
+        method = self.method.contents
+        method.rtol, method.t_end = request.rtol, self.segments[0].end
+        method.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
+        method.fixed_h = request.fixed_step or 0.0
+        method.atol = lib.pointer(self._atol)
+        method.magnitude = lib.pointer(self.magnitude)
+        method.test, method.power = lib.pointer(self.roles.test), lib.pointer(self.roles.power)
+        method.track = 1
+        if request.method == "radau":
+            method.smooth = lib.pointer(self._smooth)
+        else:
+            method.max_order = request.max_order
+        self.method.start(self.start.t, self.y, self.yd)
 
     def _driver(self) -> None:
         request, system = self.request, self.system
         self.observed = system.observed_rows("observe")[1]
         self.width = lib.ROW_HEAD + 2 * self.observed
         self.run_ = lib.core.sd_run_new(
-            lib.core.sd_bdf_stepper(self.bdf),
+            self.method.stepper,
             self.settler.core,
             system.form.written,
             system.form.extended,
@@ -143,39 +146,38 @@ class Integration:
             run.rows = 0
 
     def _failure(self, cause: str) -> SolverFailure:
-        bdf = self.bdf.contents
+        method = self.method.contents
         unknown: str | None = None
         row: RowLabel | None = None
-        if cause in ("singular", "nonfinite") and 0 <= bdf.bad_row < self.system.rows:
-            row = self.system.row_label(bdf.bad_row)
+        if cause in ("singular", "nonfinite") and 0 <= method.bad_row < self.system.rows:
+            row = self.system.row_label(method.bad_row)
         if cause == "singular":
-            unknown = self.system.name(bdf.bad_column)
+            unknown = self.system.name(method.bad_column)
         if cause in ("newton", "step_too_small", "error_test", "singular") and self.system.unknowns <= DENSE:
             # where the equations themselves are singular there, say so, with the place
             names, at = self._null_place()
             if names:
                 return SolverFailure(
-                    "singular", bdf.t, bdf.h, ", ".join(names[:3]), self.system.row_label(at)
+                    "singular", method.t, method.h, ", ".join(names[:3]), self.system.row_label(at)
                 )
             cause = "newton" if cause == "singular" else cause
         if cause in ("error_test", "step_too_small", "newton"):
             unknown = self._worst()
-        return SolverFailure(cause, bdf.t, bdf.h, unknown, row)
+        return SolverFailure(cause, method.t, method.h, unknown, row)
 
     def _null_place(self) -> tuple[tuple[str, ...], int]:
         """Unknowns and row of a singular pencil at the last accepted point; () where it is regular."""
-        bdf, n = self.bdf.contents, self.system.unknowns
-        y = lib.reader(bdf.phi[0], n).copy()
-        yd = self.yd if bdf.steps == 0 else lib.reader(bdf.yd, n).copy()
-        jy, jyd = self.system.jacobian(bdf.t, y, yd)
+        method = self.method.contents
+        y, yd = self.method.point()
+        jy, jyd = self.system.jacobian(method.t, y, yd)
         if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
             return (), -1
         return null_place(self.system, jy, jyd)
 
     def _worst(self) -> str:
         """The unknown with the largest weighted correction in the last step."""
-        bdf, n = self.bdf.contents, self.system.unknowns
-        change = np.abs(lib.reader(bdf.ee, n) * lib.reader(bdf.weight, n))
+        method, n = self.method.contents, self.system.unknowns
+        change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
         change = np.where(np.isfinite(change), change, np.inf)
         if (self.roles.test >= 0).any():
             change[self.roles.test < 0] = 0.0
@@ -187,22 +189,21 @@ class Integration:
 
     def statistics(self) -> Statistics:
         """Counters so far; residuals and Jacobians of the settling at output instants not included."""
-        bdf, core = self.bdf.contents, self.system.core
+        method, core = self.method.contents, self.system.core
         return Statistics(
-            bdf.steps,
-            bdf.rejected_steps,
+            method.steps,
+            method.rejected_steps,
             core.residual_evaluations,
             core.jacobian_evaluations,
             self.linear.contents.factorisations,
-            bdf.newton_failures,
+            method.newton_failures,
         )
 
     def _cross(self, segment: Segment) -> None:
         """Restarts behind the instant at which a segment ended."""
-        n, bdf = self.system.form.written, self.bdf.contents
-        y, yd = (np.zeros(self.system.form.extended) for _ in range(2))
-        lib.core.sd_bdf_dense(self.bdf, bdf.t, lib.pointer(y), lib.pointer(yd))
-        y, yd, _ = self.settler.settle(bdf.t, y[:n], yd[:n])
+        n, method = self.system.form.written, self.method.contents
+        y, yd = self.method.point()
+        y, yd, _ = self.settler.settle(method.t, y[:n], yd[:n])
         if self._restart is None:
             self._restart = Restart(self.settler, self.roles.state[:n])
         found = self._restart.across(segment.begin, y, yd)
@@ -211,15 +212,15 @@ class Integration:
         self.y[:], self._start_rate[:] = 0.0, 0.0
         self.y[:n], self._start_rate[:n] = found
         self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
-        bdf.t_end = segment.end
+        method.t_end = segment.end
         pointers = (lib.pointer(item) for item in (self.y, self.yd, y, yd))
         lib.core.sd_run_restart(self.run_, segment.begin, segment.label, *pointers)
 
     def _advance(self, sink: Sink, progress: Progress | None, began: float) -> None:
         """To the end of a segment."""
-        request, bdf = self.request, self.bdf.contents
+        request, method = self.request, self.method.contents
         while True:
-            left = CHUNK_STEPS if request.max_steps is None else request.max_steps - bdf.steps
+            left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
             before = time.process_time()
             state = lib.core.sd_run_advance(self.run_, min(CHUNK_STEPS, max(left, 1)), CHUNK_SECONDS)
             self.cpu += time.process_time() - before
@@ -227,13 +228,13 @@ class Integration:
             self.system.failure.check()
             self.settler.system.failure.check()
             if progress is not None:
-                progress(bdf.t)
+                progress(method.t)
             if state == 3:
-                raise self._failure(lib.CAUSES[bdf.cause])
-            if request.max_steps is not None and bdf.steps >= request.max_steps and bdf.t < request.t_end:
+                raise self._failure(lib.CAUSES[method.cause])
+            if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
                 raise self._failure("max_steps")
             late = request.max_wall is not None and time.monotonic() - began > request.max_wall
-            if late and bdf.t < request.t_end:
+            if late and method.t < request.t_end:
                 raise self._failure("max_wall")
             if state == 1:
                 break
@@ -242,7 +243,7 @@ class Integration:
         """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
         began = time.monotonic()
         self.system.core.residual_evaluations = self.system.core.jacobian_evaluations = 0
-        bdf = self.bdf.contents
+        method = self.method.contents
         for segment in self.segments:
             if segment is not self.segments[0]:
                 before = time.process_time()
@@ -250,7 +251,7 @@ class Integration:
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began)
         return Finished(
-            bdf.t,
+            method.t,
             self.statistics(),
             self.magnitude[: self.system.form.written].copy(),
             self.largest(),
@@ -259,7 +260,7 @@ class Integration:
         )
 
     def __del__(self) -> None:
-        for name, free in (("run_", "sd_run_free"), ("bdf", "sd_bdf_free"), ("linear", "sd_linear_free")):
+        for name, free in (("run_", "sd_run_free"), ("linear", "sd_linear_free")):
             if getattr(self, name, None):
                 getattr(lib.core, free)(getattr(self, name))
 

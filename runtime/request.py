@@ -21,9 +21,9 @@ class Request:
     t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
     (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
     absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; magnitude [unknowns as
-    written] known from an earlier run (else tracked); fixed_step [s]: no error test (with max_order 1 the
-    implicit Euler method); h_max [s]: longest step, None: LONGEST of the span; stops [s] ascending: instants at which
-    a step ends and the integration restarts (segments.py).
+    written] known from an earlier run (else tracked); method: bdf or radau; fixed_step [s]: no error test (bdf with
+    max_order 1: the implicit Euler method); h_max [s]: longest step, None: LONGEST of the span; stops [s] ascending:
+    instants at which a step ends and the integration restarts (segments.py).
     """
 
     t_end: float
@@ -37,6 +37,7 @@ class Request:
     max_wall: float | None = None
     magnitude: Floats | None = None
     index: int = 3
+    method: str = "bdf"
     max_order: int = lib.MAX_ORDER
     fixed_step: float | None = None
     h_max: float | None = None

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime import core_library as lib
-from sysdyn.runtime.accuracy import Achieved, Sampled, control
+from sysdyn.runtime.accuracy import FINEST, Achieved, Sampled, control
 from sysdyn.runtime.carrier import Carrier
 from sysdyn.runtime.description import Description, Floats, Ints, describe, element
 from sysdyn.runtime.failures import SolverFailure
@@ -28,6 +28,10 @@ from sysdyn.runtime.structure import Structure, structure
 from sysdyn.runtime.system import System
 from sysdyn.runtime.trace import Column, Parameter, TraceWriter, columns_of
 
+FINE = 1e-8
+"""Accuracy from which method auto takes radau."""
+FINEST_RADAU = 1e-17
+"""Smallest tolerance of Radau: its error test works with a tenth of the power 2/3 of it (core/radau.h)."""
 COMPARISONS = 200
 """Instants at which the runs of the accuracy control are compared, where the grid gives fewer."""
 
@@ -127,16 +131,22 @@ def choose_index(wanted: str, facts: Structure) -> tuple[str, int, tuple[str, ..
         return "2v", min(written, 2), ()
     if wanted == "1":
         return "1", min(written, 1), ("index 1: the constraints drift between the instants of the trace",)
-    raise ValueError(f"index {wanted} is not available with method bdf")
+    raise ValueError(f"index {wanted} is not available with methods bdf, radau")
 
 
 def choose_method(options: Options) -> str:
-    """Bdf or euler.  Raises ValueError for others."""
-    if options.method in ("auto", "bdf"):
-        return "bdf"
-    if options.method == "euler":
-        return "euler"
-    raise ValueError(f"method {options.method} is not available yet: bdf, euler")
+    """The method of the core, or euler; ValueError for what does not exist.
+
+    auto: radau from an accuracy of FINE on, else bdf.  Measured over the seed's models: at 1e-6 they cost the same; at
+    1e-9 radau takes a fifth of the steps and half the time, and reaches what the bdf cannot.
+    """
+    if options.method == "auto":
+        wanted = [options.accuracy or 1.0, *(accuracy for _, accuracy in options.accuracy_on)]
+        own = options.rtol is not None or options.atol is not None
+        return "radau" if min(wanted) <= FINE and not own else "bdf"
+    if options.method in ("bdf", "radau", "euler"):
+        return options.method
+    raise ValueError(f"method {options.method} is not available yet: bdf, radau, euler")
 
 
 def instants(options: Options) -> tuple[Floats, Ints]:
@@ -207,6 +217,7 @@ class _Runs:
             magnitude=magnitude,
             index=self.index,
             stops=options.stops,
+            method="radau" if self.method == "radau" else "bdf",
             max_order=1 if self.method == "euler" else lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
@@ -355,7 +366,8 @@ def _controlled(runs: _Runs, options: Options) -> tuple[Achieved | None, tuple[s
     if options.rtol is not None or options.atol is not None:
         runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol, None)
         return None, ()
-    achieved = control(runs.sampled, _targets(runs, options))
+    finest = FINEST_RADAU if runs.method == "radau" else FINEST
+    achieved = control(runs.sampled, _targets(runs, options), finest)
     if achieved.met:
         return achieved, ()
     return achieved, (

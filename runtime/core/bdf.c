@@ -54,8 +54,8 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     bdf->linear = linear;
     bdf->n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
-    bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->y, bdf->yd, &bdf->taken,
-                                step, dense, start};
+    bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->phi[0], bdf->yd, &bdf->taken,
+                                step, dense, NULL, start};
     return bdf;
 }
 

@@ -14,6 +14,7 @@ void sd_linear_free(sd_linear *linear)
         return;
     sd_sparse_free(linear->sparse);
     free(linear->row_scale);
+    free(linear->work);
     free(linear->dense);
     free(linear->pivot);
     free(linear);
@@ -29,32 +30,32 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
     linear->entries = column[n];
     linear->column = column;
     linear->row = row;
-    linear->row_scale = calloc(4 * m + nnz + 1, sizeof(double));
+    linear->row_scale = calloc(2 * m + 1, sizeof(double));
+    linear->work = calloc(2 * m + nnz + 1, sizeof(sd_number));
     linear->pivot = calloc(m + 1, sizeof(int32_t));
     if (order)
         linear->sparse = sd_sparse_new(n, column, row, order);
     else
-        linear->dense = calloc(m * m + 1, sizeof(double));
-    if (!linear->row_scale || !linear->pivot || !(order ? (void *)linear->sparse : (void *)linear->dense)) {
+        linear->dense = calloc(m * m + 1, sizeof(sd_number));
+    if (!linear->row_scale || !linear->work || !linear->pivot || !(order ? (void *)linear->sparse : (void *)linear->dense)) {
         sd_linear_free(linear);
         return NULL;
     }
     linear->column_scale = linear->row_scale + m;
-    linear->work = linear->row_scale + 2 * m;
-    linear->work2 = linear->row_scale + 3 * m;
-    linear->scaled = linear->row_scale + 4 * m;
+    linear->work2 = linear->work + m;
+    linear->scaled = linear->work + 2 * m;
     return linear;
 }
 
 /* scaled := R values C with rows of largest entry 1 */
-static void equilibrate(sd_linear *linear, const double *values, const double *scale)
+static void equilibrate(sd_linear *linear, const sd_number *values, const double *scale)
 {
     for (int32_t i = 0; i < linear->n; i++)
         linear->row_scale[i] = 0.0;
     for (int32_t j = 0; j < linear->n; j++) {
         double s = linear->column_scale[j] = scale ? scale[j] : 1.0;
         for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++) {
-            double size = fabs(linear->scaled[e] = values[e] * s);
+            double size = sd_size(linear->scaled[e] = values[e] * s);
             if (size > linear->row_scale[linear->row[e]])
                 linear->row_scale[linear->row[e]] = size;
         }
@@ -69,7 +70,7 @@ static void equilibrate(sd_linear *linear, const double *values, const double *s
 static int dense_factor(sd_linear *linear)
 {
     int32_t n = linear->n;
-    double *a = linear->dense;
+    sd_number *a = linear->dense;
     memset(a, 0, (size_t)n * (size_t)n * sizeof *a);
     for (int32_t j = 0; j < n; j++)
         for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
@@ -78,36 +79,37 @@ static int dense_factor(sd_linear *linear)
         linear->pivot[i] = i;
     linear->smallest = 1.0;
     for (int32_t k = 0; k < n; k++) {
-        double *ck = a + (size_t)k * n, size = 0.0;
+        sd_number *ck = a + (size_t)k * n;
+        double size = 0.0;
         int32_t best = k;
         for (int32_t i = k; i < n; i++)
-            if (fabs(ck[i]) > fabs(ck[best]))
+            if (sd_size(ck[i]) > sd_size(ck[best]))
                 best = i;
         for (int32_t e = linear->column[k]; e < linear->column[k + 1]; e++)
-            size = fmax(size, fabs(linear->scaled[e]));
-        double relative = size > 0.0 ? fabs(ck[best]) / size : 0.0;
+            size = fmax(size, sd_size(linear->scaled[e]));
+        double relative = size > 0.0 ? sd_size(ck[best]) / size : 0.0;
         if (!(relative >= linear->smallest)) {
             linear->smallest = relative;
             linear->bad_row = linear->pivot[best];
             linear->bad_column = k;
         }
-        if (!(fabs(ck[best]) > 0.0) || !isfinite(ck[best]))
+        if (!(sd_size(ck[best]) > 0.0) || !isfinite(sd_size(ck[best])))
             return 1;
         if (best != k) {
             int32_t p = linear->pivot[k];
             linear->pivot[k] = linear->pivot[best];
             linear->pivot[best] = p;
             for (int32_t j = 0; j < n; j++) {
-                double swap = a[(size_t)j * n + k];
+                sd_number swap = a[(size_t)j * n + k];
                 a[(size_t)j * n + k] = a[(size_t)j * n + best];
                 a[(size_t)j * n + best] = swap;
             }
         }
-        double inverse = 1.0 / ck[k];
+        sd_number inverse = 1.0 / ck[k];
         for (int32_t i = k + 1; i < n; i++)
             ck[i] *= inverse;
         for (int32_t j = k + 1; j < n; j++) {
-            double *cj = a + (size_t)j * n, u = cj[k];
+            sd_number *cj = a + (size_t)j * n, u = cj[k];
             if (u == 0.0)
                 continue;
             for (int32_t i = k + 1; i < n; i++)
@@ -117,26 +119,26 @@ static int dense_factor(sd_linear *linear)
     return 0;
 }
 
-static void dense_solve(const sd_linear *linear, double *x, double *work)
+static void dense_solve(const sd_linear *linear, sd_number *x, sd_number *work)
 {
     int32_t n = linear->n;
-    const double *a = linear->dense;
+    const sd_number *a = linear->dense;
     for (int32_t i = 0; i < n; i++)
         work[i] = x[linear->pivot[i]];
     for (int32_t k = 0; k < n; k++) {
-        const double *ck = a + (size_t)k * n;
+        const sd_number *ck = a + (size_t)k * n;
         for (int32_t i = k + 1; i < n; i++)
             work[i] -= ck[i] * work[k];
     }
     for (int32_t k = n - 1; k >= 0; k--) {
-        const double *ck = a + (size_t)k * n;
-        double v = x[k] = work[k] / ck[k];
+        const sd_number *ck = a + (size_t)k * n;
+        sd_number v = x[k] = work[k] / ck[k];
         for (int32_t i = 0; i < k; i++)
             work[i] -= ck[i] * v;
     }
 }
 
-int sd_linear_factor(sd_linear *linear, const double *values, const double *scale)
+int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale)
 {
     equilibrate(linear, values, scale);
     linear->factorisations++;
@@ -156,7 +158,7 @@ int sd_linear_factor(sd_linear *linear, const double *values, const double *scal
     return failed;
 }
 
-static void scaled_solve(sd_linear *linear, double *x)
+static void scaled_solve(sd_linear *linear, sd_number *x)
 {
     if (linear->dense)
         dense_solve(linear, x, linear->work);
@@ -164,10 +166,10 @@ static void scaled_solve(sd_linear *linear, double *x)
         sd_sparse_solve(linear->sparse, x, linear->work);
 }
 
-void sd_linear_solve(sd_linear *linear, double *x)
+void sd_linear_solve(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
-    double *rest = linear->work2;
+    sd_number *rest = linear->work2;
     for (int32_t i = 0; i < n; i++)
         rest[i] = x[i] *= linear->row_scale[i];
     scaled_solve(linear, x);
@@ -177,7 +179,7 @@ void sd_linear_solve(sd_linear *linear, double *x)
                 rest[linear->row[e]] -= linear->scaled[e] * x[j];
         scaled_solve(linear, rest);
         for (int32_t i = 0; i < n; i++)
-            x[i] += isfinite(rest[i]) ? rest[i] : 0.0;
+            x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;
     }
     for (int32_t i = 0; i < n; i++)
         x[i] *= linear->column_scale[i];

@@ -9,6 +9,8 @@
 #ifndef SYSDYN_LINEAR_H
 #define SYSDYN_LINEAR_H
 
+#include "number.h"
+
 #include <stdint.h>
 
 #define SD_DENSE 50 /* measured: below, the dense loops win over indirect ones */
@@ -19,11 +21,11 @@ typedef struct sd_linear {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
     double *row_scale, *column_scale;
-    double *scaled;              /* entries of the scaled matrix */
-    double *dense;               /* LU of small matrices, [n][n] by columns; NULL for sparse ones */
+    sd_number *scaled;           /* entries of the scaled matrix */
+    sd_number *dense;               /* LU of small matrices, [n][n] by columns; NULL for sparse ones */
     int32_t *pivot;
     sd_sparse *sparse;
-    double *work, *work2;
+    sd_number *work, *work2;
     double smallest;             /* smallest pivot relative to its column: 0 singular */
     int32_t bad_row, bad_column; /* where it was found */
     int64_t factorisations, pivotings;
@@ -33,8 +35,8 @@ typedef struct sd_linear {
 sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order);
 void sd_linear_free(sd_linear *linear);
 /* values [entries], scale [n] magnitudes of the unknowns or NULL.  0 done, 1 singular (bad_row, bad_column), 2 memory. */
-int sd_linear_factor(sd_linear *linear, const double *values, const double *scale);
+int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
-void sd_linear_solve(sd_linear *linear, double *x);
+void sd_linear_solve(sd_linear *linear, sd_number *x);
 
 #endif

@@ -130,6 +130,9 @@ static double kind_here(const sd_run *run, int asked)
 static int drain(sd_run *run)
 {
     double t = *run->stepper->t;
+    if (run->pending && run->settle && run->stepper->refine && run->next < run->instants &&
+        run->instant[run->next] < t)
+        run->stepper->refine(run->stepper->self, run->settle);
     while (run->pending) {
         if (run->rows >= run->room)
             return 1;

@@ -32,11 +32,11 @@ sd_sparse *sd_sparse_new(int32_t n, const int32_t *column, const int32_t *row, c
     lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
     lu->order = calloc(7 * m + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    lu->diagonal = calloc(2 * m + 1, sizeof(double));
+    lu->diagonal = calloc(2 * m + 1, sizeof(sd_number));
     lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
     lu->u_row = malloc((size_t)lu->u_room * sizeof(int32_t));
-    lu->l_value = malloc((size_t)lu->l_room * sizeof(double));
-    lu->u_value = malloc((size_t)lu->u_room * sizeof(double));
+    lu->l_value = malloc((size_t)lu->l_room * sizeof(sd_number));
+    lu->u_value = malloc((size_t)lu->u_room * sizeof(sd_number));
     if (!lu->order || !lu->l_start || !lu->diagonal || !lu->l_row || !lu->u_row || !lu->l_value || !lu->u_value) {
         sd_sparse_free(lu);
         return NULL;
@@ -91,7 +91,7 @@ static int32_t reach(sd_sparse *lu, const int32_t *column, const int32_t *row, i
 }
 
 /* room for one more column of L and of U */
-static int grow(int64_t need, int64_t *room, int32_t **rows, double **values)
+static int grow(int64_t need, int64_t *room, int32_t **rows, sd_number **values)
 {
     if (need <= *room)
         return 0;
@@ -100,7 +100,7 @@ static int grow(int64_t need, int64_t *room, int32_t **rows, double **values)
     if (!r)
         return 2;
     *rows = r;
-    double *v = realloc(*values, (size_t)more * sizeof *v);
+    sd_number *v = realloc(*values, (size_t)more * sizeof *v);
     if (!v)
         return 2;
     *values = v;
@@ -114,11 +114,11 @@ static int32_t choose(const sd_sparse *lu, int32_t top, double *largest)
     int32_t best = -1;
     *largest = 0.0;
     for (int32_t i = top; i < lu->n; i++)
-        if (lu->place[lu->stack[i]] < 0 && fabs(lu->x[lu->stack[i]]) > *largest)
-            *largest = fabs(lu->x[lu->stack[i]]);
+        if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
+            *largest = sd_size(lu->x[lu->stack[i]]);
     for (int32_t i = top; i < lu->n && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
-        if (lu->place[r] >= 0 || fabs(lu->x[r]) < THRESHOLD * *largest)
+        if (lu->place[r] >= 0 || sd_size(lu->x[r]) < THRESHOLD * *largest)
             continue;
         if (best < 0 || lu->count[r] < lu->count[best] || (lu->count[r] == lu->count[best] && r < best))
             best = r;
@@ -126,7 +126,7 @@ static int32_t choose(const sd_sparse *lu, int32_t top, double *largest)
     return best;
 }
 
-int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const double *value)
+int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
     int32_t n = lu->n;
     int64_t nl = 0, nu = 0;
@@ -147,14 +147,14 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         double size = 0.0;
         for (int32_t e = column[c]; e < column[c + 1]; e++) {
             lu->x[row[e]] += value[e];
-            size = fmax(size, fabs(value[e]));
+            size = fmax(size, sd_size(value[e]));
         }
         /* eliminate with the finished columns, in order */
         for (int32_t i = top; i < n; i++) {
             int32_t r = lu->stack[i], j = lu->place[r];
             if (j < 0)
                 continue;
-            double u = lu->x[r];
+            sd_number u = lu->x[r];
             lu->u_row[nu] = j;
             lu->u_value[nu++] = u;
             for (int32_t p = lu->l_start[j]; p < lu->l_start[j + 1]; p++)
@@ -175,7 +175,7 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
             lu->bad_column = c;
             return 1;
         }
-        double diagonal = lu->x[pivot];
+        sd_number diagonal = lu->x[pivot];
         lu->diagonal[k] = diagonal;
         lu->place[pivot] = k;
         lu->source[k] = pivot;
@@ -196,9 +196,9 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     return 0;
 }
 
-int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const double *value)
+int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
-    double *x = lu->x;
+    sd_number *x = lu->x;
     lu->smallest = 1.0;
     for (int32_t k = 0; k < lu->n; k++) {
         int32_t c = lu->order[k];
@@ -206,24 +206,25 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
             x[lu->place[row[e]]] += value[e];
         for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++) {
             int32_t j = lu->u_row[p];
-            double u = x[j];
+            sd_number u = x[j];
             x[j] = 0.0;
             lu->u_value[p] = u;
             for (int32_t l = lu->l_start[j]; l < lu->l_start[j + 1]; l++)
                 x[lu->l_row[l]] -= lu->l_value[l] * u;
         }
-        double diagonal = x[k], largest = fabs(diagonal);
+        sd_number diagonal = x[k];
+        double largest = sd_size(diagonal);
         x[k] = 0.0;
         lu->diagonal[k] = diagonal;
         for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++) {
-            double v = x[lu->l_row[l]];
+            sd_number v = x[lu->l_row[l]];
             x[lu->l_row[l]] = 0.0;
             lu->l_value[l] = v / diagonal;
-            largest = fmax(largest, fabs(v));
+            largest = fmax(largest, sd_size(v));
         }
-        double relative = largest > 0.0 ? fabs(diagonal) / largest : 0.0;
+        double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
         lu->smallest = fmin(lu->smallest, relative);
-        if (!(relative >= UNHEALTHY) || !isfinite(diagonal)) {
+        if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
             memset(x, 0, (size_t)lu->n * sizeof *x);
             lu->pivoted = 0;
             return 1;
@@ -232,7 +233,7 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     return 0;
 }
 
-void sd_sparse_solve(sd_sparse *lu, double *x, double *work)
+void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work)
 {
     for (int32_t k = 0; k < lu->n; k++)
         work[k] = x[lu->source[k]];
@@ -240,7 +241,7 @@ void sd_sparse_solve(sd_sparse *lu, double *x, double *work)
         for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
             work[lu->l_row[l]] -= lu->l_value[l] * work[k];
     for (int32_t k = lu->n - 1; k >= 0; k--) {
-        double v = work[k] / lu->diagonal[k];
+        sd_number v = work[k] / lu->diagonal[k];
         x[lu->order[k]] = v;
         for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
             work[lu->u_row[p]] -= lu->u_value[p] * v;

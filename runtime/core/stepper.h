@@ -6,6 +6,7 @@
 #define SYSDYN_STEPPER_H
 
 #include "assembly.h"
+#include "settle.h"
 
 enum sd_cause {
     SD_FINE = 0,
@@ -29,6 +30,8 @@ typedef struct sd_stepper {
     int (*step)(void *self);
     /* y, yd [n] at any t within the last step */
     void (*dense)(const void *self, double t, double *y, double *yd);
+    /* before values within the last step are asked for: derivatives as exact as the values (NULL: nothing to do) */
+    void (*refine)(void *self, sd_settle *settle);
     /* from (t, y, yd) with step h (0: chosen) */
     void (*start)(void *self, double t, const double *y, const double *yd, double h);
 } sd_stepper;

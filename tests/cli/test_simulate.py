@@ -277,6 +277,6 @@ def test_not_yet_is_said_with_a_code(tmp_path, capsys):
     assert "N608" in capsys.readouterr().err
     assert run(["simulate", path, "--level", "a=b"]) == 1
     assert "E802" in capsys.readouterr().err
-    for option in (("--method", "radau"), ("--index", "0")):
+    for option in (("--method", "dopri"), ("--index", "0")):
         assert run(["simulate", path, *option]) == 2
         assert "not available" in capsys.readouterr().err

@@ -12,8 +12,10 @@ CORE = Path(__file__).parents[2] / "runtime" / "core"
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs = [("Frame", "sd_frame"), ("Call", "sd_call"), ("System", "sd_system"), ("Linear", "sd_linear")]
-    pairs += [("Bdf", "sd_bdf"), ("Settle", "sd_settle"), ("Stepper", "sd_stepper"), ("Run", "sd_run")]
-    lines = ['#include "run.h"', '#include "bdf.h"', "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
+    pairs += [("Bdf", "sd_bdf"), ("Settle", "sd_settle"), ("Stepper", "sd_stepper"), ("Radau", "sd_radau")]
+    pairs += [("Run", "sd_run")]
+    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau")]
+    lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
         lines.append(f'printf("%zu\\n", sizeof({tag}));')
         lines += [f'printf("%zu\\n", offsetof({tag}, {field[0]}));' for field in getattr(lib, name)._fields_]

@@ -1,0 +1,18 @@
+/* linear.h for complex matrices: G = A + i B on one fixed pattern with real magnitudes of the unknowns. */
+#ifndef SYSDYN_COMPLEX_LINEAR_H
+#define SYSDYN_COMPLEX_LINEAR_H
+
+#include <complex.h>
+#include <stdint.h>
+
+typedef struct sd_linear_z sd_linear_z;
+
+sd_linear_z *sd_linear_z_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order);
+void sd_linear_z_free(sd_linear_z *linear);
+/* as sd_linear_factor */
+int sd_linear_z_factor(sd_linear_z *linear, const double complex *values, const double *scale);
+void sd_linear_z_solve(sd_linear_z *linear, double complex *x);
+/* where the last factorisation found its smallest pivot */
+void sd_linear_z_bad(const sd_linear_z *linear, int32_t *row, int32_t *column);
+
+#endif

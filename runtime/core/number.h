@@ -1,0 +1,42 @@
+/* The numbers of a factorisation: double, or double complex where SD_COMPLEX is defined.
+ *
+ * linear.c and sparse.c are written once and compiled twice; complex_linear.c gives the complex ones names of their own.
+ */
+#ifndef SYSDYN_NUMBER_H
+#define SYSDYN_NUMBER_H
+
+#include <math.h>
+
+#ifdef SD_COMPLEX
+#include <complex.h>
+
+typedef double complex sd_number;
+
+/* |re| + |im|: within sqrt(2) of the modulus, and good enough to choose pivots */
+static inline double sd_size(sd_number x)
+{
+    return fabs(creal(x)) + fabs(cimag(x));
+}
+
+#define sd_linear sd_linear_z
+#define sd_linear_new sd_linear_z_new
+#define sd_linear_free sd_linear_z_free
+#define sd_linear_factor sd_linear_z_factor
+#define sd_linear_solve sd_linear_z_solve
+#define sd_sparse sd_sparse_z
+#define sd_sparse_new sd_sparse_z_new
+#define sd_sparse_free sd_sparse_z_free
+#define sd_sparse_pivot sd_sparse_z_pivot
+#define sd_sparse_refactor sd_sparse_z_refactor
+#define sd_sparse_solve sd_sparse_z_solve
+#else
+
+typedef double sd_number;
+
+static inline double sd_size(sd_number x)
+{
+    return fabs(x);
+}
+#endif
+
+#endif

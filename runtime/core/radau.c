@@ -1,0 +1,459 @@
+/* The step of Radau IIA: stages by Newton's iteration, error, step size (see radau.h). */
+#include "radau.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ITERATIONS 7       /* of Newton a step */
+#define PATIENT 30         /* the same where the step is fixed: nothing is gained by giving up early */
+#define SAFETY 0.9
+#define GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
+#define SHRINK 0.2
+#define SLOW 0.99          /* contraction above which Newton gives up */
+#define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
+#define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
+#define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
+#define KEEP_HIGH 1.2
+#define SINGULAR 6         /* halvings after a singular matrix */
+
+static const double c[SD_STAGES] = {0.15505102572168219018, 0.64494897427831780982, 1.0};
+static const double inverse_a[SD_STAGES][SD_STAGES] = {
+    {3.2247448713915890491, 1.1678400846904054949, -0.25319726474218082619},
+    {-3.5678400846904054949, 0.7752551286084109509, 1.0531972647421808262},
+    {5.5319726474218082619, -7.5319726474218082619, 5.0},
+};
+static const double gamma0 = 3.6378342527444957322;
+static const double complex lambda = 2.6810828736277521339 + 3.0504301992474105694 * I;
+/* A^-1 = S diag(gamma, lambda, conj lambda) S^-1: columns of S, rows of S^-1 */
+static const double column_real[SD_STAGES] = {0.094438762488975241487, 0.25021312296533331138, 1.0};
+static const double complex column_complex[SD_STAGES] = {
+    -0.14125529502095420843 + 0.030029194105147424492 * I, 0.204129352293799932 - 0.3829421127572619378 * I, 1.0};
+static const double row_real[SD_STAGES] = {4.1787185915519047273, 0.32768282076106238708, 0.52337644549944954804};
+static const double complex row_complex[SD_STAGES] = {
+    -2.0893592957759523637 - 0.25143631747289343798 * I, -0.16384141038053119354 + 1.2859634749278027146 * I,
+    0.23831177725027522598 - 0.29801960241411246248 * I};
+static const double estimate[SD_STAGES] = {-10.048809399827415562, 1.3821427331607488958, -1.0 / 3.0};
+
+static int step(void *radau)
+{
+    return sd_radau_step(radau);
+}
+
+static void dense(const void *radau, double t, double *y, double *yd)
+{
+    sd_radau_dense(radau, t, y, yd);
+}
+
+static void refine(void *radau, sd_settle *settle)
+{
+    sd_radau_refine(radau, settle);
+}
+
+static void start(void *radau, double t, const double *y, const double *yd, double h)
+{
+    sd_radau_start(radau, t, y, yd, h);
+}
+
+sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *complex_linear)
+{
+    sd_radau *radau = calloc(1, sizeof *radau);
+    if (!radau)
+        return NULL;
+    size_t nnz = (size_t)system->entries + 1, m = (size_t)system->unknowns + 1;
+    double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
+                          &radau->slope[2], &radau->point, &radau->point_d,
+                          &radau->z[0], &radau->z[1], &radau->z[2], &radau->kept[0], &radau->kept[1], &radau->kept[2],
+                          &radau->d[0], &radau->d[1], &radau->d[2], &radau->y, &radau->rate, &radau->ee,
+                          &radau->weight, &radau->newton_weight, &radau->scale};
+    size_t number = sizeof vectors / sizeof *vectors;
+    radau->memory = calloc(number * m + 3 * nnz, sizeof(double));
+    radau->w = calloc(m + nnz, sizeof(double complex));
+    if (!radau->memory || !radau->w) {
+        sd_radau_free(radau);
+        return NULL;
+    }
+    for (size_t i = 0; i < number; i++)
+        *vectors[i] = radau->memory + i * m;
+    radau->jy = radau->memory + number * m;
+    radau->jyd = radau->jy + nnz;
+    radau->g = radau->jyd + nnz;
+    radau->gz = radau->w + m;
+    radau->system = system;
+    radau->linear = linear;
+    radau->complex_linear = complex_linear;
+    radau->n = system->unknowns;
+    radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
+                                  &radau->taken, step, dense, refine, start};
+    return radau;
+}
+
+void sd_radau_free(sd_radau *radau)
+{
+    if (!radau)
+        return;
+    free(radau->memory);
+    free(radau->w);
+    free(radau);
+}
+
+sd_stepper *sd_radau_stepper(sd_radau *radau)
+{
+    return &radau->stepper;
+}
+
+/* weights of the error test and of Newton's at the last accepted point */
+static void set_weights(sd_radau *radau)
+{
+    for (int32_t i = 0; i < radau->n; i++) {
+        double size = fabs(radau->phi[i]);
+        if (radau->track && size > radau->magnitude[i])
+            radau->magnitude[i] = size;
+        double atol = radau->tolerance * radau->magnitude[i];
+        if (radau->atol && radau->test[i] >= 0)
+            atol = radau->atol[i] * radau->tolerance / radau->rtol;
+        radau->weight[i] = 1.0 / (atol + radau->tolerance * size);
+    }
+}
+
+/* index-2 unknowns and index-3 multipliers count with powers of h */
+static void set_newton_weights(sd_radau *radau)
+{
+    for (int32_t i = 0; i < radau->n; i++) {
+        double power = radau->power[i] == 0 ? 1.0 : radau->power[i] == 1 ? radau->h : radau->h * radau->h;
+        radau->newton_weight[i] = radau->weight[i] * power;
+        radau->scale[i] = radau->magnitude[i] / power;
+    }
+}
+
+/* root mean square over the tested unknowns in the error weights */
+static double tested_norm(const sd_radau *radau, const double *x)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < radau->n; i++)
+        if (radau->test[i] >= 0) {
+            double v = x[i] * radau->weight[i] * (radau->test[i] ? radau->h : 1.0);
+            sum += v * v;
+        }
+    return radau->tested ? sqrt(sum / radau->tested) : 0.0;
+}
+
+void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd, double h)
+{
+    size_t size = (size_t)radau->n * sizeof *y;
+    radau->t = t;
+    radau->taken = 0;
+    radau->tested = 0;
+    for (int32_t i = 0; i < radau->n; i++)
+        radau->tested += radau->test[i] >= 0;
+    radau->tolerance = fmax(0.1 * pow(radau->rtol, 2.0 / 3.0), 1e-13);
+    memmove(radau->phi, y, size);
+    memmove(radau->yd, yd, size);
+    memcpy(radau->slope[0], radau->yd, size);
+    radau->refined[0] = 1; /* a start is settled */
+    radau->h = 1.0;
+    set_weights(radau);
+    double span = radau->t_end - t, change = tested_norm(radau, yd) * radau->tolerance;
+    if (!(h > 0.0)) { /* local error (h y'/y)^4 within tolerance, with y' / y for the rate of all derivatives */
+        h = 1e-2 * span;
+        if (isfinite(change) && change > 0.0)
+            h = fmin(h, 0.1 * pow(radau->tolerance, 0.25) / change);
+        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), span), span));
+    }
+    radau->h = fmin(radau->fixed_h > 0.0 ? radau->fixed_h : h, radau->h_max);
+    radau->h_used = radau->h_before = 0.0;
+    radau->error_accepted = 0.0;
+    radau->ready = radau->old_jacobian = radau->rejected = 0;
+    radau->trust = 1.0;
+    radau->theta = 1.0;
+}
+
+/* J, E where they are not old, and the factors of J + gamma/h E and J + lambda/h E.  Taken at the last accepted point, or
+ * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
+static int factorise(sd_radau *radau, int at_end)
+{
+    sd_system *system = radau->system;
+    if (!radau->old_jacobian) {
+        double **z = radau->z, h = radau->h;
+        for (int32_t i = 0; at_end && i < radau->n; i++) {
+            radau->y[i] = radau->phi[i] + z[2][i];
+            radau->rate[i] =
+                (inverse_a[2][0] * z[0][i] + inverse_a[2][1] * z[1][i] + inverse_a[2][2] * z[2][i]) / h;
+        }
+        sd_jacobian(system, at_end ? radau->t + h : radau->t, at_end ? radau->y : radau->phi,
+                    at_end ? radau->rate : radau->yd, radau->jy, radau->jyd);
+        if (*system->stop)
+            return SD_STOPPED;
+        int32_t a = sd_first_bad(system->entries, radau->jy), b = sd_first_bad(system->entries, radau->jyd);
+        if (a >= 0 || b >= 0) {
+            radau->bad_row = system->row[a >= 0 ? a : b];
+            return SD_NONFINITE;
+        }
+        radau->old_jacobian = 1;
+    }
+    double real = gamma0 / radau->h;
+    double complex both = lambda / radau->h;
+    for (int32_t e = 0; e < system->entries; e++) {
+        radau->g[e] = radau->jy[e] + real * radau->jyd[e];
+        radau->gz[e] = radau->jy[e] + both * radau->jyd[e];
+    }
+    radau->ready = 0;
+    radau->factorisations++;
+    int failed = sd_linear_factor(radau->linear, radau->g, radau->scale);
+    radau->bad_row = radau->linear->bad_row;
+    radau->bad_column = radau->linear->bad_column;
+    if (!failed) {
+        failed = sd_linear_z_factor(radau->complex_linear, radau->gz, radau->scale);
+        if (failed)
+            sd_linear_z_bad(radau->complex_linear, &radau->bad_row, &radau->bad_column);
+    }
+    if (failed)
+        return failed == 2 ? SD_MEMORY : SD_SINGULAR;
+    radau->h_factored = radau->h;
+    radau->ready = 1;
+    return SD_FINE;
+}
+
+/* residuals of the three stages into d */
+static int residuals(sd_radau *radau)
+{
+    int32_t n = radau->n;
+    double *z[SD_STAGES] = {radau->z[0], radau->z[1], radau->z[2]};
+    for (int s = 0; s < SD_STAGES; s++) {
+        double a = inverse_a[s][0] / radau->h, b = inverse_a[s][1] / radau->h, e = inverse_a[s][2] / radau->h;
+        for (int32_t i = 0; i < n; i++) {
+            radau->y[i] = radau->phi[i] + z[s][i];
+            radau->rate[i] = a * z[0][i] + b * z[1][i] + e * z[2][i];
+        }
+        sd_residual(radau->system, radau->t + c[s] * radau->h, radau->y, radau->rate, radau->d[s]);
+        if (*radau->system->stop)
+            return SD_STOPPED;
+        int32_t bad = sd_first_bad(n, radau->d[s]);
+        if (bad >= 0) {
+            radau->bad_row = bad;
+            return SD_NONFINITE;
+        }
+    }
+    return SD_FINE;
+}
+
+/* one Newton step from the residuals in d; the size of the correction in Newton's weights */
+static double correct(sd_radau *radau)
+{
+    int32_t n = radau->n;
+    double *d1 = radau->d[0], *d2 = radau->d[1], *d3 = radau->d[2], sum = 0.0;
+    double complex *w = radau->w;
+    for (int32_t i = 0; i < n; i++) {
+        double r1 = -d1[i], r2 = -d2[i], r3 = -d3[i];
+        w[i] = row_complex[0] * r1 + row_complex[1] * r2 + row_complex[2] * r3;
+        d1[i] = row_real[0] * r1 + row_real[1] * r2 + row_real[2] * r3;
+    }
+    sd_linear_solve(radau->linear, d1);
+    sd_linear_z_solve(radau->complex_linear, w);
+    for (int32_t i = 0; i < n; i++) {
+        double real = d1[i];
+        for (int s = 0; s < SD_STAGES; s++) {
+            double dz = column_real[s] * real + 2.0 * creal(column_complex[s] * w[i]);
+            double v = dz * radau->newton_weight[i];
+            radau->z[s][i] += dz;
+            sum += v * v;
+        }
+    }
+    radau->newton_iterations++;
+    return sqrt(sum / (3.0 * n));
+}
+
+/* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
+static int iterate(sd_radau *radau, int full, int *used, double *retry)
+{
+    double tolerance = fmax(10.0 * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
+    double before = 0.0, ratio_before = 0.0, trust = pow(fmax(radau->trust, DBL_EPSILON), 0.8);
+    int patient = full || radau->fixed_h > 0.0;
+    *retry = 0.5;
+    for (int m = 1; m <= (patient ? PATIENT : ITERATIONS); m++) {
+        int cause = residuals(radau);
+        if (cause)
+            return cause;
+        double size = correct(radau);
+        *used = m;
+        if (!isfinite(size))
+            return SD_NEWTON;
+        if (m > 1) {
+            double ratio = size / before;
+            radau->theta = m == 2 ? ratio : sqrt(ratio * ratio_before);
+            ratio_before = ratio;
+            if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2))
+                return size <= STAGNANT * tolerance ? SD_FINE : SD_NEWTON;
+            trust = radau->theta < SLOW ? radau->theta / (1.0 - radau->theta) : 1.0 / DBL_EPSILON;
+            double end = trust * size * pow(radau->theta, ITERATIONS - 1 - m) / tolerance;
+            if (!patient && end >= 1.0 && trust * size > tolerance) {
+                double far = fmax(1e-4, fmin(20.0, end));
+                *retry = 0.8 * pow(far, -1.0 / (4 + ITERATIONS - 1 - m));
+                return SD_NEWTON;
+            }
+        }
+        before = fmax(size, DBL_MIN);
+        if (trust * size <= tolerance) {
+            radau->trust = trust;
+            return SD_FINE;
+        }
+        if (full) {
+            radau->old_jacobian = 0;
+            if ((cause = factorise(radau, 1)))
+                return cause;
+        }
+    }
+    return SD_NEWTON;
+}
+
+/* error of the step in the weights, filtered once more where it is large after a rejection or at the start */
+static int estimate_error(sd_radau *radau, double *error)
+{
+    int32_t n = radau->n;
+    double *v = radau->rate;
+    memcpy(radau->y, radau->phi, (size_t)n * sizeof(double));
+    for (int again = 0;; again++) {
+        for (int32_t i = 0; i < n; i++)
+            v[i] = -(estimate[0] * radau->z[0][i] + estimate[1] * radau->z[1][i] + estimate[2] * radau->z[2][i]) /
+                   radau->h;
+        sd_residual(radau->system, radau->t, radau->y, v, radau->ee);
+        if (*radau->system->stop)
+            return SD_STOPPED;
+        for (int32_t i = 0; i < n; i++)
+            radau->ee[i] = -radau->ee[i];
+        sd_linear_solve(radau->linear, radau->ee);
+        *error = tested_norm(radau, radau->ee);
+        if (!(*error >= 1.0) || again || !(radau->taken == 0 || radau->rejected))
+            break;
+        for (int32_t i = 0; i < n; i++)
+            radau->y[i] = radau->phi[i] + (radau->test[i] >= 0 ? radau->ee[i] : 0.0);
+    }
+    *error = isfinite(*error) ? fmax(*error, 1e-10) : INFINITY;
+    return SD_FINE;
+}
+
+/* the step ends at t_end exactly, and never leaves less than its half for the last one */
+static void fit_end(sd_radau *radau)
+{
+    double left = radau->t_end - radau->t;
+    if (radau->h >= left * (1.0 - 1e-12))
+        radau->h = left;
+    else if (2.0 * radau->h > left && radau->taken > 0 && !(radau->fixed_h > 0.0))
+        radau->h = 0.5 * left;
+}
+
+/* the new point, and the next step's size */
+static void accept(sd_radau *radau, double error, int iterations)
+{
+    size_t size = (size_t)radau->n * sizeof(double);
+    double h = radau->h, **z = radau->z;
+    double limit = fmin(SAFETY, SAFETY * (1 + 2 * ITERATIONS) / (iterations + 2 * ITERATIONS));
+    double ratio = fmax(1.0 / GROWTH, fmin(1.0 / SHRINK, pow(error, 0.25) / limit));
+    if (radau->taken > 0) { /* Gustafsson's predictive controller */
+        double predicted = radau->h_accepted / h * pow(error * error / radau->error_accepted, 0.25) / SAFETY;
+        ratio = fmax(ratio, fmax(1.0 / GROWTH, fmin(1.0 / SHRINK, predicted)));
+    }
+    radau->h_accepted = h;
+    radau->error_accepted = fmax(1e-2, error);
+    double next = h / ratio;
+    if (radau->rejected)
+        next = fmin(next, h);
+    double *oldest = radau->before, *slope = radau->slope[2];
+    radau->before = radau->last;
+    radau->last = oldest;
+    memcpy(radau->last, radau->phi, size);
+    for (int k = 2; k > 0; k--) {
+        radau->slope[k] = radau->slope[k - 1];
+        radau->refined[k] = radau->refined[k - 1];
+    }
+    radau->slope[0] = slope;
+    radau->refined[0] = 0;
+    radau->h_before = radau->h_used;
+    radau->h_used = h;
+    for (int32_t i = 0; i < radau->n; i++) {
+        radau->phi[i] += z[2][i];
+        radau->yd[i] =
+            (inverse_a[2][0] * z[0][i] + inverse_a[2][1] * z[1][i] + inverse_a[2][2] * z[2][i]) / h;
+    }
+    memcpy(radau->slope[0], radau->yd, size);
+    for (int s = 0; s < SD_STAGES; s++) {
+        double *swap = radau->kept[s];
+        radau->kept[s] = radau->z[s];
+        radau->z[s] = swap;
+    }
+    double t = radau->t + h;
+    radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;
+    radau->steps++;
+    radau->taken++;
+    radau->rejected = 0;
+    /* the Jacobian lasts while Newton converges fast; the factors while the step hardly changes */
+    if (radau->theta > GOOD)
+        radau->old_jacobian = radau->ready = 0;
+    if (radau->fixed_h > 0.0)
+        radau->h = radau->fixed_h;
+    else if (!(radau->ready && next / h >= KEEP_LOW && next / h <= KEEP_HIGH))
+        radau->h = fmin(next, radau->h_max);
+}
+
+int sd_radau_step(sd_radau *radau)
+{
+    int singular = 0, iterations = 0, failures = 0;
+    double retry = 0.5, error = 0.0;
+    set_weights(radau);
+    radau->cause = SD_FINE;
+    for (;;) {
+        fit_end(radau);
+        double left = radau->t_end - radau->t;
+        if (radau->h < 4.0 * DBL_EPSILON * fmax(fabs(radau->t), left) && radau->h < left) {
+            radau->cause = radau->cause ? radau->cause : SD_STEP;
+            return radau->cause;
+        }
+        set_newton_weights(radau);
+        int cause = SD_FINE;
+        retry = 0.5;
+        int fresh = !radau->old_jacobian;
+        sd_radau_extrapolate(radau, radau->h);
+        if (!radau->ready || radau->h != radau->h_factored)
+            cause = factorise(radau, failures > 0);
+        if (cause == SD_FINE) {
+            radau->theta = 0.0; /* one iteration: the Jacobian is good enough */
+            cause = iterate(radau, failures > 1, &iterations, &retry);
+        }
+        if (cause == SD_FINE && !(radau->fixed_h > 0.0)) {
+            cause = estimate_error(radau, &error);
+            if (cause == SD_FINE && !(error < 1.0))
+                cause = SD_ERROR_TEST;
+        }
+        if (cause == SD_FINE)
+            break;
+        radau->cause = cause;
+        if (cause == SD_STOPPED || cause == SD_MEMORY || radau->fixed_h > 0.0)
+            return cause;
+        if (cause == SD_ERROR_TEST) {
+            radau->rejected_steps++;
+            radau->rejected = 1;
+            double limit = fmin(SAFETY, SAFETY * (1 + 2 * ITERATIONS) / (iterations + 2 * ITERATIONS));
+            double ratio = fmin(1.0 / SHRINK, pow(error, 0.25) / limit);
+            radau->h *= radau->taken == 0 ? 0.1 : isfinite(ratio) ? 1.0 / fmax(ratio, 1.0) : SHRINK;
+        } else {
+            radau->newton_failures++;
+            radau->trust = 1.0;
+            radau->ready = 0;
+            if (cause == SD_SINGULAR && ++singular >= SINGULAR)
+                return cause;
+            if (cause == SD_NEWTON && !fresh) {
+                radau->old_jacobian = 0; /* once more with fresh slopes */
+                continue;
+            }
+            radau->h *= cause == SD_NEWTON ? retry : 0.25;
+            if (++failures > 2)
+                radau->h *= 0.5;
+            radau->old_jacobian = 0;
+            radau->rejected = 1;
+        }
+    }
+    radau->cause = SD_FINE;
+    accept(radau, error, iterations);
+    return SD_FINE;
+}

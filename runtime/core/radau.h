@@ -1,0 +1,67 @@
+/* Radau IIA of three stages (order 5, stiffly accurate) for F(t, y, yd) = 0.
+ *
+ * Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Springer 1996, sections IV.8 and VI.4; the
+ * error estimate (8.19)-(8.20), Gustafsson's controller (8.25).  Names of that book, declared once:
+ *   c[i], A      nodes and coefficients; A^-1 has the eigenvalues gamma and lambda, conj(lambda)
+ *   z[i]         Y_i - y_n of the stages; the derivatives there are K = A^-1 z / h
+ *   theta        contraction of Newton's iteration
+ * Unknowns that occur undifferentiated are stage values like the others: their K enters no row.  With simplified
+ * Jacobians J = dF/dy, E = dF/dyd a Newton step is the real system (J + gamma/h E) w = r and the complex one
+ * (J + lambda/h E) w = r on one pattern.
+ * Error test, weights and Newton's norm: as in bdf.h, with the tolerance 0.1 rtol^(2/3) that fits an estimate of order 3.
+ * Values within a step: the cubic of the stages, or, for unknowns with derivatives, the quintic through values and
+ * derivatives at the last three points, whose error is that of the method.  The stage's K at the end of a step has the
+ * multipliers' order only: where rows are asked for, derivatives come from the settled point.
+ */
+#ifndef SYSDYN_RADAU_H
+#define SYSDYN_RADAU_H
+
+#include "assembly.h"
+#include "complex_linear.h"
+#include "linear.h"
+#include "stepper.h"
+
+#define SD_STAGES 3
+
+typedef struct sd_radau {
+    sd_system *system;
+    sd_linear *linear;
+    sd_linear_z *complex_linear;
+    int32_t n, tested;
+    double rtol, t_end, h_max, fixed_h;
+    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| where `track` */
+    const int32_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative */
+    int32_t track;
+    /* state of the integration */
+    double tolerance;         /* 0.1 rtol^(2/3) */
+    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, trust;
+    int32_t ready, old_jacobian, rejected;
+    double *phi, *yd;         /* [n] the last accepted point */
+    double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */
+    double *slope[SD_STAGES]; /* [n] derivatives at phi, last, before, for values within the step */
+    int32_t refined[SD_STAGES];                     /* they are settled */
+    double *z[SD_STAGES], *kept[SD_STAGES];         /* of this step, of the last accepted one */
+    double *d[SD_STAGES];                           /* right sides and corrections */
+    double *point, *point_d;  /* [written and more] */
+    double *y, *rate, *ee, *weight, *newton_weight, *scale, *jy, *jyd, *g, *memory;
+    double complex *w, *gz;
+    /* what happened */
+    int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;
+    int32_t cause, bad_row, bad_column;
+    sd_stepper stepper;
+} sd_radau;
+
+sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *complex_linear);
+void sd_radau_free(sd_radau *radau);
+sd_stepper *sd_radau_stepper(sd_radau *radau);
+void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd, double h);
+int sd_radau_step(sd_radau *radau);
+/* radau_dense.c: y, yd [n] at any t within the last step */
+void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd);
+/* settled derivatives at the points that sd_radau_dense uses */
+void sd_radau_refine(sd_radau *radau, sd_settle *settle);
+/* z [stages] of a step of size h from the last step's polynomial */
+void sd_radau_extrapolate(sd_radau *radau, double h);
+
+#endif

@@ -1,0 +1,273 @@
+"""The structures of runtime/core/*.h as ctypes sees them.
+
+The layouts mirror the headers field by field; a test compares their sizes with the compiler's.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+
+MAX_ORDER = 5
+STAGES = 3
+ROW_HEAD = 8
+CAUSES = ("", "newton", "error_test", "singular", "nonfinite", "step_too_small", "stopped", "memory")
+
+ROWS = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p, c.c_void_p)
+"""sd_rows and sd_entries: frame, t, y, yd, out."""
+
+_D, _I, _L, _P = c.c_double, c.c_int32, c.c_int64, c.c_void_p
+_ORDERS = _D * (MAX_ORDER + 2)
+
+
+class Frame(c.Structure):
+    """sd_frame."""
+
+    _fields_ = [("p", _P), ("ix", _P), ("at", _P), ("to", _P)]
+
+
+class Call(c.Structure):
+    """sd_call."""
+
+    _fields_ = [
+        ("rows", _P),
+        ("dy", _P),
+        ("dyd", _P),
+        ("frame", Frame),
+        ("n_dy", _I),
+        ("n_dyd", _I),
+        ("slot_dy", _P),
+        ("slot_dyd", _P),
+    ]
+
+
+class System(c.Structure):
+    """sd_system."""
+
+    _fields_ = [
+        ("unknowns", _I),
+        ("rows", _I),
+        ("entries", _I),
+        ("calls", _I),
+        ("kinematics", _I),
+        ("column", _P),
+        ("row", _P),
+        ("call", _P),
+        ("k_row", _P),
+        ("k_q", _P),
+        ("k_f", _P),
+        ("k_slot_q", _P),
+        ("k_slot_f", _P),
+        ("v", _P),
+        ("stop", _P),
+        ("residual_evaluations", _L),
+        ("jacobian_evaluations", _L),
+    ]
+
+
+class Linear(c.Structure):
+    """sd_linear."""
+
+    _fields_ = [
+        ("n", _I),
+        ("entries", _I),
+        ("column", _P),
+        ("row", _P),
+        ("row_scale", _P),
+        ("column_scale", _P),
+        ("scaled", _P),
+        ("dense", _P),
+        ("pivot", _P),
+        ("sparse", _P),
+        ("work", _P),
+        ("work2", _P),
+        ("smallest", _D),
+        ("bad_row", _I),
+        ("bad_column", _I),
+        ("factorisations", _L),
+        ("pivotings", _L),
+    ]
+
+
+class Stepper(c.Structure):
+    """sd_stepper."""
+
+    _fields_ = [
+        ("self", _P),
+        ("system", _P),
+        ("n", _I),
+        *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
+    ]
+
+
+class Bdf(c.Structure):
+    """sd_bdf."""
+
+    _fields_ = [
+        ("system", _P),
+        ("linear", _P),
+        ("n", _I),
+        ("max_order", _I),
+        ("tested", _I),
+        ("rtol", _D),
+        ("t_end", _D),
+        ("h_max", _D),
+        ("fixed_h", _D),
+        ("atol", _P),
+        ("magnitude", _P),
+        ("test", _P),
+        ("power", _P),
+        ("track", _I),
+        ("t", _D),
+        ("h", _D),
+        ("h_used", _D),
+        ("cj", _D),
+        ("cj_factored", _D),
+        ("contraction", _D),
+        ("order", _I),
+        ("order_used", _I),
+        ("ns", _I),
+        ("rising", _I),
+        ("fresh_jacobian", _I),
+        ("jacobian_age", _I),
+        ("ready", _I),
+        ("psi", _ORDERS),
+        ("alpha", _ORDERS),
+        ("beta", _ORDERS),
+        ("sigma", _ORDERS),
+        ("gamma", _ORDERS),
+        ("phi", _P * (MAX_ORDER + 2)),
+        *[
+            (name, _P)
+            for name in (
+                [
+                    "y",
+                    "yd",
+                    "ee",
+                    "weight",
+                    "newton_weight",
+                    "delta",
+                    "predicted",
+                    "predicted_d",
+                    "scale",
+                    "jy",
+                    "jyd",
+                    "g",
+                    "memory",
+                ]
+            )
+        ],
+        ("error_next", _D),
+        ("steps", _L),
+        ("rejected_steps", _L),
+        ("newton_failures", _L),
+        ("newton_iterations", _L),
+        ("taken", _L),
+        ("cause", _I),
+        ("bad_row", _I),
+        ("bad_column", _I),
+        ("stepper", Stepper),
+    ]
+
+
+class Radau(c.Structure):
+    """sd_radau."""
+
+    _fields_ = [
+        ("system", _P),
+        ("linear", _P),
+        ("complex_linear", _P),
+        ("n", _I),
+        ("tested", _I),
+        *[(name, _D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, _P) for name in ["atol", "magnitude", "test", "power", "smooth"]],
+        ("track", _I),
+        *[(name, _D) for name in ["tolerance", "t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
+        *[(name, _D) for name in ["error_accepted", "theta", "trust"]],
+        *[(name, _I) for name in ["ready", "old_jacobian", "rejected"]],
+        *[(name, _P) for name in ["phi", "yd", "last", "before"]],
+        ("slope", _P * STAGES),
+        ("refined", _I * STAGES),
+        *[(name, _P * STAGES) for name in ["z", "kept", "d"]],
+        *[(name, _P) for name in ["point", "point_d", "y", "rate", "ee", "weight", "newton_weight", "scale"]],
+        *[(name, _P) for name in ["jy", "jyd", "g", "memory"]],
+        *[(name, _P) for name in ["w", "gz"]],
+        *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
+        *[(name, _L) for name in ["factorisations", "taken"]],
+        *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],
+        ("stepper", Stepper),
+    ]
+
+
+class Settle(c.Structure):
+    """sd_settle."""
+
+    _fields_ = [
+        ("system", _P),
+        ("linear", _P),
+        ("unknowns", _I),
+        ("rates", _I),
+        ("rows", _I),
+        *[
+            (name, _P)
+            for name in [
+                "rate",
+                "slot_y",
+                "slot_y_t",
+                "slot_yd",
+                "slot_yd_t",
+                "slot_x",
+                "slot_r",
+                "weight",
+                "scale",
+            ]
+        ],
+        ("constraint", _P),
+        ("k_q", _P),
+        ("k_f", _P),
+        ("kinematics", _I),
+        *[(name, _P) for name in ["jy", "jyd", "matrix", "row_scale", "r", "x", "x0", "step", "memory"]],
+        ("ready", _I),
+        ("residual", _D),
+        ("constraints", _D),
+        ("calls", _L),
+        ("failures", _L),
+    ]
+
+
+class Run(c.Structure):
+    """sd_run."""
+
+    _fields_ = [
+        ("stepper", _P),
+        ("settle", _P),
+        ("written", _I),
+        ("observed", _I),
+        *[
+            (name, _P)
+            for name in [
+                "audit",
+                "observe",
+                "observe_rate",
+                "observe_scale",
+                "audit_at",
+                "instant",
+                "instant_kind",
+            ]
+        ],
+        ("instants", _I),
+        ("every_step", _I),
+        ("sample_steps", _I),
+        ("start_rate", _P),
+        ("row", _P),
+        ("room", _I),
+        ("rows", _I),
+        ("next", _I),
+        ("pending", _I),
+        ("started", _I),
+        ("fresh", _I),
+        *[(name, _D) for name in ["stored", "dissipated", "supplied", "step_dissipated", "step_supplied"]],
+        *[(name, _D) for name in ["t_from", "power_dissipated", "power_supplied"]],
+        *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "memory"]],
+        ("rows_written", _L),
+        ("first_energy", _D),
+    ]
