@@ -20,7 +20,8 @@ from sysdyn.compiler.momenta import given, inertial, resolved
 from sysdyn.compiler.observing import add_initials, add_observations, observed, pins_and_equations
 from sysdyn.compiler.terms import Nest, counter, local_variables
 from sysdyn.dsl.diagnostics import Place
-from sysdyn.dsl.expression import Node, derivative, mul, neg, time_derivative, var
+from sysdyn.dsl.expression import Node, derivative, differential, mul, neg, time_derivative, var, variables
+from sysdyn.dsl.expression import rate as rate_of
 from sysdyn.dsl.network import Loop
 
 
@@ -65,6 +66,25 @@ def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
     return nest, tuple(counter(k) for k in range(len(nest)))
 
 
+def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
+    """Coordinates whose balances of efforts are algebraic in all elements and have a rate."""
+    m = model.mirror
+    moved = {n.data[0] for t in model.function(m.coenergy) for n in local_variables(t.expression, m.rate)}
+    moved |= {
+        node.data[0]
+        for work in model.works
+        if any(n.op == "var" and (n.data[2] or n.data[1] == "audit") for n in variables(work.effort))
+        for node in local_variables(work.on, m.coordinate)
+    }
+    return frozenset(c.name for c in model.coordinates) - moved - carriers
+
+
+def _rate(root: Node) -> Node:
+    """Total derivative by t, the derivatives of multipliers among its variables."""
+    seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in variables(root)}
+    return differential(root, seeds)
+
+
 class _Lowering:
     """One lowering under way: the families decided, rows collected in `assembly`."""
 
@@ -72,6 +92,7 @@ class _Lowering:
         self.model = model
         self.stores = stores
         self.carriers = carriers
+        self.massless = _massless(model, carriers)
         self.assembly = Assembly()
         self.covers: list[Cover] = []
         self.families = self._families()
@@ -171,15 +192,14 @@ class _Lowering:
             for term in self.model.function(name):
                 for node in local_variables(term.expression, kind):
                     slope = derivative(term.expression, node)
-                    value = slope if sign > 0 else neg(slope)
-                    self.assembly.add("dynamics", node.data[0], node.args, term.loops, value)
+                    self._effort("dynamics", node, term.loops, slope if sign > 0 else neg(slope))
 
     def works(self) -> None:
         """-Q_j = -E du/dq_j."""
         for work in self.model.works:
             for node in local_variables(work.on, self.model.mirror.coordinate):
                 force = mul(work.effort, derivative(work.on, node))
-                self.assembly.add("dynamics", node.data[0], node.args, work.loops, neg(force))
+                self._effort("dynamics", node, work.loops, neg(force))
 
     def constraints(self) -> None:
         """Phi, Psi with their reactions, Gamma, Lambda, and the total time derivatives of all."""
@@ -203,7 +223,13 @@ class _Lowering:
         multiplier = var(row.name, name, *row.at)
         for node in local_variables(expression, kind):
             value = mul(derivative(expression, node), multiplier)
-            self.assembly.add(f"{row.kind}_reaction", node.data[0], node.args, nest, value)
+            self._effort(f"{row.kind}_reaction", node, nest, value)
+
+    def _effort(self, block: str, on: Node, nest: Nest, value: Node) -> None:
+        """A summand of the balance of a coordinate; where that is algebraic, its rate holds too."""
+        self.assembly.add(block, on.data[0], on.args, nest, value)
+        if on.data[0] in self.massless:
+            self.assembly.add("dynamics_rate", on.data[0], on.args, nest, _rate(value))
 
     def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
         if not self._has_rate(row):

@@ -123,7 +123,7 @@ class Parameters:
             nest = tuple(Loop(name, const(first), const(last)) for name, (first, last) in pairs)
             columns = np.stack(over(nest, parameter.values, lookup), axis=-1)
             rest = int(np.prod(shape[len(parameter.indices) :]))
-            values = np.broadcast_to(columns, (columns.shape[0], rest)).ravel()
+            values = np.broadcast_to(columns, (columns.shape[0], rest)).flatten()
         else:
             values = np.asarray([float(v) for v in evaluate(parameter.values, lookup)])
             if len(values) != int(np.prod(shape)):

@@ -12,7 +12,8 @@ initial positions become initial contents of the stores between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from sysdyn.dsl import expression as ex
@@ -36,6 +37,9 @@ from sysdyn.dsl.network import (
 _KINDS = {"be": "bf", "bf": "be", "bq": "bp", "bp": "bq", "ne": "nf", "nf": "ne"}
 _FUNCTIONS = {"T*": "V*", "V*": "T*", "T": "V", "V": "T", "D": "G", "G": "D"}
 _ELEMENTS = {"kinetic": "potential", "potential": "kinetic", "effort": "flow", "flow": "effort"}
+_At = tuple[str, tuple[Node, ...]]
+"""An element of a node family."""
+_Links = dict[_At | None, list[tuple[_At | None, Node]]]
 _SIDES = {"e": "f", "f": "e", "p": "q", "q": "p"}
 
 
@@ -45,9 +49,12 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    network = _with_contents(as_elements(network))
-    read = frozenset(_read(network))  # quadratures for traces change nothing in the model
+    network = _with_contents(_from_stores(as_elements(network)))
+    bare = network
     network = _with_positions(network)
+    # quadratures for traces change nothing in the model where a mass on the node tells its flow
+    massive = {b.plus.node for b in network.branches if b.kind == "kinetic" and b.plus is not None}
+    read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive)
     return replace(
         network,
         coordinates=tuple(_coordinate(c) for c in network.coordinates),
@@ -254,7 +261,7 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
 
 def _with_contents(network: Network) -> Network:
     """Initial positions of common-flow nodes as initial displacements of the potential stores between them."""
-    given: dict[tuple[str, tuple[Node, ...]], Initial] = {}
+    given: dict[_At, Initial] = {}
     for initial in network.initials:
         if initial.target.op == "var" and initial.target.data[1] == "nq":
             given[initial.target.data[0], initial.target.args] = initial
@@ -267,13 +274,13 @@ def _with_contents(network: Network) -> Network:
         value = ex.sub(ends[0][0], ends[1][0])
         target = ex.var(b.name, "bq", *b.at)
         added.append(Initial(target, value, ends[0][1] and ends[1][1], b.loops, b.place))
-    return replace(network, initials=(*network.initials, *added))
+    return replace(network, initials=(*network.initials, *added, *_chained(network, given)))
 
 
 def _start(
-    terminal: Terminal | None, given: dict[tuple[str, tuple[Node, ...]], Initial], branch: Branch
+    terminal: Terminal | None, given: Mapping[_At, Initial], branch: Branch
 ) -> tuple[Node, bool]:
-    """The initial position of a terminal over the branch's loops, and whether it is fixed; 0 where none is written."""
+    """The initial position of a terminal over the branch's loops, and whether it is fixed; ~ 0 where none is."""
     if terminal is None or terminal.node is None:
         return ex.const(0.0), True
     for (name, at), initial in given.items():
@@ -287,7 +294,68 @@ def _start(
                     fits = False
             if fits:
                 return ex.substitute(initial.value, change), initial.fixed
-    return ex.const(0.0), True
+    return ex.const(0.0), False
+
+
+def _chained(network: Network, given: Mapping[_At, Initial]) -> Iterator[Initial]:
+    """Fixed positions that stores in series make up: the sum of their displacements to the next fixed place."""
+    fixed = {key for key, initial in given.items() if initial.fixed}
+    links = _links(network, frozenset())
+    for start in fixed:
+        found = _path(links, start, fixed - {start})
+        if found is None or found[1].op == "var":  # one store: its displacement has been given
+            continue
+        end = ex.const(0.0) if found[0] is None else given[found[0]].value
+        yield replace(given[start], target=found[1], value=ex.sub(given[start].value, end))
+
+
+def _from_stores(network: Network) -> Network:
+    """Traced positions of points that stores hold to the ground, as displacements of these stores."""
+    written = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] in ("bq", "be")}
+    links = _links(network, frozenset(written))
+
+    def read(root: Node) -> Node:
+        change = {}
+        for node in ex.topological([root]):
+            if node.op == "var" and node.data[1:] == ("nq", 0):
+                found = _path(links, (node.data[0], node.args), set())
+                if found is not None:
+                    change[node] = found[1]
+        return ex.substitute(root, change) if change else root
+
+    return replace(
+        network,
+        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
+        expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
+    )
+
+
+def _links(network: Network, without: AbstractSet[str]) -> _Links:
+    """Single potential stores of positions by the points they join, with the position of the first over the second."""
+    links: _Links = {}
+    for b in network.branches:
+        if b.kind == "potential" and b.domain.common == "flow" and not b.loops and b.plus is not None:
+            if b.name in without or b.minus is None:
+                continue
+            plus, minus = (None if t.node is None else (t.node, t.at) for t in (b.plus, b.minus))
+            own = ex.var(b.name, "bq", *b.at)
+            links.setdefault(plus, []).append((minus, own))
+            links.setdefault(minus, []).append((plus, ex.neg(own)))
+    return links
+
+
+def _path(links: _Links, start: _At, ends: AbstractSet[_At]) -> tuple[_At | None, Node] | None:
+    """The nearest end (one of `ends`, or the ground: None) along stores, and the position of `start` over it."""
+    paths: dict[_At | None, Node] = {start: ex.const(0.0)}
+    ahead: list[_At | None] = [start]
+    for here in ahead:
+        if here is None or here in ends:
+            return here, paths[here]
+        for there, own in links.get(here, ()):
+            if there not in paths:
+                paths[there] = ex.add(paths[here], own)
+                ahead.append(there)
+    return None
 
 
 def unreflectable(network: Network) -> Diagnostic | None:

@@ -177,15 +177,12 @@ def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
     found: dict[Node, float] = {}
     for exponent, node in factors:
         inner, parts = _factors(node)
-        if inner != 1.0:
-            if not _whole(exponent) and (inner < 0.0 or len(parts) > 0):
-                found[node] = found.get(node, 0.0) + exponent
-                continue
-            total *= _power(inner, exponent)
+        # (x^2)^(1/2) is |x| and (x y)^(1/2) may be real where x^(1/2) is not: roots are taken of the whole
+        if not _whole(exponent) and parts and (inner != 1.0 or len(parts) > 1 or parts[0][0] != 1.0):
+            found[node] = found.get(node, 0.0) + exponent
+            continue
+        total *= _power(inner, exponent)
         for e, part in parts:
-            if not _whole(exponent) and e != 1.0:  # (x^2)^(1/2) is |x|: kept as it is
-                found[node] = found.get(node, 0.0) + exponent
-                break
             found[part] = found.get(part, 0.0) + exponent * e
     if total == 0.0:
         return const(0.0)

@@ -22,6 +22,7 @@ Index = tuple[int, int, int]
 
 KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
 BASE = {
+    "dynamics_rate": "dynamics",
     "phi_reaction": "dynamics",
     "psi_reaction": "dynamics",
     "momentum_rate": "momentum",
@@ -73,7 +74,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class RowFamily:
-    """Rows of one label.  name, stored, rate: of the rows of block observe."""
+    """Rows of one label.  name, stored, rate: of the rows of block observe; fixed: of block initial."""
 
     block: str
     label: str
@@ -86,6 +87,7 @@ class RowFamily:
     name: str
     stored: bool
     rate: bool
+    fixed: bool
 
     @property
     def size(self) -> int:
@@ -197,6 +199,7 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
         name=str(value.get("name") or label),
         stored=bool(value.get("stored", True)),
         rate=bool(value.get("rate", False)),
+        fixed=bool(value.get("fixed", True)),
     )
 
 

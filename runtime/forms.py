@@ -7,7 +7,7 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
   2v    phi_rate in the place of phi
   1     phi_acceleration in the place of phi, psi_rate of psi
   settled   all rows that hold at a consistent point: as written and hidden (no rows q' - f)
-  start     the same and the block `initial`
+  start     the same, dynamics_rate and the block `initial`
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
         ("lambda", "lambda"),
     ),
 }
-FORMS["start"] = (*FORMS["settled"], ("initial", "initial"))
+FORMS["start"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"), ("initial", "initial"))
 """form -> (block, group of rows it is added to); blocks a model lacks are skipped."""
 
 

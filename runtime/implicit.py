@@ -1,12 +1,14 @@
 """Whether the gammas determine the implicit unknowns at a state (language, E505).
 
-A gamma may leave out its own unknown (a controlled flow source does): then the rest of the model determines it.  But
-where the unknown stands in a gamma and the slope there vanishes, Newton's iteration has nothing to hold on to.
+A gamma may leave out its own unknown (a controlled flow source does), and its slope may vanish at a point (a valve at
+rest): then the rest of the model must determine the unknown.  Where it does not, the matrix of Newton's iteration is
+singular there and regular beside it.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime.description import Floats
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.system import System
 
@@ -14,6 +16,9 @@ NUDGE = 1e-3
 """Relative move of an implicit unknown, small enough for the exponential of a diode."""
 VANISHING = 1e-7
 """A slope below this part of the one beside it vanishes."""
+
+DENSE = 600
+"""Rows up to which the matrix is looked at."""
 
 
 def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
@@ -36,4 +41,25 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
         np.maximum.at(largest, columns, values)
         slopes.append(largest[implicit])
     found = (slopes[1] > 0.0) & (slopes[0] <= VANISHING * slopes[1])
+    if not found.any() or system.rows > DENSE:
+        return ()
+    here, there = _conditions([_matrix(system, state.t, point, yd) for point in (y, beside)])
+    if here > VANISHING * there:
+        return ()
     return tuple(system.name(int(k)) for k in implicit[found])
+
+
+def _matrix(system: System, t: float, y: Floats, yd: Floats) -> Floats:
+    """The iteration's matrix dF/dy + dF/dy'."""
+    jy, jyd = system.jacobian(t, y, yd)
+    matrix = np.zeros((system.rows, system.unknowns))
+    np.add.at(matrix, (system.pattern.row, system.pattern.columns_of()), jy + jyd)
+    return matrix
+
+
+def _conditions(matrices: list[Floats]) -> list[float]:
+    """The smallest singular value of each, rows and columns scaled alike."""
+    for axis in (1, 0):
+        size = np.max([np.abs(m).max(axis=axis, keepdims=True, initial=0.0) for m in matrices], axis=0)
+        matrices = [m / np.where(size > 0.0, size, 1.0) for m in matrices]
+    return [float(np.linalg.svd(m, compute_uv=False)[-1]) for m in matrices]

@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Set as AbstractSet
 
 import numpy as np
+from sysdyn.runtime.description import Floats
 from sysdyn.runtime.start import ConsistentState, Starter
 from sysdyn.runtime.system import System
 
 DENSE = 600
 """Unknowns and rates up to which the null space is taken."""
 RANK = 1e-9
+SWEEPS = 10
 
 
 def order_and_manifold(system: System, state: ConsistentState, tangible: AbstractSet[str]) -> tuple[int, int] | None:
@@ -27,11 +29,9 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     x = np.concatenate([state.y, state.yd[starter.rates]])
     if x.size > DENSE:
         return None
-    scale = starter.scale(state.t, x)
     full = np.zeros((starter.settled.rows, x.size))
-    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x) * scale[starter.columns])
-    size = np.abs(full).max(axis=1, initial=0.0)
-    full /= np.where(size > 0.0, size, 1.0)[:, None]
+    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
+    full = _balanced(full[~starter.groups("initial")])
     _, sigma, vectors = np.linalg.svd(full)
     rank = int((sigma > RANK * sigma.max(initial=RANK)).sum())
     tangent = vectors[rank:].T  # [unknowns and rates, freedoms]
@@ -43,7 +43,16 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     return _rank(tangent[: starter.n][content]), _rank(tangent[: starter.n][moving])
 
 
-def _rank(part: np.ndarray) -> int:
+def _balanced(matrix: Floats) -> Floats:
+    """Rows and columns of largest entry about one (Ruiz 2001)."""
+    for _ in range(SWEEPS):
+        for axis in (1, 0):
+            size = np.sqrt(np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0))
+            matrix = matrix / np.where(size > 0.0, size, 1.0)
+    return matrix
+
+
+def _rank(part: Floats) -> int:
     if not part.size:
         return 0
     sigma = np.linalg.svd(part, compute_uv=False)

@@ -66,17 +66,24 @@ def propagate(
     columns: NDArray[np.integer],
     size: Floats,
     excited: Floats,
+    alike: NDArray[np.int64],
     *,
     largest: bool = False,
 ) -> Floats:
     """Fills zeros of `magnitude` [unknowns] so that their terms balance the others of their rows.
 
-    rows, columns, size [entries]: |coefficient| of each place; excited [rows]: magnitude of the rows' free terms.
-    Of several rows' proposals the least counts (a coefficient that is small by chance proposes much), or the largest.
+    rows, columns, size [entries]: |coefficient| of each place; excited [rows]: magnitude of the rows' free terms;
+    alike [unknowns]: number of the kind and unit.  A coefficient that is small beside those of its like proposes much:
+    it is asked only where no other is left.
+    Of several rows' proposals the least counts, or the largest.
     """
     found = magnitude.copy()
     places = size > 0.0
     rows, columns, size = rows[places], columns[places], size[places]
+    _, group = np.unique(rows.astype(np.int64) * (1 + int(alike.max(initial=0))) + alike[columns], return_inverse=True)
+    leading = np.zeros(int(group.max(initial=-1)) + 1)
+    np.maximum.at(leading, group, size)
+    small = size < GROUP * leading[group]
     for _ in range(_SWEEPS):
         missing = found == 0.0
         if not missing.any():
@@ -84,9 +91,12 @@ def propagate(
         row = excited.copy()
         np.maximum.at(row, rows, size * found[columns])
         wanted = missing[columns] & (row[rows] > 0.0)
+        if (wanted & ~small).any():
+            wanted &= ~small
         best = np.zeros(found.size) if largest else np.full(found.size, np.inf)
         pick = np.maximum if largest else np.minimum
-        pick.at(best, columns[wanted], row[rows[wanted]] / size[wanted])
+        with np.errstate(over="ignore"):  # a proposal without bound is none
+            pick.at(best, columns[wanted], row[rows[wanted]] / size[wanted])
         found = np.where(missing & np.isfinite(best), best, found)
     return found
 
@@ -110,18 +120,31 @@ def _efforts(system: System, found: Floats, row: Floats) -> Floats:
     return least
 
 
-def group_maximum(system: System, values: Floats) -> Floats:
-    """Largest value among the unknowns of the same kind and unit."""
+def alike(system: System) -> NDArray[np.int64]:
+    """Number of the kind and unit of each unknown [unknowns]."""
     families = system.description.families
     keys: dict[tuple[str, str], int] = {}
     number = np.empty(len(families) + 1, dtype=np.int64)
     for k, family in enumerate(families):
         number[k] = keys.setdefault((family.kind, family.unit), len(keys))
     number[-1] = len(keys)
-    group = number[system.family_of]
-    largest = np.zeros(len(keys) + 1)
+    return number[system.family_of]
+
+
+def group_maximum(system: System, values: Floats) -> Floats:
+    """Largest value among the unknowns of the same kind and unit."""
+    group = alike(system)
+    largest = np.zeros(int(group.max(initial=0)) + 1)
     np.maximum.at(largest, group, values)
     return largest[group]
+
+
+def _with_momentum(system: System) -> NDArray[np.bool_]:
+    """Unknowns of coordinates whose momenta are unknowns [unknowns]."""
+    families = system.description.families
+    owners = {family.owner for family in families if family.kind == "p"}
+    member = np.array([*(family.owner in owners for family in families), False])
+    return np.asarray(member[system.family_of])
 
 
 def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
@@ -131,25 +154,33 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
     excited, quick = excitation(system, t0, t0 + span, y, yd)
     tau = time_scale(system, span, y, yd, quick)
-    known = np.maximum(np.abs(y), np.where(state, tau * np.abs(yd), 0.0))
+    jy, jyd = system.jacobian(t0, y, yd)
+    # flows without inertia follow from the rest
+    carries = state & ((system.kinds != "f") | system.differential(jyd) | _with_momentum(system))
+    moves = np.where(carries, tau * np.abs(yd), 0.0)
+    known = np.maximum(np.abs(y), moves)
+    form = system.form
+    flows = np.maximum(known, GROUP * group_maximum(system, known))[form.k_f]
+    moves[form.k_q[np.abs(y[form.k_f]) < QUIET * flows]] = 0.0  # rates that are round-off
+    known = np.maximum(np.abs(y), moves)
     known = np.maximum(known, GROUP * group_maximum(system, known))
     found = np.where(system.nominal > 0.0, system.nominal, known)
     found = _flows(system, found, span)
-    jy, jyd = system.jacobian(t0, y, yd)
     size = np.abs(jy) + np.abs(jyd) / tau
     size = np.where(np.isfinite(size), size, 0.0)
     pattern = system.pattern
-    rows, columns = pattern.row.astype(np.int64), pattern.columns_of()
-    # momenta are balanced against flows, what follows from the state against all of it: so round-off of a start does
-    # not pass for a magnitude
-    kept = np.where(np.isin(system.kinds, ("q", "f", "s")), found, 0.0)
-    balanced = propagate(kept, rows, columns, size, excited, largest=True)
-    found = np.where((system.kinds != "p") | (found > NOISE * balanced), found, balanced)
-    kept = np.where(state, found, 0.0)
+    rows, columns, kinds = pattern.row.astype(np.int64), pattern.columns_of(), alike(system)
+    # momenta and dynamic variables are balanced against flows, what follows from the state against all of it: so
+    # round-off of a start does not pass for a magnitude
+    kept = np.where(np.isin(system.kinds, ("q", "f")) & carries, found, 0.0)
+    balanced = propagate(kept, rows, columns, size, excited, kinds, largest=True)
+    found = np.where(~np.isin(system.kinds, ("p", "s")) | (found > NOISE * balanced), found, balanced)
+    kept = np.where(carries, found, 0.0)
     row = excited.copy()
     np.maximum.at(row, rows, size * kept[columns])
-    balanced = propagate(kept, rows, columns, size, np.maximum(excited, _efforts(system, found, row)))
+    balanced = propagate(kept, rows, columns, size, np.maximum(excited, _efforts(system, found, row)), kinds)
     found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, group_maximum(system, found), found)
+    found[form.k_q] = np.where(found[form.k_q] == 0.0, tau * found[form.k_f], found[form.k_q])
     tiny = np.finfo(np.float64).tiny * 1e30
     return np.where(found > tiny, found, 1.0), tau

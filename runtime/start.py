@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve
-from sysdyn.runtime.scales import group_maximum, propagate
+from sysdyn.runtime.scales import alike, group_maximum, propagate
 from sysdyn.runtime.settled import rates_of
 from sysdyn.runtime.system import System
 
@@ -26,7 +26,10 @@ Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s")
 _WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
+_RESCALINGS = 6
 EXACT = 1e-9
+OWN = 1e-6
+NOISE = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +95,11 @@ class Starter:
         self.settled = system.another("start")
         self.rates = rates_of(self.settled)
         self.given = _given(system)
+        kinds = alike(system)
+        self._alike = np.concatenate([kinds[: system.form.written], kinds.max(initial=0) + 1 + kinds[self.rates]])
         self.n = system.form.written
+        self.guessed = self._guessed()
+        self.every = ~self.guessed  # rows that must hold
         self.kinds = system.kinds[: self.n]
         pattern = self.settled.pattern
         columns = pattern.columns_of()
@@ -127,12 +134,27 @@ class Starter:
                 mask[first : first + self.settled.description.rows[family].size] = True
         return mask
 
+    def _guessed(self) -> Mask:
+        """Rows of block initial that are guesses."""
+        mask = np.zeros(self.settled.rows, dtype=bool)
+        for group, family, first in self.settled.form.groups:
+            rows = self.settled.description.rows[family]
+            if group == "initial" and not rows.fixed:
+                mask[first : first + rows.size] = True
+        return mask
+
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia."""
         jyd = self.system.jacobian(t, *self.expand(x))[1]
         carries = self.system.differential(jyd)[: self.n] & np.isin(self.kinds, STATE)
         carries |= self.given.written & np.isin(self.kinds, STATE)
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
+
+    def without_noise(self, x: Floats, scale: Floats) -> Floats:
+        """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
+        largest = np.zeros(int(self._alike.max(initial=0)) + 1)
+        np.maximum.at(largest, self._alike, np.abs(x))
+        return np.where(np.abs(x) > NOISE * np.maximum(scale, largest[self._alike]), x, 0.0)
 
     def scale(self, t: float, x: Floats) -> Floats:
         """Magnitudes of x, found by balancing rows where the guess is zero."""
@@ -142,11 +164,15 @@ class Starter:
         values = np.abs(self.jacobian(t, x))
         free = np.abs(self.residual(t, x))
         values, free = (np.where(np.isfinite(item), item, 0.0) for item in (values, free))
-        found = propagate(known, self.rows, self.columns, values, free)
+        # how fast what follows from the state moves says nothing of its size
+        sizes = ~self.groups("dynamics_rate")[self.rows]
+        found = propagate(known, self.rows[sizes], self.columns[sizes], values[sizes], free, self._alike)
         for kind in np.unique(self.kinds):
             members = np.flatnonzero(self.kinds == kind)
             largest = found[members].max(initial=0.0)
             found[members] = np.maximum(found[members], 1e-3 * largest)
+        found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
+        found = propagate(found, self.rows, self.columns, values, free, self._alike)
         return np.where(found > 1e-280, found, 1.0)
 
 
@@ -173,6 +199,16 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
     )
 
 
+def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
+    """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
+    if not starter.guessed.any():
+        return guess
+    rows = starter.guessed | starter.groups("phi", "psi")
+    free = free & (np.arange(free.size) < starter.n)
+    found = solve(_problem(starter, t, guess, guess, rows=rows, free=free), guess)
+    return found.x if np.isfinite(found.residual) else guess
+
+
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
     """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held."""
     kinds = np.concatenate([starter.kinds, np.full(starter.rates.size, "rate")])
@@ -191,38 +227,44 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     return x
 
 
-def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Solution:
-    """Everything at once; magnitudes that proved wrong (currents of 1e-12 A at the guess) are taken anew."""
-    every = np.ones(starter.settled.rows, dtype=bool)
-    best = solve(_problem(starter, t, x, guess, rows=every, free=free), x)
-    for _ in range(3):
-        if best.residual < EXACT or not np.isfinite(best.residual):
+def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Everything at once, and whether it holds.
+
+    Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
+    in the magnitudes of the solution too.
+    """
+    at, best = x, Solution(x, np.inf, np.zeros(0))
+    for number in range(_RESCALINGS):
+        found = solve(_problem(starter, t, at, guess, rows=starter.every, free=free), best.x)
+        if number and best.residual >= EXACT and not found.residual < best.residual:
             break
-        again = solve(_problem(starter, t, best.x, guess, rows=every, free=free), best.x)
-        if not again.residual < best.residual:
+        best = found
+        if not np.isfinite(best.residual):
             break
-        best = again
-    return best
+        at = starter.without_noise(best.x, starter.scale(t, at))
+        scaled = np.abs(starter.residual(t, best.x)) * _row_scale(starter, t, at, starter.scale(t, at))
+        if best.residual < EXACT and np.max(scaled[starter.every], initial=0.0) < OWN:
+            return best, True
+    return best, False
 
 
-def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> Solution:
+def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """What follows from the staged state; where nothing does, everything at once, then from perturbed points."""
-    every = np.ones(starter.settled.rows, dtype=bool)
     x = _stages(starter, t, guess.copy(), guess, free)
-    best = _rescaled(starter, t, x, guess, free & starter.following(t, x))
-    if best.residual < EXACT:
-        return best
-    problem = _problem(starter, t, x, guess, rows=every, free=free)
-    best = _rescaled(starter, t, x, guess, free)
+    best, holds = _rescaled(starter, t, x, guess, free & starter.following(t, x))
+    if holds:
+        return best, True
+    best, holds = _rescaled(starter, t, x, guess, free)
+    scale = starter.scale(t, x)
     random = np.random.default_rng(20)
     for amplitude in _AMPLITUDES:
-        if best.residual < EXACT:
+        if holds:
             break
-        shaken = x + np.where(free, amplitude * problem.scale * random.standard_normal(x.size), 0.0)
-        found = solve(problem, shaken)
-        if found.residual < best.residual:
+        shaken = x + np.where(free, amplitude * scale * random.standard_normal(x.size), 0.0)
+        found, holds = _rescaled(starter, t, shaken, guess, free)
+        if holds or found.residual < best.residual:
             best = found
-    return best
+    return best, holds
 
 
 def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
@@ -270,17 +312,16 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         return InconsistentStart("nonfinite", float("inf"), rows)
     x, scaled = best.x, best.scaled
     if x.size <= DENSE:
-        every = np.ones(starter.settled.rows, dtype=bool)
-        problem = _problem(starter, t, guess, guess, rows=every, free=free)
+        problem = _problem(starter, t, guess, guess, rows=starter.every, free=free)
         x = least_residual(problem, x)
         scaled = np.abs(starter.residual(t, x)) * _row_scale(starter, t, x, problem.scale)
-    raw = np.abs(starter.residual(t, x))
+    raw, scaled = (np.where(starter.every, item, 0.0) for item in (np.abs(starter.residual(t, x)), scaled))
     order = np.argsort(-scaled)
     worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]
     rows = tuple(dict.fromkeys(starter.settled.row_label(row) for row in worst))
-    freed = _attempt(starter, t, guess, np.ones_like(free))
+    freed, holds = _attempt(starter, t, guess, np.ones_like(free))
     candidates: tuple[RowLabel, ...] = ()
-    if freed.residual < EXACT:
+    if holds:
         scale = starter.scale(t, freed.x)
         change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
@@ -301,7 +342,7 @@ def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tu
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(t, x) * scale[starter.columns])
     size = np.abs(full).max(axis=1, initial=0.0)
-    full /= np.where(size > 0.0, size, 1.0)[:, None]
+    full = (full / np.where(size > 0.0, size, 1.0)[:, None])[starter.every]
     carries = ~starter.following(t, x) & free
     follows = free & ~carries
     if not carries.any():
@@ -320,8 +361,9 @@ def consistent_start(system: System, t0: float) -> ConsistentState:
     starter = Starter(system if system.form.name == "3" else system.another("3"))
     guess = np.concatenate([starter.given.guess, np.zeros(starter.rates.size)])
     free = np.concatenate([~starter.given.fixed, np.ones(starter.rates.size, dtype=bool)])
-    best = _attempt(starter, t0, guess, free)
-    if not best.residual < EXACT:
+    guess = _guess(starter, t0, guess, free)
+    best, holds = _attempt(starter, t0, guess, free)
+    if not holds:
         raise _explain(starter, t0, guess, free, best)
     y, yd = starter.expand(best.x)
     freedom, names = _freedom(starter, t0, best.x, free)

@@ -14,6 +14,7 @@
  *
  * Blocks (missing ones have no rows; with T*, V, D, Q of the book and M = d2(T*)/df2)
  *   dynamics          Lagrange: M f' - Y;  Hamilton: p' - U (coordinates with momentum), -U (without)
+ *   dynamics_rate     the total time derivative of balances without inertia (reads yd of e, kappa, mu)
  *   phi_reaction      Phi_q^T kappa, added to the rows of dynamics
  *   psi_reaction      Psi_f^T mu, added to the rows of dynamics
  *   momentum          p - dT/df (Hamilton), or dT/dp - f where the author gave T
@@ -59,7 +60,7 @@ typedef void sd_entries(const sd_frame *frame, double t, const double *y, const 
  *             the name itself otherwise.  `audit` families are scalars energy, kinetic, potential, dissipated,
  *             supplied, constraints: the runtime hands them to `observe` behind y.
  *   rows      [{"block", "label", "owner", "kind", "file", "line", "unit"}]   in the order of `to`;
- *             dynamics, phi_reaction, psi_reaction share the row families of block "dynamics" (owner:
+ *             dynamics, dynamics_rate, phi_reaction, psi_reaction share the row families of block "dynamics" (owner:
  *             coordinate); phi, phi_rate, phi_acceleration those of "phi"; psi, psi_rate those of "psi"; gamma,
  *             gamma_rate those of "gamma"; momentum, momentum_rate those of "momentum"; observe,
  *             observe_rate, observe_scale those of "observe".
