@@ -57,6 +57,9 @@ class System(c.Structure):
         ("k_f", _P),
         ("k_slot_q", _P),
         ("k_slot_f", _P),
+        ("held", _I),
+        ("clear", _I),
+        *[(name, _P) for name in ["held_row", "held_unknown", "held_slot", "cleared"]],
         ("v", _P),
         ("stop", _P),
         ("residual_evaluations", _L),
@@ -234,12 +237,25 @@ class Settle(c.Structure):
     ]
 
 
+class LeastNorm(c.Structure):
+    """sd_least_norm."""
+
+    _fields_ = [
+        ("system", _P),
+        ("linear", _P),
+        *[(name, _I) for name in ["multipliers", "coordinates", "entries"]],
+        *[(name, _P) for name in ["place", "source", "coordinate", "slot", "slot_t", "slot_diagonal"]],
+        *[(name, _P) for name in ["jy", "jyd", "matrix", "x", "size", "memory"]],
+    ]
+
+
 class Run(c.Structure):
     """sd_run."""
 
     _fields_ = [
         ("stepper", _P),
         ("settle", _P),
+        ("least_norm", _P),
         ("written", _I),
         ("observed", _I),
         *[

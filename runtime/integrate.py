@@ -15,6 +15,7 @@ import numpy as np
 from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel, SolverFailure
+from sysdyn.runtime.least_norm import LeastNorm
 from sysdyn.runtime.methods import Method
 from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.request import LONGEST, TRACE, Finished, Request, Statistics
@@ -118,6 +119,9 @@ class Integration:
             name: system.observer(name) for name in ("audit", "observe", "observe_rate", "observe_scale")
         }
         run = self.run_.contents
+        self._least_norm = LeastNorm(self.settler.system) if request.least_norm else None
+        if self._least_norm is not None:
+            run.least_norm = c.cast(self._least_norm.core, c.c_void_p)
         for name, call in self._calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
         self._audit_at = np.full(6, -1, dtype=np.int32)

@@ -23,7 +23,8 @@ class Request:
     absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; magnitude [unknowns as
     written] known from an earlier run (else tracked); method: bdf or radau; fixed_step [s]: no error test (bdf with
     max_order 1: the implicit Euler method); h_max [s]: longest step, None: LONGEST of the span; stops [s] ascending:
-    instants at which a step ends and the integration restarts (segments.py).
+    instants at which a step ends and the integration restarts (segments.py); least_norm: rows hold the
+    least multipliers of redundant constraints.
     """
 
     t_end: float
@@ -42,6 +43,7 @@ class Request:
     fixed_step: float | None = None
     h_max: float | None = None
     stops: Floats | None = None
+    least_norm: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from sysdyn.runtime.failures import SolverFailure
 from sysdyn.runtime.integrate import Integration
 from sysdyn.runtime.request import COMPARED, STEP, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.start import ConsistentState, consistent_start
-from sysdyn.runtime.structure import Structure, structure
+from sysdyn.runtime.structure import Structure, index_of, structure
 from sysdyn.runtime.system import System
 from sysdyn.runtime.trace import Column, Parameter, TraceWriter, columns_of
 
@@ -47,7 +47,9 @@ class Options:
     samples alone; accuracy relative to the largest value of each traced quantity, accuracy_on: (name, accuracy) of
     single ones (the others are then free if `accuracy` is None); rtol, atol: the solver's own, switch the control
     off; euler_step: of method "euler"; stops: ascending instants at which the text jumps or has kinks: a step ends and
-    the integration restarts there; sample_steps: hand the sides of expects back at accepted steps too.
+    the integration restarts there; redundancy: what becomes of redundant constraints: drop (the last written of each
+    dependent group is left out), minimum_norm (the least multipliers), error (the caller has seen to it);
+    sample_steps: hand the sides of expects back at accepted steps too.
     """
 
     output: str | Path
@@ -64,6 +66,7 @@ class Options:
     index: str = "auto"
     euler_step: float | None = None
     stops: Floats | None = None
+    redundancy: str = "error"
     max_steps: int | None = None
     max_wall: float | None = None
     sample_steps: bool = False
@@ -218,6 +221,7 @@ class _Runs:
             index=self.index,
             stops=options.stops,
             method="radau" if self.method == "radau" else "bdf",
+            least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
             max_order=1 if self.method == "euler" else lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
@@ -397,6 +401,12 @@ def simulate(
     written = System.of(description, carrier, "3")
     start = start or consistent_start(written, options.t_start)
     facts = facts or structure(written, start)
+    if options.redundancy not in ("error", "drop", "minimum_norm"):
+        raise ValueError(f"redundancy {options.redundancy}: error, drop or minimum_norm")
+    if facts.left_out and options.redundancy != "error":
+        written = written.without(facts.left_out)
+        start = consistent_start(written, options.t_start)
+        facts = replace(facts, index=index_of(written, start)[0], undetermined=())
     form, index, warnings = choose_index(options.index, facts)
     system = written if form == "3" else written.another(form)
     name = {"3": str(facts.index), "2": "2"}.get(form, form)

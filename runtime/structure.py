@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel
+from sysdyn.runtime.redundancy import combination, dependent, nearby, reactions
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.system import System
 
@@ -28,6 +28,8 @@ class Structure:
     """index: of the form as written, None where the pencil is singular (undetermined: names of unknowns in its null
     vector).  coordinates n, m1, m2: coordinates and constraint rows; rank of [Phi_q; Psi_f]; dof, redundant,
     configuration_dof as the language defines them; dependent: labels of a dependent group with its coefficients.
+    singular: rank that the start lacks and points near it have; left_out: (family, position) of the multipliers of
+    constraints that depend on those written before them.
     """
 
     index: int | None
@@ -40,6 +42,8 @@ class Structure:
     configuration_dof: int
     redundant: int
     dependent: tuple[tuple[RowLabel, float], ...]
+    singular: int = 0
+    left_out: tuple[tuple[int, int], ...] = ()
 
 
 def _equilibrate(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -117,61 +121,16 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     return index if 0 <= index <= MAX_INDEX else None
 
 
-def _reactions(system: System, jy: Floats, kinds: tuple[str, ...]) -> tuple[NDArray[np.int64], ...]:
-    """Entries (row of dynamics, column) of the multipliers of those kinds, and the columns themselves."""
-    pattern = system.pattern
-    columns = pattern.columns_of()
-    multipliers = np.flatnonzero(np.isin(system.kinds, kinds))
-    dynamics = np.zeros(system.rows, dtype=bool)
-    for group, family, first in system.form.groups:
-        if group == "dynamics":
-            dynamics[first : first + system.description.rows[family].size] = True
-    take = np.flatnonzero(np.isin(columns, multipliers) & dynamics[pattern.row] & (jy != 0.0))
-    return take, columns[take], pattern.row[take].astype(np.int64), multipliers
-
-
-def _rank(system: System, jy: Floats, kinds: tuple[str, ...]) -> tuple[int, Floats, NDArray[np.int64]]:
-    """Rank of the constraint rows, a null vector of their transpose (empty: none, or too large), multipliers."""
-    take, columns, rows, multipliers = _reactions(system, jy, kinds)
-    if multipliers.size == 0:
-        return 0, np.zeros(0), multipliers
-    used, place = np.unique(rows, return_inverse=True)
-    which = np.searchsorted(multipliers, columns)
-    # each constraint and each coordinate scaled to size one
-    value = jy[take]
-    for _ in range(4):
-        for number, index in ((multipliers.size, which), (used.size, place)):
-            size = np.zeros(number)
-            np.maximum.at(size, index, np.abs(value))
-            value = value / np.sqrt(np.where(size > 0.0, size, 1.0))[index]
-    if multipliers.size > DENSE or used.size > 4 * DENSE:
-        return _sparse_rank(which, place, value, multipliers.size, used.size), np.zeros(0), multipliers
-    c = np.zeros((multipliers.size, used.size))
-    np.add.at(c, (which, place), value)
-    u, sigma, _ = np.linalg.svd(c)
-    rank = int((sigma > RANK * sigma.max(initial=0.0)).sum()) if sigma.size else 0
-    null = np.zeros(0) if rank == multipliers.size else u[:, -1]
-    return rank, null, multipliers
-
-
-def _sparse_rank(
-    which: NDArray[np.int64], place: NDArray[np.int64], value: Floats, rows: int, columns: int
-) -> int:
-    """Rows - (pivots of the order of eps in the factors of [I C^T; C -eps])."""
-    from scipy.sparse import block_array, csc_array, eye_array
-    from scipy.sparse.linalg import splu
-
-    eps = 1e-13
-    c = csc_array((value, (which, place)), shape=(rows, columns))
-    matrix = block_array([[eye_array(columns), c.T], [c, -eps * eye_array(rows)]], format="csc")
-    lu = splu(matrix, permc_spec="COLAMD")
-    return rows - int((np.abs(lu.U.diagonal()) < 1e3 * eps).sum())
+def _place(system: System, multiplier: int) -> tuple[int, int]:
+    """Family of a multiplier and its position there."""
+    family = int(system.family_of[multiplier])
+    return family, multiplier - int(system.form.at[family])
 
 
 def _label(system: System, multiplier: int) -> RowLabel:
     """Label of the constraint of a multiplier."""
-    family = system.description.families[int(system.family_of[multiplier])]
-    position = multiplier - int(system.form.at[system.family_of[multiplier]])
+    number, position = _place(system, multiplier)
+    family = system.description.families[number]
     block = "phi" if family.kind == "kappa" else "psi"
     for k in system.description.rows_of(block):
         row = system.description.rows[k]
@@ -196,18 +155,28 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
 def structure(system: System, state: ConsistentState) -> Structure:
     """Facts of a model at a consistent state; system: any form."""
     system = system if system.form.name == "3" else system.another("3")
-    jy, _ = system.jacobian(state.t, *state.for_form(system))
+    y, yd = state.for_form(system)
+    jy, _ = system.jacobian(state.t, y, yd)
     index, undetermined = index_of(system, state)
-    rank, null, multipliers = _rank(system, jy, ("kappa", "mu"))
-    rank_q = _rank(system, jy, ("kappa",))[0]
+    found = reactions(system, jy)
+    left = dependent(found)
+    lost = 0
+    if left.size:
+        # a rank that is smaller here alone is the configuration's, not the constraints'
+        for point in nearby(system, state):
+            there = reactions(system, system.jacobian(state.t, point, yd)[0])
+            fewer = dependent(there)
+            if fewer.size < left.size:
+                lost += int(left.size - fewer.size)
+                found, left = there, fewer
     n = int((system.kinds == "f").sum())
     m1, m2 = (int((system.kinds == kind).sum()) for kind in ("kappa", "mu"))
-    dependent: list[tuple[RowLabel, float]] = []
-    if null.size:
-        null = null / null[np.argmax(np.abs(null))]
-        dependent = [
-            (_label(system, int(multipliers[k])), float(null[k])) for k in np.flatnonzero(np.abs(null) > 1e-8)
-        ]
+    rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())
+    weights = combination(found, left)
+    group = tuple(
+        (_label(system, int(found.multipliers[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8)
+    )
+    names = tuple(_place(system, int(found.multipliers[k])) for k in left)
     return Structure(
-        index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, m1 + m2 - rank, tuple(dependent)
+        index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names
     )

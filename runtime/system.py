@@ -18,6 +18,7 @@ from sysdyn.runtime.carrier import Carrier, Extent, Failure, Tables
 from sysdyn.runtime.description import BASE, Description, Floats, Ints, describe
 from sysdyn.runtime.failures import RowLabel
 from sysdyn.runtime.forms import Form, Planned, plan, unknown_name
+from sysdyn.runtime.held_rows import LeftOut, held_rows
 from sysdyn.runtime.patterns import Pattern, Places, compress, places
 
 Mask = NDArray[np.bool_]
@@ -32,17 +33,26 @@ class System:
         self._make(describe(manifest, binding), carrier, index_form)
 
     @classmethod
-    def of(cls, description: Description, carrier: Carrier, index_form: str) -> System:
-        """The same from a description."""
+    def of(
+        cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
+    ) -> System:
+        """The same from a description; left_out: multipliers (family, position) of constraints that do not count."""
         self = cls.__new__(cls)
-        self._make(description, carrier, index_form)
+        self._make(description, carrier, index_form, left_out)
         return self
 
     def another(self, index_form: str) -> System:
         """The same model in another form."""
-        return System.of(self.description, self.carrier, index_form)
+        return System.of(self.description, self.carrier, index_form, self.left_out)
 
-    def _make(self, description: Description, carrier: Carrier, index_form: str) -> None:
+    def without(self, left_out: LeftOut) -> System:
+        """The same form, these constraints left out."""
+        return System.of(self.description, self.carrier, self.form.name, left_out)
+
+    def _make(
+        self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
+    ) -> None:
+        self.left_out = left_out
         self.description = description
         self.carrier = carrier
         self.form: Form = plan(description, index_form)
@@ -81,6 +91,8 @@ class System:
         found = [self._places(call) for call in form.calls]
         for pair in found:
             parts += pair
+        held = held_rows(self.description, form, self.left_out)
+        parts.append(Places(*held))
         self.pattern: Pattern
         self.pattern, slots = compress(form.rows, form.unknowns, parts)
         entries = max([part.row.size for part in parts] + [1])
@@ -90,7 +102,9 @@ class System:
                 call.block, call.at, call.to, form.rows, dy=slots[2 * k + 2], dyd=slots[2 * k + 3]
             )
         self._scratch = np.zeros(entries)
-        self._keep += [calls, slots]
+        cleared = np.flatnonzero(np.isin(self.pattern.row, held[0])).astype(np.int32)
+        held_row, held_unknown = (item.astype(np.int32) for item in held)
+        self._keep += [calls, slots, cleared, held_row, held_unknown]
         self.core = lib.System(
             unknowns=form.unknowns,
             rows=form.rows,
@@ -105,6 +119,12 @@ class System:
             k_f=lib.pointer(form.k_f),
             k_slot_q=lib.pointer(slots[0]),
             k_slot_f=lib.pointer(slots[1]),
+            held=held_row.size,
+            clear=cleared.size,
+            held_row=lib.pointer(held_row),
+            held_unknown=lib.pointer(held_unknown),
+            held_slot=lib.pointer(slots[-1]),
+            cleared=lib.pointer(cleared),
             v=lib.pointer(self._scratch),
             stop=lib.pointer(self.failure.flag),
         )

@@ -11,6 +11,8 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
         r[system->k_row[i]] = yd[system->k_q[i]] - y[system->k_f[i]];
     for (int32_t c = 0; c < system->calls; c++)
         system->call[c].rows(&system->call[c].frame, t, y, yd, r);
+    for (int32_t i = 0; i < system->held; i++)
+        r[system->held_row[i]] = y[system->held_unknown[i]];
     system->residual_evaluations++;
 }
 
@@ -37,6 +39,12 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
         const sd_call *call = &system->call[c];
         add_entries(call->dy, &call->frame, call->n_dy, call->slot_dy, t, y, yd, system->v, jy);
         add_entries(call->dyd, &call->frame, call->n_dyd, call->slot_dyd, t, y, yd, system->v, jyd);
+    }
+    for (int32_t i = 0; i < system->clear; i++)
+        jy[system->cleared[i]] = jyd[system->cleared[i]] = 0.0;
+    for (int32_t i = 0; i < system->held; i++) {
+        jy[system->held_slot[i]] = 1.0;
+        jyd[system->held_slot[i]] = 0.0;
     }
     system->jacobian_evaluations++;
 }

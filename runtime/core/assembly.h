@@ -9,6 +9,9 @@
  *   y, yd [unknowns]   r [rows]   column [unknowns + 1]   row, jy, jyd [entries]   v [largest list of entries]
  *   slot_dy [n_dy], slot_dyd [n_dyd]      place in jy / jyd of each entry of the block's list
  *   k_row, k_q, k_f, k_slot_q, k_slot_f [kinematics]      the rows q' - f and their two entries
+ *   held_row, held_unknown, held_slot [held]   rows that read "unknown = 0" in the place of their equation (the
+ *                                      multiplier of a redundant constraint), with their entry
+ *   cleared [clear]                    the other entries of these rows
  * All arrays belong to the caller.
  */
 #ifndef SYSDYN_ASSEMBLY_H
@@ -30,6 +33,8 @@ typedef struct sd_system {
     const int32_t *column, *row;
     const sd_call *call;
     const int32_t *k_row, *k_q, *k_f, *k_slot_q, *k_slot_f;
+    int32_t held, clear;
+    const int32_t *held_row, *held_unknown, *held_slot, *cleared;
     double *v;
     const int32_t *stop; /* nonzero: a callback of the caller failed, give up */
     int64_t residual_evaluations, jacobian_evaluations;

@@ -85,6 +85,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     }
     if (run->settle)
         sd_settle_point(run->settle, t, run->point, run->point_d);
+    if (run->least_norm)
+        sd_least_norm_apply(run->least_norm, t, run->point, run->point_d);
     dissipated = at_step ? run->dissipated : run->step_dissipated + dissipated;
     supplied = at_step ? run->supplied : run->step_supplied + supplied;
     audit(run, t, run->point, run->point_d, out);

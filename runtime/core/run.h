@@ -11,6 +11,7 @@
 #ifndef SYSDYN_RUN_H
 #define SYSDYN_RUN_H
 
+#include "least_norm.h"
 #include "settle.h"
 #include "stepper.h"
 
@@ -21,6 +22,7 @@ enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3 };
 typedef struct sd_run {
     sd_stepper *stepper;
     sd_settle *settle;
+    sd_least_norm *least_norm;        /* NULL: multipliers are as they come */
     int32_t written;                  /* unknowns as written: y of blocks observe, audit */
     int32_t observed;
     const sd_call *audit;             /* NULL: no audit block */
