@@ -242,9 +242,10 @@ def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) 
         if not np.isfinite(best.residual):
             break
         at = starter.without_noise(best.x, starter.scale(t, at))
-        scaled = np.abs(starter.residual(t, best.x)) * _row_scale(starter, t, at, starter.scale(t, at))
-        if best.residual < EXACT and np.max(scaled[starter.every], initial=0.0) < OWN:
-            return best, True
+        size = _row_scale(starter, t, at, starter.scale(t, at))[starter.every]
+        own, clean = (np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0) for x in (best.x, at))
+        if best.residual < EXACT and own < OWN:
+            return Solution(at, best.residual, best.scaled) if clean < max(own, EXACT) else best, True
     return best, False
 
 
