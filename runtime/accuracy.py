@@ -15,7 +15,7 @@ import numpy as np
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import SolverFailure
 
-RUNS = 6
+RUNS = 7
 FINEST = 2e-14
 COARSEST = 1e-3
 POWER = 0.8
