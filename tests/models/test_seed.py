@@ -12,6 +12,8 @@ from sysdyn.runtime.trace import Trace
 
 ALLOWED = 1e-5
 """Of each variable's largest magnitude, at an accuracy of 1e-6."""
+COARSER = {("nonlinear_fluid", "co_hamiltonian"): 5e-6}
+"""Accuracy where Newton's iteration ends earlier: the flow of a valve at rest has no slope in its pressure."""
 INTEGRATION = ("q10", "q20", "q30", "q40")
 """Constants of integration: by default what the initial values make them."""
 FACTORS = (0.8, 1.3, 0.7, 1.5, 1.1)
@@ -51,7 +53,7 @@ def simulated(tmp_path, model, *, formulation, backend, times, settings=()):
         scene="reference",
         formulation=formulation,
         backend=backend,
-        accuracy=1e-6,
+        accuracy=COARSER.get((model, formulation), 1e-6),
         at=",".join(map(repr, times)),
         settings=tuple((name, repr(value)) for name, value in settings),
         output=str(tmp_path / "trace.h5"),
