@@ -93,7 +93,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         network = load.network(
             target.document, target.model, target.scene, report, request.settings, levels=request.levels
         )
-        if network is None or not _possible(request, network, report):
+        if network is None:
             return None
         prepared = prepare(network, report, formulation=request.formulation, backend=request.backend)
         if prepared is None:
@@ -101,7 +101,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         options = _options(request, target, prepared, report, began, progress)
         if options is None:
             return None
-        started = start(prepared, options.t_start, report)
+        started = start(prepared, options.t_start, report, options.redundancy)
         if started is None or report.failed:
             return None
         options = replace(options, stops=_stops(prepared, options, report))
@@ -115,13 +115,9 @@ def _same(one: str, other: str) -> bool:
         return False
 
 
-def _possible(request: Request, network: Network, report: Report) -> bool:
-    """What later issues build is refused by name."""
-    wanted = request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
-    if wanted != "error":
-        message = f"redundancy {wanted} is not supported yet (planned: four formulations)"
-        report.note("N608", message, network.place)
-    return wanted == "error"
+def _redundancy(request: Request, network: Network) -> str:
+    """What shall become of redundant constraints."""
+    return request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
 
 
 def _options(
@@ -173,6 +169,7 @@ def _options(
         method=method,
         index=request.index or (f"{solver['index']:g}" if "index" in solver else "auto"),
         euler_step=solver.get("step"),
+        redundancy=_redundancy(request, prepared.network),
         max_steps=steps,
         max_wall=wall,
         sample_steps=any(e.moment == "always" for e in prepared.network.expectations),

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sysdyn.cli.prepare import Prepared, place_at
+from sysdyn.cli.prepare import Prepared, place_at, prepare
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Place, Related, Report
 from sysdyn.dsl.network import Expectation
@@ -26,8 +26,13 @@ class Started:
     facts: Structure
 
 
-def start(prepared: Prepared, t0: float, report: Report) -> Started | None:
-    """The consistent start and the structural facts there; None where the report says what is in the way."""
+def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None = None) -> Started | None:
+    """The consistent start and the structural facts there; None where the report says what is in the way.
+
+    redundancy: error, drop or minimum_norm; None: the scene's.
+    """
+    scene = prepared.network.scene
+    policy = redundancy or (scene.redundancy if scene else None) or "error"
     system = System(prepared.manifest, prepared.arrays, prepared.carrier)
     try:
         state = consistent_start(system, t0)
@@ -35,9 +40,10 @@ def start(prepared: Prepared, t0: float, report: Report) -> Started | None:
         _inconsistent(prepared, error, report)
         return None
     facts = structure(system, state)
-    _structural(prepared, facts, report)
+    implicit = undetermined(system, state)
+    _structural(prepared, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
-    for name in undetermined(system, state):
+    for name in implicit:
         place = next(
             (u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place
         )
@@ -88,14 +94,20 @@ def _inconsistent(prepared: Prepared, error: InconsistentStart, report: Report) 
             report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
 
 
-def _structural(prepared: Prepared, facts: Structure, report: Report) -> None:
+def _structural(prepared: Prepared, facts: Structure, policy: str, report: Report) -> None:
+    if facts.singular:
+        near = facts.rank
+        message = f"the initial configuration is singular: rank {near - facts.singular}, {near} nearby"
+        report.error("E512", message, prepared.network.place, help="move the guess off the dead centre")
+    if facts.redundant and policy != "error":
+        return
     if facts.redundant:
         first = facts.dependent[0][0] if facts.dependent else None
         where = _place(prepared, first) if first else prepared.network.place
         group = ", ".join(f"{label.label} ({weight:+.3g})" for label, weight in facts.dependent)
         plural = "s" if facts.redundant > 1 else ""
         message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
-        report.error("E509", message, where, help="delete one of them")
+        report.error("E509", message, where, help="delete one of them, or redundancy minimum_norm in the scene")
     elif facts.undetermined:
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
         message = f"the equations do not determine {names}"
@@ -124,7 +136,13 @@ def _inertia(prepared: Prepared, system: System, state: ConsistentState, report:
 
 
 def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: Structure, report: Report) -> None:
-    """`expect static`: claims about counts (E909)."""
+    """`expect static`: claims about counts (E909).
+
+    Claims of a model hold in each of its scenes: a complementary formulation of a network that has a primal one too is
+    counted in that.
+    """
+    if prepared.formulation.startswith("co_") and prepared.network.statics:
+        facts = replace(_primal(prepared, state.t) or facts, index=facts.index)
     known = {
         "coordinates": facts.coordinates,
         "m1": facts.m1,
@@ -140,6 +158,19 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
         known |= {"order": counted[0], "manifold": counted[1]} if counted else {}
     for claim in prepared.network.statics:
         _static(prepared, claim, known, report)
+
+
+def _primal(prepared: Prepared, t0: float) -> Structure | None:
+    """The facts of the Lagrangian formulation; None where there is none."""
+    silent = Report()
+    primal = prepare(prepared.network, silent, formulation="lagrangian", backend=prepared.backend)
+    if primal is None:
+        return None
+    system = System(primal.manifest, primal.arrays, primal.carrier)
+    try:
+        return structure(system, consistent_start(system, t0))
+    except InconsistentStart:
+        return None
 
 
 def _names(claim: Expectation) -> list[ex.Node]:

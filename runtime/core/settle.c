@@ -175,6 +175,8 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
     memcpy(y, settle->x, (size_t)n * sizeof *y);
     for (int32_t k = 0; k < settle->rates; k++)
         yd[settle->rate[k]] = settle->x[n + k];
+    for (int32_t i = 0; done && i < settle->system->held; i++)
+        y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
     for (int32_t i = 0; i < settle->kinematics; i++)
         yd[settle->k_q[i]] = y[settle->k_f[i]];
     measure(settle, t, y, yd);
