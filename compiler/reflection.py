@@ -362,7 +362,9 @@ def unreflectable(network: Network) -> Diagnostic | None:
     """The first statement that reads a displacement or flow where only momenta and efforts may stand (E602)."""
     network = as_elements(network)
     help_ = "formulation lagrangian, hamiltonian"
-    statements = [(f"energy {e.function}", (e.expression,), e.place) for e in network.energies]
+    statements: list[tuple[str, tuple[ex.Node, ...], Place]] = [
+        (f"energy {e.function}", (e.expression,), e.place) for e in network.energies
+    ]
     statements += [("work", (w.effort, w.on), w.place) for w in network.works]
     statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in network.constraints]
     laws = [(f"law of {b.name}", (b.law,), b.place) for b in network.branches if b.law is not None]

@@ -666,12 +666,13 @@ def _show(node: Node, args: list[str]) -> str:
         case "var":
             family, kind, order = data
             base = str(family) + (f"[{', '.join(args)}]" if args else "")
+            primes = "'" * int(order)
             if kind in ("q", "f"):
                 return f"{base}{_PRIMES.get((kind, order), '')}"
             if kind[0] in "nb":  # of a node or branch
-                return f"{base}.{kind[1]}" + "'" * order
+                return f"{base}.{kind[1]}{primes}"
             suffix = {"p": ".p", "kappa": ".multiplier", "mu": ".multiplier"}.get(kind, "")
-            return f"{base}{suffix}" + "'" * order
+            return f"{base}{suffix}{primes}"
         case "sum":
             return _show_sum(node, args)
         case "mul":

@@ -121,7 +121,7 @@ class Integration:
         run = self.run_.contents
         self._least_norm = LeastNorm(self.settler.system) if request.least_norm else None
         if self._least_norm is not None:
-            run.least_norm = c.cast(self._least_norm.core, c.c_void_p)
+            run.least_norm = self._least_norm.address
         for name, call in self._calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
         self._audit_at = np.full(6, -1, dtype=np.int32)

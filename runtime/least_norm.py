@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as c
+from typing import Any
 
 import numpy as np
 from sysdyn.runtime import core_library as lib
@@ -41,7 +42,7 @@ class LeastNorm:
         self.linear = lib.core.sd_linear_new(
             m + n, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, self._keep[-1]))
         )
-        self.core = lib.core.sd_least_norm_new(c.byref(settled.core), self.linear, m, n) if self.linear else None
+        self.core: Any = lib.core.sd_least_norm_new(c.byref(settled.core), self.linear, m, n) if self.linear else None
         if not self.core:
             raise MemoryError
         core = self.core.contents
@@ -49,6 +50,11 @@ class LeastNorm:
         names = ("place", "source", "coordinate", "slot", "slot_t", "slot_diagonal")
         for name, item in zip(names, self._keep, strict=False):
             setattr(core, name, lib.pointer(item))
+
+    @property
+    def address(self) -> Any:
+        """Of the core's structure, void *."""
+        return c.cast(c.pointer(self.core.contents), c.c_void_p)
 
     def apply(self, t: float, y: Floats, yd: Floats) -> Floats:
         """Y [unknowns as written] with the least multipliers."""

@@ -165,4 +165,5 @@ def combination(found: Reactions, left: Ints) -> Floats:
     weights[:last] = -np.linalg.lstsq(rows[:last].T, rows[last], rcond=RANK)[0]
     weights[last] = 1.0
     weights *= found.scale
-    return weights / weights[np.argmax(np.abs(weights))]
+    weights /= weights[np.argmax(np.abs(weights))]
+    return weights
