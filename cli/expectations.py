@@ -9,7 +9,8 @@ import numpy as np
 from sysdyn.cli.prepare import Prepared
 from sysdyn.cli.starting import holds
 from sysdyn.dsl.diagnostics import Report
-from sysdyn.dsl.network import Expectation
+from sysdyn.dsl.network import Expectation, Golden
+from sysdyn.runtime.failures import TraceError
 from sysdyn.runtime.simulate import Outcome
 
 
@@ -26,15 +27,7 @@ class Claim:
 def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: bool) -> tuple[Claim, ...]:
     """All expectations of the scene; those that fail are reported as E909."""
     claims = [_claim(prepared, outcome, k, e, report, finished) for k, e in enumerate(prepared.network.expectations)]
-    for golden in prepared.network.goldens:
-        path = Path(golden.place.file).parent / golden.file
-        if not path.is_file():
-            message = f"the golden file '{golden.file}' is missing"
-            report.error("E907", message, golden.place, help="sysdyn golden record")
-        else:
-            message = "comparison with a golden trace is not supported yet (planned: golden traces)"
-            report.note("N608", message, golden.place)
-        claims.append(Claim(f'golden "{golden.file}"', None, None, None))
+    claims += [_golden(prepared, outcome, g, report, finished) for g in prepared.network.goldens]
     return tuple(claims)
 
 
@@ -48,6 +41,8 @@ def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report:
     elif e.at is not None:
         at = prepared.binding.evaluate(e.at)
         here = np.flatnonzero(np.abs(time - at) <= 1e-12 * max(abs(at), 1.0))
+        if not here.size and not finished:
+            return Claim(text, None, None, None)
         if not here.size:
             report.error("E909", f"expect failed: the run does not reach {at:g} s", e.place)
             return Claim(text, False, None, at)
@@ -59,6 +54,36 @@ def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report:
     if not time.size:
         return Claim(text, None, None, None)
     return Claim(text, True, float(left[-1]), float(time[-1]))
+
+
+def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report, finished: bool) -> Claim:
+    """`expect golden "F" within r`: the quantities that F also has, by the comparison of `sysdyn diff`."""
+    text = f'golden "{golden.file}"'
+    path = Path(golden.place.file).parent / golden.file
+    if not path.is_file():
+        message = f"the golden file '{golden.file}' is missing"
+        report.error("E907", message, golden.place, help="sysdyn golden record")
+        return Claim(text, None, None, None)
+    if not finished:
+        return Claim(text, None, None, None)
+    from sysdyn.cli.diffing import common, differences, sentence
+    from sysdyn.runtime.comparison.recorded import Recorded
+    from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
+
+    within = prepared.binding.evaluate(golden.within)
+    try:
+        with Recorded(path) as reference, Recorded(outcome.trace) as trace:
+            names = set(reference.quantities) & set(trace.quantities)
+            tube = Tolerance(rtol=within, tau=reference.tau)
+            verdict = differences(common(reference, names), common(trace, names), tube)
+    except (Incomparable, TraceError) as error:
+        report.error("E909", f"expect failed: {text} cannot be compared: {error}", golden.place)
+        return Claim(text, False, None, None)
+    worst = verdict.worst
+    found = (worst.worst.test, worst.worst.time) if worst else (None, None)
+    if worst is not None and not verdict.equal:
+        report.error("E909", f"expect failed: {text} within {within:g}: {sentence(worst)}", golden.place)
+    return Claim(text, verdict.equal, *found)
 
 
 def _sides(

@@ -11,10 +11,13 @@ import click
 COMMANDS = {
     "check": "Check models: everything that needs no time integration.",
     "compile": "Write the residual module and its manifest.",
+    "diff": "Compare two traces.",
     "explain": "Say what a diagnostic code means.",
     "fmt": "Bring model texts into the canonical layout.",
+    "golden": "Golden traces of a project: record, check, accept, list.",
     "plot": "Draw quantities of a trace.",
     "simulate": "Run a scene: text in, trace out.",
+    "verify": "Compare the formulations and methods of a scene.",
 }
 
 

@@ -77,12 +77,7 @@ class Ran:
 def run(request: Request, report: Report, progress: Progress | None = None) -> Ran | None:
     """Simulate; None where the report says why not.  UsageError, OSError and TraceError pass through."""
     began = time.monotonic()
-    if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
-        raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
-    if request.rtol is not None and not 0.0 < request.rtol < 1.0:
-        raise UsageError(f"--rtol {request.rtol:g}: it must be positive and less than 1")
-    if request.atol is not None and not 0.0 <= request.atol < math.inf:
-        raise UsageError(f"--atol {request.atol:g}: it must not be negative")
+    check_tolerances(request)
     if request.output and request.file != "-" and _same(request.output, request.file):
         raise UsageError(f"-o {request.output} is the model itself")
     document = targets.read(request.file, report)
@@ -90,22 +85,36 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     if target is None:
         return None
     with ex.fresh():
-        network = load.network(
-            target.document, target.model, target.scene, report, request.settings, levels=request.levels
-        )
-        if network is None:
-            return None
-        prepared = prepare(network, report, formulation=request.formulation, backend=request.backend)
-        if prepared is None:
-            return None
-        options = _options(request, target, prepared, report, began, progress)
-        if options is None:
-            return None
-        started = start(prepared, options.t_start, report, options.redundancy)
-        if started is None or report.failed:
-            return None
-        options = replace(options, stops=_stops(prepared, options, report))
-        return _ran(target, prepared, started, options, report)
+        prepared = ready(request, target, report)
+        options = None if prepared is None else options_of(request, target, prepared, report, began, progress)
+        return None if prepared is None or options is None else integrate(target, prepared, options, report)
+
+
+def check_tolerances(request: Request) -> None:
+    """UsageError where --accuracy, --rtol, --atol make no sense."""
+    if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
+        raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
+    if request.rtol is not None and not 0.0 < request.rtol < 1.0:
+        raise UsageError(f"--rtol {request.rtol:g}: it must be positive and less than 1")
+    if request.atol is not None and not 0.0 <= request.atol < math.inf:
+        raise UsageError(f"--atol {request.atol:g}: it must not be negative")
+
+
+def ready(request: Request, target: Target, report: Report) -> Prepared | None:
+    """The target under the request's settings, compiled and bound; None where the report says why not."""
+    network = load.network(target.document, target.model, target.scene, report, request.settings, levels=request.levels)
+    if network is None:
+        return None
+    return prepare(network, report, formulation=request.formulation, backend=request.backend)
+
+
+def integrate(target: Target, prepared: Prepared, options: Options, report: Report) -> Ran | None:
+    """From the consistent start to the trace; None where the report says why not."""
+    started = start(prepared, options.t_start, report, options.redundancy)
+    if started is None or report.failed:
+        return None
+    options = replace(options, stops=_stops(prepared, options, report))
+    return _ran(target, prepared, started, options, report)
 
 
 def _same(one: str, other: str) -> bool:
@@ -120,9 +129,10 @@ def _redundancy(request: Request, network: Network) -> str:
     return request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
 
 
-def _options(
+def options_of(
     request: Request, target: Target, prepared: Prepared, report: Report, began: float, progress: Progress | None
 ) -> Options | None:
+    """The runtime's options; None where the report says why not.  began: `time.monotonic()` of the command."""
     scene = prepared.network.scene or Scene("", prepared.network.place)
     value = prepared.binding.evaluate
 
@@ -270,7 +280,9 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         if not isinstance(error.partial, Outcome):
             raise UsageError(failure) from error
         outcome = error.partial
-    claims = judge(prepared, outcome, report, finished=failure is None)
+        if outcome.reached > error.time:
+            failure += "; the trace is that of a coarser run to the end, its error is not known"
+    claims = judge(prepared, outcome, report, finished=outcome.reached >= options.t_end)
     code = 3 if failure else 1 if report.failed else 0
     return Ran(target, prepared, started, outcome, claims, code, failure)
 

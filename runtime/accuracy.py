@@ -111,7 +111,7 @@ def control(run: Run, target: Floats, finest: float = FINEST) -> Achieved:
         estimate, relative = over * shrink, apart * shrink
         if estimate <= 1.0:
             return Achieved(relative, True, number, now.tolerance)
-        if now.tolerance <= finest:
+        if now.tolerance <= 1.01 * finest:
             return Achieved(relative, False, number, now.tolerance)
         before, last, last_step = over, now, step
         # the tolerance at which the next run should do, with the estimate's own safety

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.description import Floats
+from sysdyn.runtime.scales import balanced
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.system import System
 
 NUDGE = 1e-3
-"""Relative move of an implicit unknown, small enough for the exponential of a diode."""
+"""Move of an implicit unknown, as part of its size: small enough for the exponential of a diode."""
 VANISHING = 1e-7
 """A slope below this part of the one beside it vanishes."""
 
@@ -32,7 +33,7 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
         if group == "gamma":
             gamma[first : first + system.description.rows[family].size] = True
     beside = y.copy()
-    beside[implicit] += NUDGE * (1.0 + np.abs(y[implicit]))
+    beside[implicit] += NUDGE * balanced(system, y, system.jacobian(state.t, y, yd)[0])[implicit]
     columns = system.pattern.columns_of()
     slopes = []
     for point in (y, beside):

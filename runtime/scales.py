@@ -139,6 +139,15 @@ def group_maximum(system: System, values: Floats) -> Floats:
     return largest[group]
 
 
+def balanced(system: System, y: Floats, jy: Floats) -> Floats:
+    """Size of each unknown at a point [unknowns], all positive: |y|, or what balances its rows."""
+    rows, columns = system.pattern.row.astype(np.int64), system.pattern.columns_of()
+    size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
+    found = propagate(np.abs(y), rows, columns, size, np.zeros(system.rows), alike(system), largest=True)
+    found = np.maximum(found, GROUP * group_maximum(system, found))
+    return np.where(found > 0.0, found, 1.0)
+
+
 def _with_momentum(system: System) -> NDArray[np.bool_]:
     """Unknowns of coordinates whose momenta are unknowns [unknowns]."""
     families = system.description.families

@@ -14,6 +14,7 @@ import numpy as np
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel
 from sysdyn.runtime.redundancy import combination, dependent, nearby, reactions
+from sysdyn.runtime.scales import balanced
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.system import System
 
@@ -141,14 +142,19 @@ def _label(system: System, multiplier: int) -> RowLabel:
 
 def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
     """Index of the form as written, and the undetermined unknowns where there is none."""
-    jy, jyd = system.jacobian(state.t, *state.for_form(system))
+    y, yd = state.for_form(system)
+    jy, jyd = system.jacobian(state.t, y, yd)
     if system.unknowns == 0:
         return 0, ()
     if system.unknowns > DENSE:
         return _growth_index(system, jy, jyd), ()
     names = null_place(system, jy, jyd)[0]
     if names:
-        return None, names
+        # equilibration may end where one unit makes the others tiny: asked again in sizes of the unknowns
+        size = balanced(system, y, jy)[system.pattern.columns_of()]
+        jy, jyd = jy * size, jyd * size
+        if null_place(system, jy, jyd)[0]:
+            return None, names
     return pencil_index(system.dense(jyd), system.dense(jy)), ()
 
 

@@ -214,6 +214,11 @@ class System:
             a[self.form.at[k]] = (audit or {}).get(family.name.removeprefix("audit."), 0.0)
         return self._evaluate("observe", t, a, b)
 
+    def observe_rate(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """Derivatives of the traced quantities at a point, in the order of their rows; 0 where there is none."""
+        buffers = (self._buffer(item[: self.form.written]) for item in (y, yd))
+        return self._evaluate("observe_rate", t, *buffers)
+
     def audit(self, t: float, y: Floats, yd: Floats) -> Floats:
         """[kinetic energy, potential energy (J), power dissipated, power supplied (W)]."""
         values = self._evaluate(

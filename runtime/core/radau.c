@@ -165,7 +165,6 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->h_used = radau->h_before = 0.0;
     radau->error_accepted = 0.0;
     radau->ready = radau->old_jacobian = radau->rejected = 0;
-    radau->trust = 1.0;
     radau->theta = 1.0;
 }
 
@@ -268,7 +267,7 @@ static double correct(sd_radau *radau)
 static int iterate(sd_radau *radau, int full, int *used, double *retry)
 {
     double tolerance = fmax(10.0 * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
-    double before = 0.0, ratio_before = 0.0, trust = pow(fmax(radau->trust, DBL_EPSILON), 0.8);
+    double before = 0.0, ratio_before = 0.0, trust = 1.0;
     int patient = full || radau->fixed_h > 0.0;
     *retry = 0.5;
     for (int m = 1; m <= (patient ? PATIENT : ITERATIONS); m++) {
@@ -295,7 +294,6 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
         }
         before = fmax(size, DBL_MIN);
         if (trust * size <= tolerance) {
-            radau->trust = trust;
             return SD_FINE;
         }
         if (full) {
@@ -438,7 +436,6 @@ int sd_radau_step(sd_radau *radau)
             radau->h *= radau->taken == 0 ? 0.1 : isfinite(ratio) ? 1.0 / fmax(ratio, 1.0) : SHRINK;
         } else {
             radau->newton_failures++;
-            radau->trust = 1.0;
             radau->ready = 0;
             if (cause == SD_SINGULAR && ++singular >= SINGULAR)
                 return cause;

@@ -35,7 +35,7 @@ typedef struct sd_radau {
     int32_t track;
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
-    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, trust;
+    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta;
     int32_t ready, old_jacobian, rejected;
     double *phi, *yd;         /* [n] the last accepted point */
     double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */

@@ -1,0 +1,1 @@
+"""Golden traces: what `sysdyn golden` keeps, measures and checks."""

@@ -1,0 +1,244 @@
+"""Runs against golden traces: structure exactly, meters by bounds, trajectories by the tube; and mutants of parameters.
+
+One golden serves every formulation: each runs at the accuracy that `record` found to be enough.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.diffing import as_json, cases, common, differences, headline
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.golden.book import Golden
+from sysdyn.cli.golden.runs import Run, Stopped, between, run
+from sysdyn.cli.running import Request
+from sysdyn.runtime.comparison.arrays import Arrays
+from sysdyn.runtime.comparison.recorded import Recorded
+from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance, Verdict
+from sysdyn.runtime.failures import TraceError
+
+DIFFERENT, SOLVER, INPUT_OUTPUT = 1, 3, 5
+SHARE = 0.01
+"""By which `--mutate` changes a parameter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One run against one golden.  exit: 0 equal, 1 different, else why it could not be compared; message: the first
+    line; ratio: largest over the limit; cases: (what, what is wrong or None); page: HTML of its pictures.
+    """
+
+    golden: str
+    formulation: str
+    method: str
+    backend: str
+    exit: int
+    message: str
+    ratio: float
+    variable: str | None
+    time: float | None
+    seconds: float
+    cases: tuple[tuple[str, str | None], ...]
+    result: dict[str, Any] = field(default_factory=dict)
+    page: str = ""
+
+    @property
+    def label(self) -> str:
+        """For a person: pendulum/swing lagrangian c."""
+        return f"{self.golden} {self.formulation} {self.backend}" + (f" {self.method}" if self.method else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """One parameter changed by SHARE.  noticed: None where it could not be changed (reason says why)."""
+
+    golden: str
+    parameter: str
+    noticed: bool | None
+    ratio: float
+    reason: str
+
+
+def request_of(golden: Golden, **options: Any) -> Request:
+    """The run that a golden asks for."""
+    if not golden.model.is_file():
+        raise FileNotFoundError(2, "no such model", str(golden.model))
+    known: dict[str, Any] = {"settings": golden.settings, "until": golden.until, "accuracy": golden.accuracy}
+    named = {"scene": golden.scene} if golden.scene else {"model": golden.name}
+    return Request(str(golden.model), **(known | named | options))
+
+
+def loaded(golden: Golden) -> Arrays:
+    """The kept trace.  Raises TraceError, Incomparable, OSError."""
+    golden.trace.open("rb").close()
+    with Recorded(golden.trace) as source:
+        read = {name: source.read(name, 0, source.time.size) for name in source.quantities}
+        return Arrays(
+            source.time,
+            {name: values for name, (values, _) in read.items()},
+            {name: rates for name, (_, rates) in read.items() if rates is not None},
+            list(source.quantities.values()),
+            source.events,
+            source.time_unit,
+        )
+
+
+def check(
+    golden: Golden,
+    formulations: Sequence[str],
+    methods: Sequence[str],
+    backends: Sequence[str],
+    with_page: bool = False,
+) -> Iterator[Case]:
+    """Every combination that is asked for; no formulation named: all that the golden was recorded with."""
+    missing = [f for f in formulations if f not in golden.formulations]
+    if missing:
+        raise UsageError(f"{golden.label} has no formulation {missing[0]}: it has {', '.join(golden.formulations)}")
+    for formulation in formulations or golden.formulations:
+        for method in methods or ("",):
+            for backend in backends:
+                yield _case(golden, formulation, method, backend, with_page)
+
+
+def _case(golden: Golden, formulation: str, method: str, backend: str, with_page: bool) -> Case:
+    began = time.monotonic()
+
+    def stopped(code: int, message: str) -> Case:
+        seconds = time.monotonic() - began
+        wrong = (("run", message),)
+        return Case(golden.label, formulation, method, backend, code, message, np.inf, None, None, seconds, wrong)
+
+    try:
+        kept = loaded(golden)
+        structure = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"][formulation]
+    except (Incomparable, TraceError) as error:
+        return stopped(INPUT_OUTPUT, str(error))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        return stopped(INPUT_OUTPUT, f"{golden.structure}: {type(error).__name__}: {error}")
+    try:
+        options = {"formulation": formulation, "backend": backend, "method": method or None}
+        one = run(request_of(golden, **options), between(kept.time))
+        verdict = _verdict(golden, kept, one, structure)
+    except Stopped as error:
+        return stopped(error.code, str(error))
+    except OSError as error:
+        return stopped(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
+    except TraceError as error:
+        return stopped(INPUT_OUTPUT, str(error))
+    except Incomparable as error:
+        return stopped(SOLVER, f"the traces cannot be compared: {error}")
+    wrong = [*_structural(structure, one.structure), *_meters(golden, one)]
+    judged = (*wrong, *cases(verdict))
+    failed = next((text for _, text in wrong if text is not None), None)
+    message = headline(verdict) if failed is None or not verdict.equal else f"differs: {failed}"
+    worst = verdict.worst
+    different = not verdict.equal or failed is not None
+    page = ""
+    if with_page and different:
+        from sysdyn.cli.comparison_page import section
+
+        page = section(common(kept, set(structure["quantities"])), one.trace, verdict)
+    return Case(
+        golden.label,
+        formulation,
+        method,
+        backend,
+        DIFFERENT if different else 0,
+        message,
+        worst.worst.ratio if worst else 0.0,
+        worst.name if worst else None,
+        worst.worst.time if worst else None,
+        time.monotonic() - began,
+        judged,
+        as_json(verdict),
+        page,
+    )
+
+
+def _verdict(golden: Golden, kept: Arrays, one: Run, structure: dict[str, Any]) -> Verdict:
+    """A formulation is compared on the quantities that it had when it was recorded."""
+    return differences(common(kept, set(structure["quantities"])), one.trace, tolerance_of(golden))
+
+
+def tolerance_of(golden: Golden) -> Tolerance:
+    """The tube of a golden."""
+    return Tolerance(golden.rtol, golden.atol, golden.tau)
+
+
+def _structural(kept: dict[str, Any], found: dict[str, Any]) -> list[tuple[str, str | None]]:
+    """(fact, what differs) of each fact of the structure."""
+    found = json.loads(json.dumps(found))
+    facts = [(name, kept.get(name), found.get(name)) for name in dict.fromkeys((*kept, *found))]
+    return [(f"structure: {name}", None if a == b else changed(name, a, b)) for name, a, b in facts]
+
+
+def changed(name: str, kept: Any, found: Any) -> str:
+    """What changed in one fact: the numbers, or the first lines that are not in the other."""
+    if not (isinstance(kept, list) and isinstance(found, list)):
+        return f"{name} is {found}, recorded {kept}"
+
+    def text(item: Any) -> str:
+        return " ".join(map(str, item)) if isinstance(item, list) else str(item)
+
+    gone = [text(item) for item in kept if item not in found]
+    new = [text(item) for item in found if item not in kept]
+    if not gone and not new:
+        return f"{name} are in another order"
+    parts = [f"'{new[0]}' is new" if new else "", f"'{gone[0]}' is gone" if gone else ""]
+    more = max(len(new) - 1, 0) + max(len(gone) - 1, 0)
+    return f"{name}: {', '.join(p for p in parts if p)}" + (f" and {more} more" if more else "")
+
+
+def _meters(golden: Golden, one: Run) -> list[tuple[str, str | None]]:
+    """The meters against their bounds."""
+    found: list[tuple[str, str | None]] = []
+    for name, value, bound, unit in (
+        ("energy", one.energy, golden.energy, " J"),
+        ("constraints", one.constraints, golden.constraints, ""),
+    ):
+        inside = value <= bound
+        text = f"audit.{name} reaches {value:.3g}{unit}, its bound is {bound:.3g}{unit}"
+        found.append((f"meter: {name}", None if inside else text))
+    return found
+
+
+def mutate(golden: Golden) -> Iterator[Mutant]:
+    """Each parameter of the scene changed by SHARE: does the golden notice?  Raises Stopped where no run succeeds."""
+    kept = loaded(golden)
+    known = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"]
+    formulation = golden.formulations[0]
+    base = run(request_of(golden, formulation=formulation), between(kept.time))
+    for name, value in base.parameters.items():
+        if value == 0.0 or not np.isfinite(value):
+            yield Mutant(golden.label, name, None, 0.0, f"it is {value:g}: a share of it changes nothing")
+            continue
+        settings = (*golden.settings, (name, repr(value * (1.0 + SHARE))))
+        try:
+            one = run(request_of(golden, formulation=formulation, settings=settings), between(kept.time))
+            verdict = _verdict(golden, kept, one, known[formulation])
+        except (Stopped, UsageError, Incomparable) as error:
+            message = error.message if isinstance(error, UsageError) else str(error)
+            yield Mutant(golden.label, name, True, np.inf, f"the model refuses it: {message}")
+            continue
+        worst = verdict.worst
+        ratio = worst.worst.ratio if worst else 0.0
+        reason = "" if not verdict.equal else _insensitive(base, one, ratio)
+        yield Mutant(golden.label, name, not verdict.equal, ratio, reason)
+
+
+def _insensitive(base: Run, mutant: Run, ratio: float) -> str:
+    one, two = base.trace.values, mutant.trace.values
+    same = all(np.array_equal(one[name], values) for name, values in two.items() if name in one)
+    if same and base.trace.time.size == mutant.trace.time.size:
+        return "no traced quantity depends on it"
+    return f"the traced quantities move by {ratio:.2g} of the limit: trace one that depends on it, or a smaller rtol"
+
+
+def checkable(case: Case) -> dict[str, Any]:
+    """A case as JSON."""
+    return asdict(replace(case, page="")) | {"ok": case.exit == 0}

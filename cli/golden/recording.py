@@ -1,0 +1,227 @@
+"""A scene becomes a golden trace: its own error is measured first, and a tolerance too near to it is refused.
+
+The reference runs at rtol/50 (rtol/1000 where that is not enough).  Its error is the largest difference, between and at
+all instants, of its thinned trace from a run at a hundredth of that tolerance and from a run by another method; a
+tolerance below ten times that is refused.  Every formulation that can express the scene then runs as `check` will, and
+has to be inside half the tube.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.diffing import common, differences, sentence
+from sysdyn.cli.golden.runs import Run, Stopped, between, run
+from sysdyn.cli.running import Request
+from sysdyn.runtime.comparison.arrays import Arrays
+from sysdyn.runtime.comparison.curve import Curve
+from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
+from sysdyn.runtime.comparison.verdict import SHARE, Tolerance, Verdict
+
+REFERENCE = (2e-2, 1e-3)
+"""Accuracy of the reference run, of rtol; the second where the first is not enough."""
+FINER = 1e-2
+"""Tolerance of the run that measures it, of the reference's."""
+FINEST = 1e-12
+CHECKED = 0.1
+"""Accuracy of the runs that `check` makes, of rtol; a tenth of that where a formulation leaves half the tube."""
+HALF = 0.5
+MARGIN = 10.0
+"""A tolerance below this many times the measured error is refused."""
+INTERPOLATION = 1.0 / 40.0
+"""What thinning may add, of the limit."""
+STEEP = (1e-6, 1e-5)
+"""Time tolerances, of the span, that are tried where runs differ on a flank that is steep as a jump."""
+ROUNDING = 0.25
+"""Of that: what is kept has no digits that nobody compares, and packs to a third."""
+BOUND = 10.0
+"""Bounds of the meters, of the largest that any run showed."""
+LEAST = 1e-12
+"""Smallest bound of a meter (J; scaled residual): below it is rounding."""
+FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane")
+
+Say = Callable[[str], None]
+
+
+class Refused(Exception):  # noqa: N818 (no fault of the program)
+    """A golden trace that could not be trusted; the message says why and what would help."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What a record holds.  error: relative, measured, and by which run; tau [s]; accuracy: of the runs of `check`;
+    energy [J], constraints: bounds; structure: by formulation.
+    """
+
+    trace: Arrays
+    error: float
+    tau: float
+    accuracy: float
+    energy: float
+    constraints: float
+    structure: dict[str, Any]
+    method: str
+
+
+def record(request: Request, rtol: float, atol: float, say: Say) -> Recorded:
+    """Measure a scene.  request: file, scene, settings.  Raises Refused, Stopped, UsageError."""
+    refused: Refused | None = None
+    for share in REFERENCE:
+        try:
+            base, runs, golden, tolerance, error = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
+            break
+        except Refused as error_:
+            refused = error_
+    else:
+        assert refused is not None
+        raise refused
+    say(f"its own error: {error:.1e}, the tolerance is {rtol / error if error else np.inf:.3g} times that")
+    checked, structure, found = _formulations(request, base, golden, tolerance, say)
+    meters = [base, *runs, *found]
+    return Recorded(
+        golden,
+        error,
+        tolerance.tau or 0.0,
+        checked,
+        max(BOUND * max(r.energy for r in meters), LEAST),
+        max(BOUND * max(r.constraints for r in meters), LEAST),
+        structure,
+        base.method,
+    )
+
+
+def _reference(
+    request: Request, accuracy: float, rtol: float, atol: float, say: Say
+) -> tuple[Run, list[Run], Arrays, Tolerance, float]:
+    """(reference, the runs that measure it, its thinned trace, the tube, its error)."""
+    base = run(replace(request, accuracy=accuracy))
+    if not base.trace.values:
+        raise Refused("the scene traces nothing: a golden trace needs quantities")
+    golden = _thin(base, rtol, atol)
+    if len(base.trace.rates) < len(base.trace.values):  # lines between rows: more of them where they are needed
+        base = run(replace(request, accuracy=accuracy), between(golden.time))
+        golden = _thin(base, rtol, atol)
+    rows = f"{golden.time.size} of {base.trace.time.size} instants"
+    say(f"reference: {base.formulation}, {base.method}, accuracy {accuracy:.0e}, {rows}")
+    dense = between(golden.time)
+    runs = [run(replace(request, accuracy=max(accuracy * FINER, FINEST)), dense)]
+    other = "bdf" if base.method == "radau" else "radau"
+    try:
+        runs.append(run(replace(request, accuracy=accuracy, method=other), dense))
+    except Stopped as stopped:
+        say(f"no second method: {stopped}")
+    tolerance, error = _own_error(golden, runs, rtol, atol, say)
+    return base, runs, golden, tolerance, error
+
+
+def _own_error(golden: Arrays, runs: Sequence[Run], rtol: float, atol: float, say: Say) -> tuple[Tolerance, float]:
+    """(the tube, the error relative to it) of the reference; where a steep flank is in the way, tau is widened."""
+    span = float(golden.time[-1] - golden.time[0])
+    least = _tau(golden, [r.trace for r in runs])
+    refused: Refused | None = None
+    for share in (SHARE, *STEEP):
+        tau = max(least, float(f"{share * span:.3g}"))
+        tolerance = Tolerance(rtol, atol, tau)
+        try:
+            error = max(_error(differences(golden, r.trace, tolerance), rtol, r.method) for r in runs)
+        except Refused as error_:
+            refused = refused or error_
+            continue
+        if refused is not None:
+            say(f"time tolerance {tau:g} s: {refused.args[0].partition(':')[0]}")
+        return tolerance, error
+    assert refused is not None
+    raise refused
+
+
+def _error(verdict: Verdict, rtol: float, method: str) -> float:
+    """The largest difference, relative as rtol is."""
+    worst = verdict.worst
+    if worst is None:
+        return 0.0
+    unlike = [c for c in verdict.traces if not c.equal]
+    if unlike or any(c.status not in ("equal", "differs") for c in verdict.quantities):
+        raise Refused(f"two runs of the scene do not agree ({method}): {sentence(worst)}")
+    error = max(c.worst.ratio for c in verdict.quantities) * rtol
+    if MARGIN * error > rtol:
+        message = f"the reference itself is off by {error:.1e} ({worst.name} at {worst.worst.time:.6g} s, {method})"
+        help_ = f"--rtol {2 * MARGIN * error:.0e}" if error < 0.05 else "a shorter scene: it is chaotic or too stiff"
+        raise Refused(f"{message}: a tolerance of {rtol:g} is below ten times that; {help_}")
+    return error
+
+
+def _tau(golden: Arrays, others: Sequence[Arrays]) -> float:
+    """Ten times the largest difference of events between the runs [s]."""
+    pairs = [
+        (a, b)
+        for o in others
+        if len(golden.events) == len(o.events)
+        for a, b in zip(golden.events, o.events, strict=True)
+    ]
+    return float(f"{MARGIN * max((abs(a.time - b.time) for a, b in pairs), default=0.0):.3g}")
+
+
+def _thin(base: Run, rtol: float, atol: float) -> Arrays:
+    """The reference on as few rows as tell it; quantities without a stored rate get one where they are smooth."""
+    trace = base.trace
+    names = list(trace.values)
+    limits = np.array([(atol + rtol * (trace.quantities[n].nominal or 0.0)) * INTERPOLATION for n in names])
+    rates = {}
+    for name, limit in zip(names, limits, strict=True):
+        known = trace.rates.get(name)
+        rates[name] = estimated_rates(trace.time, trace.values[name], limit / 2) if known is None else known
+    full = [Curve(trace.time, trace.values[n], trace.rates.get(n)) for n in names]
+    wanted = [Curve(trace.time, trace.values[n], rates[n]) for n in names]
+    rows = thinned(full, limits, wanted)
+    steps = dict(zip(names, limits * ROUNDING, strict=True))
+    longest = float(np.max(np.diff(trace.time[rows]), initial=0.0)) or 1.0
+    return Arrays(
+        trace.time[rows],
+        {n: rounded(trace.values[n][rows], steps[n]) for n in names},
+        {n: rounded(r[rows], steps[n] / longest) for n, r in rates.items() if np.isfinite(r[rows]).any()},
+        list(trace.quantities.values()),
+        trace.events,
+        trace.time_unit,
+    )
+
+
+def _formulations(
+    request: Request, base: Run, golden: Arrays, tolerance: Tolerance, say: Say
+) -> tuple[float, dict[str, Any], list[Run]]:
+    """(accuracy of checks, structure by formulation, the runs) of every formulation that can express the scene."""
+    accuracy = max(tolerance.rtol * CHECKED, FINEST)
+    others = (f for f in FORMULATIONS if f != base.formulation and request.formulation is None)
+    names = [base.formulation, *others]
+    structure: dict[str, Any] = {}
+    found = []
+    for name in names:
+        wanted = replace(request, formulation=name)
+        try:
+            one, verdict = _inside(wanted, accuracy, golden, tolerance)
+        except Stopped as stopped:
+            if stopped.finding.startswith("E60") or stopped.finding == "N608":
+                continue  # not expressible
+            raise Refused(f"{name}: {stopped}; --formulation {base.formulation} leaves it out") from stopped
+        while verdict.worst is not None and _margin(verdict) > HALF and accuracy > tolerance.rtol * CHECKED / 50.0:
+            accuracy /= 10.0
+            one, verdict = _inside(wanted, accuracy, golden, tolerance)
+        if _margin(verdict) > HALF:
+            assert verdict.worst is not None
+            raise Refused(f"{name} differs from {base.formulation}: {sentence(verdict.worst)}")
+        say(f"{name}: {_margin(verdict):.2g} of the limit at accuracy {accuracy:.0e}")
+        structure[name] = one.structure
+        found.append(one)
+    return accuracy, structure, found
+
+
+def _inside(request: Request, accuracy: float, golden: Arrays, tolerance: Tolerance) -> tuple[Run, Verdict]:
+    one = run(replace(request, accuracy=accuracy), between(golden.time))
+    return one, differences(common(golden, set(one.trace.values)), one.trace, tolerance)
+
+
+def _margin(verdict: Verdict) -> float:
+    found = (*(c for c in verdict.traces if not c.equal), *verdict.quantities)
+    return max((c.worst.ratio for c in found), default=0.0)

@@ -1,0 +1,125 @@
+"""One run for a golden trace: the scene on instants of our choice, its curves, its structure, its meters."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sysdyn.cli import targets
+from sysdyn.cli.running import Ran, Request, integrate, options_of, ready
+from sysdyn.compiler import energies
+from sysdyn.dsl import expression as ex
+from sysdyn.dsl.diagnostics import Report
+from sysdyn.runtime.comparison.arrays import Arrays, arrays_of
+from sysdyn.runtime.comparison.curve import Floats
+from sysdyn.runtime.trace import Trace
+
+INSTANTS = 2000
+"""Rows of each run besides its steps: what has no stored rate is a line between them."""
+PARTS = 8
+"""Parts of each cell of the kept trace at whose ends a run has rows too: dense where the curves are not smooth."""
+CLAIMS = ("E907", "E909")
+"""Expectations are judged by `simulate`, at the scene's own accuracy."""
+
+
+def between(time: Floats) -> Floats:
+    """Instants [m] s of the kept rows [n] and of the parts between them."""
+    return np.unique(np.linspace(time[:-1], time[1:], PARTS + 1)) if time.size > 1 else time
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """trace: its curves; structure: of this formulation; energy [J], constraints: largest of the meters;
+    parameters: name to value in SI.
+    """
+
+    trace: Arrays
+    structure: dict[str, Any]
+    energy: float
+    constraints: float
+    formulation: str
+    method: str
+    parameters: dict[str, float]
+
+
+class Stopped(Exception):  # noqa: N818 (no fault of the program)
+    """The run did not come to its end.  code: the exit code; finding: code of the first error, if there is one."""
+
+    def __init__(self, code: int, message: str, finding: str = "") -> None:
+        self.code, self.finding = code, finding
+        super().__init__(message)
+
+
+def run(request: Request, also: Floats | None = None) -> Run:
+    """Simulate at the request's accuracy, or the scene's own where that is finer (its expectations want it).
+
+    also [m] s: further instants of the trace.  Raises Stopped, UsageError, OSError, TraceError.
+    """
+    report = Report()
+    with tempfile.TemporaryDirectory(prefix="sysdyn-golden-") as folder:
+        path = Path(folder) / "trace.h5"
+        ran = _ran(replace(request, output=str(path)), report, also)
+        errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in CLAIMS)]
+        if ran is None or errors:
+            first = next(iter(errors), None)
+            where = f"{first.place.file}:{first.place.start[0]}: " if first and first.place else ""
+            if first is None:  # notes alone: what is planned for later
+                note = next(iter(report.diagnostics), None)
+                raise Stopped(1, note.message if note else "the model has errors", note.code if note else "")
+            raise Stopped(1, f"{where}{first.code}: {first.message}", first.code)
+        if ran.failure:
+            raise Stopped(3, ran.failure)
+        trace = Trace.open(path)
+    energy, constraints = (_largest(trace[f"audit.{meter}"].values) for meter in ("energy", "constraints"))
+    parameters = {name: value for name, (value, _) in trace.parameters.items()}
+    source = arrays_of(trace)
+    formulation, method = ran.prepared.formulation, ran.outcome.method
+    return Run(source, _structure(ran, source), energy, constraints, formulation, method, parameters)
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
+    """As `cli.running.run`, but the trace holds the steps and the instants that are wanted here."""
+    document = targets.read(request.file, report)
+    target = targets.one(document, request.file, request.model, request.scene, report)
+    if target is None:
+        return None
+    with ex.fresh():
+        prepared = ready(request, target, report)
+        own = replace(request, accuracy=None)
+        options = None if prepared is None else options_of(own, target, prepared, report, time.monotonic(), None)
+        if prepared is None or options is None:
+            return None
+        if request.accuracy is not None:
+            finest = min([request.accuracy, options.accuracy or 1.0, *(a for _, a in options.accuracy_on)])
+            options = replace(options, accuracy=finest, accuracy_on=())
+        even = np.linspace(options.t_start, options.t_end, INSTANTS + 1)
+        wanted = even if also is None else np.union1d(even, also)
+        inside = wanted[(wanted >= options.t_start) & (wanted <= options.t_end)]
+        options = replace(options, every=None, at=tuple(inside.tolist()))
+        return integrate(target, prepared, options, report)
+
+
+def _structure(ran: Ran, trace: Arrays) -> dict[str, Any]:
+    """Equations, degrees of freedom, index, counts of one formulation: independent of parameters' values."""
+    facts, manifest = ran.started.facts, ran.prepared.manifest
+    return {
+        "coordinates": facts.coordinates,
+        "m1": facts.m1,
+        "m2": facts.m2,
+        "dof": facts.dof,
+        "configuration_dof": facts.configuration_dof,
+        "redundant": facts.redundant,
+        "index": facts.index,
+        "unknowns": [[u["name"], u["kind"], u["unit"], u["differential"]] for u in manifest["unknowns"]],
+        "rows": [[r["label"], r["kind"]] for r in manifest["rows"]],
+        "equations": energies.show(ran.prepared.compiled.energies).splitlines(),
+        "quantities": sorted(trace.values),
+    }

@@ -1,0 +1,78 @@
+"""A thinned trace as a file: CONTRACT's layout without chunks, the same bytes for the same content."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sysdyn.runtime.comparison.arrays import Arrays
+from sysdyn.runtime.trace_store import input_output
+
+
+def write_trace(path: Path, trace: Arrays, attributes: Mapping[str, str | float | int], most: float) -> int:
+    """Write a trace in one piece, packed where it is larger than `most` bytes; its size.  Raises TraceError.
+
+    A packed file has the file format of HDF5 1.10, whose index of one chunk costs nothing.  The path keeps what it
+    held where the result is still larger.
+    """
+    for packed in (False, True):
+        size = _written(path, trace, attributes, packed, most)
+        if size <= most:
+            break
+    return size
+
+
+def _written(path: Path, trace: Arrays, attributes: Mapping[str, str | float | int], packed: bool, most: float) -> int:
+    import h5py
+
+    part = path.with_suffix(".h5.part")
+    with input_output(path):
+        try:
+            with h5py.File(part, "w", libver=("v110" if packed else "earliest", "v110")) as file:
+                for name, value in {**attributes, "final": 1}.items():
+                    file.attrs[name] = _attribute(value)
+                time = _data(file, packed, "time", trace.time, "s", "time")
+                time.make_scale("time")
+                for name, values in trace.values.items():
+                    about = trace.quantities[name]
+                    data = _data(file, packed, name, values, about.unit, name)
+                    data.attrs["nominal"] = _nominal(trace, name)
+                    data.dims[0].attach_scale(time)
+                    if name in trace.rates:
+                        unit = "1/s" if about.unit == "1" else f"({about.unit})/s"
+                        rate = f"/derivatives/{name}"
+                        _data(file, packed, rate, trace.rates[name], unit, f"time derivative of {name}")
+                        data.attrs["derivative"] = _attribute(rate)
+                if trace.events:
+                    _data(file, packed, "/events/time", np.array([e.time for e in trace.events]), "s", "time of events")
+                    names = np.array([e.name.encode() for e in trace.events])
+                    file.create_dataset("/events/name", data=names, track_times=False)
+            size = part.stat().st_size
+            if size <= most:
+                part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+    return size
+
+
+def _nominal(trace: Arrays, name: str) -> float:
+    nominal = trace.quantities[name].nominal
+    return float(np.max(np.abs(trace.values[name]), initial=0.0)) if nominal is None else nominal
+
+
+def _data(file: Any, packed: bool, name: str, values: Any, unit: str, long_name: str) -> Any:
+    how = {"chunks": (len(values),), "compression": 9, "shuffle": True} if packed and len(values) else {}
+    data = file.create_dataset(name, data=values, track_times=False, **how)
+    data.attrs["units"], data.attrs["long_name"] = _attribute(unit), _attribute(long_name)
+    return data
+
+
+def _attribute(value: str | float | int) -> Any:
+    import h5py
+
+    if not isinstance(value, str):
+        return value
+    data = value.encode("utf-8") or b" "
+    return np.array(data, dtype=h5py.string_dtype("utf-8", len(data)))

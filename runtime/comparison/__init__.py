@@ -1,0 +1,1 @@
+"""Comparison of traces: pure values in, a verdict out."""

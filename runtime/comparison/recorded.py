@@ -1,0 +1,116 @@
+"""A trace in a file as a source of a comparison: rows are read when they are asked for."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from sysdyn.runtime.comparison.curve import Floats
+from sysdyn.runtime.comparison.verdict import About, Event, Incomparable
+from sysdyn.runtime.failures import TraceError
+
+CACHE = 1 << 16
+"""Bytes of chunks that HDF5 keeps of each open data set: its own default is 8 MB, and a trace has hundreds."""
+EVENTS = 10_000_000
+"""More are no list of events."""
+
+
+class Recorded:
+    """A trace of CONTRACT's layout, open for reading.  Raises TraceError (unreadable) and Incomparable (no trace)."""
+
+    def __init__(self, path: str | Path, name: str | None = None) -> None:
+        import h5py
+
+        self.path = name or str(path)
+        with self._faults():
+            self._file: Any = h5py.File(path, "r", rdcc_nbytes=CACHE)
+        try:
+            with self._faults():
+                self._layout()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(Exception):
+            self._file.close()
+
+    @contextlib.contextmanager
+    def _faults(self) -> Iterator[None]:
+        try:
+            yield
+        except FileNotFoundError as error:
+            raise TraceError(f"{self.path}: no such file") from error
+        except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+            first = (str(error).splitlines() or [type(error).__name__])[0]
+            raise TraceError(f"{self.path}: not readable as a trace: {first}") from error
+
+    def _layout(self) -> None:
+        import h5py
+
+        data = {name: self._file[name] for name in self._file}
+        sets = {name: item for name, item in data.items() if isinstance(item, h5py.Dataset) and name != "events"}
+        if "time" not in sets:
+            raise Incomparable(f"{self.path} has no data set 'time': not a trace")
+        for name, item in sets.items():
+            if item.ndim != 1 or item.dtype.kind not in "fiu":
+                raise Incomparable(f"{self.path}: '{name}' is no row of numbers")
+        self._rates = {}
+        for name, item in sets.items():
+            path = _text(item.attrs.get("derivative", ""))
+            rate = self._file.get(path) if path else None
+            if isinstance(rate, h5py.Dataset) and rate.ndim == 1 and rate.dtype.kind in "fiu":
+                self._rates[name] = rate
+        # a run that was killed may have flushed one row more of some of them
+        length = min(item.shape[0] for item in (*sets.values(), *self._rates.values()))
+        time = sets.pop("time")
+        self.time: Floats = np.asarray(time[:length], dtype=np.float64)
+        self.time_unit = _text(time.attrs.get("units", "s"))
+        self._sets = sets
+        self.quantities = {name: self._about(name, item) for name, item in sets.items()}
+        self.events = self._events(data.get("events"))
+        self.final = bool(np.all(self._file.attrs.get("final", 1)))
+        tau = np.asarray(self._file.attrs.get("tau", math.nan))
+        self.tau = float(tau) if tau.ndim == 0 and tau.dtype.kind in "fiu" and tau >= 0.0 else None
+
+    def _about(self, name: str, item: Any) -> About:
+        nominal = item.attrs.get("nominal")
+        if nominal is not None:
+            array = np.asarray(nominal)
+            nominal = float(array) if array.ndim == 0 and array.dtype.kind in "fiu" else math.nan
+        return About(name, _text(item.attrs.get("units", "1")), nominal)
+
+    def _events(self, found: Any) -> tuple[Event, ...]:
+        """/events: a group with `time` and `name`, or rows of both."""
+        if found is None:
+            return ()
+        fields = found.dtype.names if hasattr(found, "dtype") else tuple(found)
+        if fields is None or not {"time", "name"} <= set(fields):
+            raise Incomparable(f"{self.path}: /events has no time and name")
+        times, names = np.asarray(found["time"], dtype=np.float64), np.asarray(found["name"])
+        if times.shape != names.shape or times.ndim != 1 or times.size > EVENTS:
+            raise Incomparable(f"{self.path}: /events is no list")
+        return tuple(Event(float(t), _text(n)) for t, n in zip(times, names, strict=True))
+
+    def read(self, name: str, first: int, last: int) -> tuple[Floats, Floats | None]:
+        """Rows first..last-1: values and, where they are stored, rates."""
+        with self._faults():
+            values = np.asarray(self._sets[name][first:last], dtype=np.float64)
+            rate = self._rates.get(name)
+            return values, None if rate is None else np.asarray(rate[first:last], dtype=np.float64)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        value = value.item() if value.size == 1 else ""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes | np.bytes_) else str(value)

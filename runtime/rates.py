@@ -1,0 +1,38 @@
+"""Which traced quantities have a derivative that the equations determine.
+
+The rate of an unknown whose derivative does not occur in the equations (an implicit effort, the flow of a massless
+coordinate) is but the slope of the integrator's polynomial, which no error test sees: a cubic Hermite interpolant made
+of it leaves the solution by far more than the values do.  A quantity whose derivative depends on such a rate has none.
+Flows of coordinates with a momentum of their own are functions of the tested momenta: their rates are as good as those.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.start import ConsistentState
+from sysdyn.runtime.system import System
+
+MOVED = 1e-3
+"""Relative move of the start: a coefficient that vanishes there by chance does not vanish beside it."""
+
+
+def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
+    """[observed]: elements of block observe whose derivative follows from the equations."""
+    y, yd = start.for_form(system)
+    _, jyd = system.jacobian(start.t, y, yd)
+    moved = {family.owner for family in system.description.families if family.kind == "p"}
+    inert = np.array([family.kind == "f" and family.owner in moved for family in system.description.families] + [False])
+    free = ~(system.differential(jyd) | inert[system.family_of])
+    random = np.random.default_rng(0)
+    found: NDArray[np.bool_] | None = None
+    for size in (0.0, MOVED):
+        there = y + size * (np.abs(y) + MOVED) * random.uniform(0.5, 1.0, y.size)
+        other = yd + free * random.uniform(1.0, 2.0, y.size) * np.where(yd != 0.0, np.abs(yd), 1.0)
+        with np.errstate(all="ignore"):
+            one = system.observe_rate(start.t, there, yd)
+            two = system.observe_rate(start.t, there, other)
+        same = (one == two) | np.isnan(one) | np.isnan(two)
+        found = same if found is None else found & same
+    assert found is not None
+    return found

@@ -1,0 +1,127 @@
+"""The tube against brute force, and the cubics it is made of."""
+
+import numpy as np
+import pytest
+from sysdyn.runtime.comparison.arrays import Arrays
+from sysdyn.runtime.comparison.compare import compare
+from sysdyn.runtime.comparison.curve import (
+    Curve,
+    bernstein,
+    cells_at,
+    largest,
+    largest_magnitude,
+    value_at,
+    whole_cells,
+)
+from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
+from sysdyn.runtime.comparison.tube import band
+from sysdyn.runtime.comparison.verdict import Tolerance
+
+SIZE = 400_001
+
+
+def random_curve(random, jumps):
+    time = np.sort(np.append(random.uniform(0.0, 1.0, random.integers(0, 12)), [0.0, 1.0]))
+    if jumps and time.size > 3:
+        k = random.integers(1, time.size - 1)
+        time = np.insert(time, k, time[k])
+    values = random.standard_normal(time.size)
+    rates = random.standard_normal(time.size) * 5.0
+    rates[random.uniform(size=time.size) < 0.3] = np.nan
+    return Curve(time, values, rates)
+
+
+def sampled(curve, instants):
+    cell = cells_at(curve.time, instants)
+    return bernstein(curve, cell, instants, instants)[0]
+
+
+def brute(r, s, tau, instants):
+    """Largest distance of s from the band around r, and the same the other way, on a grid."""
+    step = instants[1] - instants[0]
+    reach = round(tau / step)
+    a, b = sampled(r, instants), sampled(s, instants)
+    worst = 0.0
+    for one, two in ((a, b), (b, a)):
+        padded = np.pad(one, reach, constant_values=np.nan)
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+        worst = max(worst, np.nanmax(two - np.nanmax(windows, axis=1)), np.nanmax(np.nanmin(windows, axis=1) - two))
+    return worst
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_tube_is_what_brute_force_finds(seed):
+    random = np.random.default_rng(seed)
+    r, s = random_curve(random, seed % 2), random_curve(random, seed % 3 == 0)
+    instants = np.linspace(0.0, 1.0, 4001)
+    for tau in (0.001, 0.05, 0.4):
+        expected = brute(r, s, tau, instants)
+        ref = Arrays(r.time, {"x": r.values}, {"x": r.rates})
+        test = Arrays(s.time, {"x": s.values}, {"x": s.rates})
+        for atol in (0.05, max(expected * 0.97, 1e-3)):
+            worst = compare(ref, test, Tolerance(0.0, atol, tau)).quantities[0].worst
+            if expected > 1.01 * atol:
+                # the grid sees no more than the tube, and the tube no more than it should
+                assert worst.ratio * atol == pytest.approx(expected, rel=0.06, abs=0.02)
+        assert compare(ref, test, Tolerance(0.0, expected * 1.02 + 0.03, tau)).equal
+
+
+def test_a_band_of_a_jump_holds_both_sides():
+    jump = Curve(np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 0.0, 1.0, 1.0]))
+    assert band(jump, 0.9, 0.05) == (0.0, 0.0)
+    assert band(jump, 0.96, 0.05) == (0.0, 1.0)
+    assert band(jump, 1.04, 0.05) == (0.0, 1.0)
+    assert band(jump, 5.0, 0.05) == (np.inf, -np.inf)
+
+
+def test_extrema_in_closed_form():
+    random = np.random.default_rng(0)
+    b = random.standard_normal((4, 2000))
+    b[:, :50] = b[0, :50]  # constants
+    b[1, 50:100] = b[0, 50:100]  # slopes that vanish at an end
+    x = np.linspace(0.0, 1.0, 2001)[:, None]
+    grid = np.stack([value_at(b, np.full(2000, p)) for p in x[:, 0]])
+    assert np.allclose(largest(b), grid.max(axis=0), atol=1e-5)
+    size, at = largest_magnitude(b)
+    assert np.allclose(size, np.abs(grid).max(axis=0), atol=1e-5)
+    assert np.allclose(np.abs(value_at(b, at)), size, rtol=1e-12)
+
+
+def test_parts_of_a_cell_are_the_same_cubic():
+    curve = Curve(np.array([0.0, 2.0]), np.array([1.0, -1.0]), np.array([3.0, 0.5]))
+    cell = np.zeros(2, dtype=int)
+    parts = bernstein(curve, cell, np.array([0.0, 0.7]), np.array([0.7, 2.0]))
+    whole = whole_cells(curve, cell[:1])
+    for k, (a, b) in enumerate(((0.0, 0.7), (0.7, 2.0))):
+        for x in (0.0, 0.3, 1.0):
+            expected = value_at(whole, np.array([(a + x * (b - a)) / 2.0]))
+            assert value_at(parts[:, k : k + 1], np.array([x])) == pytest.approx(expected, rel=1e-14)
+
+
+def test_thinning_keeps_within_its_limit():
+    t = np.linspace(0.0, 10.0, 3001)
+    curves = [Curve(t, np.sin(3.0 * t), 3.0 * np.cos(3.0 * t)), Curve(t, np.abs(np.sin(t)))]
+    limits = np.array([1e-4, 1e-3])
+    kept = thinned(curves, limits)
+    assert 20 < kept.size < 400
+    assert kept[0] == 0
+    assert kept[-1] == t.size - 1
+    for curve, limit in zip(curves, limits, strict=True):
+        rates = None if curve.rates is None else curve.rates[kept]
+        thin = Arrays(t[kept], {"x": curve.values[kept]}, {} if rates is None else {"x": rates})
+        full = Arrays(t, {"x": curve.values}, {} if curve.rates is None else {"x": curve.rates})
+        assert compare(full, thin, Tolerance(0.0, limit)).equal
+
+
+def test_estimated_rates_leave_kinks_alone():
+    t = np.linspace(0.0, 2.0, 201)
+    rates = estimated_rates(t, np.abs(t - 1.0), 1e-6)
+    assert np.isnan(rates[100])
+    smooth = np.delete(rates, [99, 100, 101])
+    assert np.allclose(np.abs(smooth), 1.0)
+
+
+def test_rounded_is_within_half_a_step():
+    values = np.random.default_rng(1).standard_normal(1000)
+    assert np.max(np.abs(rounded(values, 1e-3) - values)) <= 0.5e-3
+    assert np.array_equal(rounded(values, 0.0), values)
