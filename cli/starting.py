@@ -116,9 +116,17 @@ def _structural(prepared: Prepared, facts: Structure, policy: str, report: Repor
         )
 
 
+def _without_primal_rows(prepared: Prepared) -> bool:
+    """Whether rows are other than the balances of the text's coordinates, with a multiplier a constraint."""
+    return prepared.formulation.startswith("co_") or prepared.formulation == "kane"
+
+
 def _inertia(prepared: Prepared, system: System, state: ConsistentState, report: Report) -> None:
-    """E321: T* without a minimum leaves the motion undetermined forward in time (springs may be unstable)."""
-    if prepared.formulation.startswith("co_"):
+    """E321: T* without a minimum leaves the motion undetermined forward in time (springs may be unstable).
+
+    Asked of the balances of coordinates: another formulation of the text has them.
+    """
+    if _without_primal_rows(prepared):
         return
     found = negative_inertia(system, state)
     if found is None:
@@ -138,10 +146,9 @@ def _inertia(prepared: Prepared, system: System, state: ConsistentState, report:
 def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: Structure, report: Report) -> None:
     """`expect static`: claims about counts (E909).
 
-    Claims of a model hold in each of its scenes: a complementary formulation of a network that has a primal one too is
-    counted in that.
+    Claims of a model hold in each of its scenes: where there is a Lagrangian formulation, that is counted.
     """
-    if prepared.formulation.startswith("co_") and prepared.network.statics:
+    if _without_primal_rows(prepared) and prepared.network.statics:
         facts = replace(_primal(prepared, state.t) or facts, index=facts.index)
     known = {
         "coordinates": facts.coordinates,

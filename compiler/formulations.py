@@ -11,7 +11,7 @@ from sysdyn.dsl.diagnostics import Diagnostic, Place, Related
 from sysdyn.dsl.expression import Node, variables
 from sysdyn.dsl.network import Network
 
-PRIMAL = ("lagrangian", "hamiltonian")
+PRIMAL = ("lagrangian", "hamiltonian", "kane")
 COMPLEMENTARY = ("co_lagrangian", "co_hamiltonian")
 
 
@@ -27,9 +27,6 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
         return "lagrangian", (
             Diagnostic("E604", message, network.place, "one system is written in one family", related),
         )
-    if wanted == "kane":
-        message = "formulation kane is not supported yet (planned: four formulations)"
-        return "lagrangian", (Diagnostic("N608", message, place or network.place),)
     if co:
         return _complementary(network, wanted, place)
     if wanted in COMPLEMENTARY:

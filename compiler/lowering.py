@@ -79,7 +79,7 @@ def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     return frozenset(c.name for c in model.coordinates) - moved - carriers
 
 
-def _rate(root: Node) -> Node:
+def total_rate(root: Node) -> Node:
     """Total derivative by t, the derivatives of multipliers among its variables."""
     seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in variables(root)}
     return differential(root, seeds)
@@ -229,7 +229,7 @@ class _Lowering:
         """A summand of the balance of a coordinate; where that is algebraic, its rate holds too."""
         self.assembly.add(block, on.data[0], on.args, nest, value)
         if on.data[0] in self.massless:
-            self.assembly.add("dynamics_rate", on.data[0], on.args, nest, _rate(value))
+            self.assembly.add("dynamics_rate", on.data[0], on.args, nest, total_rate(value))
 
     def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
         if not self._has_rate(row):

@@ -24,6 +24,7 @@ from sysdyn.compiler.emit_numpy import emit_numpy
 from sysdyn.compiler.energies import EnergyModel
 from sysdyn.compiler.hamiltonian import hamiltonian
 from sysdyn.compiler.integration import integrate
+from sysdyn.compiler.kane import kane
 from sysdyn.compiler.lagrangian import lagrangian
 from sysdyn.compiler.primal import primal
 from sysdyn.compiler.program import Program
@@ -35,6 +36,7 @@ from sysdyn.dsl.network import Network
 FORMULATIONS: dict[str, Callable[[EnergyModel], DescriptorForm]] = {
     "lagrangian": lagrangian,
     "hamiltonian": hamiltonian,
+    "kane": kane,
 }
 """The primal arrows; `co_` before a name says that they lower the network's reflection."""
 

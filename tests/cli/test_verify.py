@@ -104,7 +104,7 @@ def both(*formulations):
     ("name", "options", "formulations"),
     [
         ("gallery/slider_crank", ("--scene", "coast"), FOUR[:2]),  # phi
-        ("gallery/knife_edge", ("--until", "2"), FOUR[:2]),  # psi
+        ("gallery/knife_edge", ("--until", "2"), (*FOUR[:2], "kane")),  # psi
         ("gallery/friction_book", (), FOUR[:2]),  # gamma
         ("gallery/chain_1000", ("--until", "0.05"), FOUR[:2]),  # arrays, reduced by ci.toml
         ("seed/dc_motor", (), FOUR),

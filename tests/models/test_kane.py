@@ -1,0 +1,106 @@
+"""Kane's formulation: without the multipliers of psi, and the same motion and reactions."""
+
+import numpy as np
+import pytest
+from reduced import ROOT, load
+from sysdyn.cli.running import Request, run
+from sysdyn.dsl.diagnostics import Report
+from sysdyn.runtime.trace import Trace
+
+REFERENCES = load("references.json")
+SKATES = """
+model skates {
+  param n = 3
+  coord x[1..n], y[1..n]: translation
+  coord th[1..n]: rotation
+  energy T* = sum(i in 1..n: 1/2*i*1 kg*(x[i]'^2 + y[i]'^2) + 1/2*0.4 kg.m^2*th[i]'^2)
+  energy V = 1/2*20 N/m*((x[1] - x[2])^2 + (y[2] - y[3])^2)
+  for i in 1..n {
+    psi edge[i]: sin(th[i])*x[i]' = cos(th[i])*y[i]'
+    init x[i] = i*0.1 m
+    init y[i] = 0 m
+    init th[i] = 0.3*i*1 rad
+    init th[i]' = 1 rad/s
+    init x[i]' ~ 1 m/s
+    init y[i]' ~ 0.3 m/s
+  }
+}
+
+scene s of skates {
+  time 0 s to 3 s
+  trace x[1], y[2], th[3], edge[2].multiplier, edge[3].multiplier every 10 ms
+}
+"""
+DRIVEN = """
+model belt {
+  coord x, z: translation = 0 m
+  coord th: rotation = 0 rad
+  energy T* = 1/2*2 kg*x'^2 + 1/2*1 kg*z'^2 + 1/2*0.3 kg.m^2*th'^2
+  energy V = 1/2*8 N/m*(z - x)^2
+  content D = 1/2*0.4 N.m.s/rad*th'^2
+  psi slip: x' = 0.2 m/rad*th' + 0.1 m/s*cos(3 rad/s*t)*cos(x*1 rad/m)
+  init th' = 2 rad/s
+  init x' ~ 0 m/s
+  init z' = 0 m/s
+}
+
+scene s of belt {
+  time 0 s to 4 s
+  trace x, th, z, slip.multiplier every 10 ms
+}
+"""
+
+
+def simulated(tmp_path, path, formulation, **options):
+    report = Report()
+    output = tmp_path / f"{formulation}.h5"
+    ran = run(Request(str(path), formulation=formulation, output=str(output), **options), report)
+    assert ran is not None, [f"{d.code} {d.message}" for d in report]
+    assert ran.exit == 0
+    return ran, Trace.open(output)
+
+
+@pytest.mark.parametrize("model", ["knife_edge", "rolling_disk", "em_suspension"])
+def test_reference_values_without_multipliers(tmp_path, model):
+    reference = REFERENCES[model]
+    options = {"accuracy": 1e-6, "at": ",".join(map(repr, reference["t"])), "scene": "reference"}
+    ran, trace = simulated(tmp_path, ROOT / "models" / "seed" / f"{model}.sd", "kane", **options)
+    families = ran.prepared.compiled.form.families
+    assert all(f.kind != "mu" for f in families)
+    assert ran.outcome.index == "1"
+    places = [int(np.argmin(np.abs(trace.time - t))) for t in reference["t"]]
+    for name, values in reference["values"].items():
+        error = np.max(np.abs(trace[name].values[places] - values)) / np.max(np.abs(values))
+        assert error <= 1e-5, name
+
+
+@pytest.mark.parametrize("text", [SKATES, DRIVEN], ids=["arrays", "rheonomic"])
+def test_reactions_on_request(tmp_path, text):
+    path = tmp_path / "model.sd"
+    path.write_text(text)
+    _, lagrange = simulated(tmp_path, path, "lagrangian", accuracy=1e-7)
+    ran, kane = simulated(tmp_path, path, "kane", accuracy=1e-7)
+    assert "mu" in {f.kind for f in ran.prepared.compiled.form.families}
+    for name in lagrange.names:
+        wanted = lagrange[name].values
+        assert np.max(np.abs(kane[name].values - wanted)) <= 1e-6 * np.max(np.abs(wanted)), name
+    assert abs(kane["audit/energy"].values).max() <= 1e-5
+
+
+@pytest.mark.parametrize(
+    ("psi", "says"),
+    [("", "no flow constraint"), ("psi one: x' = sum(i in 1..3: v[i]')", "several elements")],
+)
+def test_what_it_cannot_leave_out_is_refused(tmp_path, psi, says):
+    path = tmp_path / "model.sd"
+    path.write_text(f"""model m {{
+  coord x: translation = 0 m
+  coord v[1..3]: translation
+  energy T* = 1/2*1 kg*(x'^2 + sum(i in 1..3: v[i]'^2))
+  {psi}
+}}
+""")
+    report = Report()
+    assert run(Request(str(path), formulation="kane", until="1", output=str(tmp_path / "t.h5")), report) is None
+    assert [d.code for d in report if d.severity == "error"] == ["E607"]
+    assert says in next(d.message for d in report)
