@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 from sysdyn.cli import targets
+from sysdyn.cli.columns import aligned
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.options import chosen
 from sysdyn.cli.prepare import Prepared, prepare
@@ -63,8 +64,20 @@ def command(
             console.data(stages[dump]())
         if dump is None or folder is not None:
             _write(console, prepared, Path(folder or "."))
+    if explain:
+        console.say(_account(prepared))
     console.explain = explain
     return console.finish()
+
+
+def _account(prepared: Prepared) -> str:
+    """What became of nodes, branches and coordinates, by which rule."""
+    compiled = prepared.compiled
+    rows = [(s.rule, s.what, s.became) for s in compiled.steps]
+    held = {f.owner for f in compiled.form.families if f.kind == "q"}
+    unseen = [c.name for c in compiled.energies.coordinates if c.name not in held]
+    rows += [("8.7", f"displacement of {name}", "pruned: nothing reads it; its flow is the unknown") for name in unseen]
+    return aligned(rows) if rows else "coordinate style: nothing was merged or pruned"
 
 
 def _write(console: Console, prepared: Prepared, folder: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 from sysdyn.cli.agreement import Gap
+from sysdyn.cli.columns import aligned
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER
 from sysdyn.cli.options import chosen
@@ -126,7 +127,8 @@ def _table(found: Verified, *, timings: bool) -> str:
         rows = [[cell for k, cell in enumerate(row) if k != 5] for row in rows]
     accuracy, (t0, t1) = found.runs[0].accuracy, found.span
     lines = [f"{found.name}: {t0:g} s to {t1:g} s, apart in units of {TIMES:g} x {accuracy:g} x nominal"]
-    lines += _aligned(rows, left={0, 1, len(rows[0]) - 2})
+    columns = len(rows[0])
+    lines.append(aligned(rows, right={*range(2, columns)} - {columns - 2}))
     lines += _refused(found)
     lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
     if found.twins:
@@ -157,16 +159,6 @@ def _gap_cells(run: Run, gap: Gap | None, found: Verified) -> list[str]:
     if run is found.runs[0]:
         return ["-", "the reference", "-"]
     return ["-", "-", "-"] if gap is None else [f"{gap.ratio:.2g}", gap.variable, f"{gap.time:.4g}"]
-
-
-def _aligned(rows: list[list[str]], left: set[int]) -> list[str]:
-    """Columns of equal width; those in `left` begin at one place, the others end at one."""
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    made = []
-    for row in rows:
-        cells = [c.ljust(w) if k in left else c.rjust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True))]
-        made.append("  ".join(cells).rstrip())
-    return made
 
 
 def _horizon(found: Verified) -> str:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.energies import EnergyModel, Offset, Row, Virtual
 from sysdyn.compiler.mirror import Mirror
-from sysdyn.compiler.terms import Term, local_variables
+from sysdyn.compiler.terms import Nest, Term, local_variables
 from sysdyn.dsl.diagnostics import Diagnostic
 from sysdyn.dsl.expression import (
     Node,
@@ -90,7 +90,16 @@ def _note(row: Row, offset: Offset, tangible: frozenset[str], mirror: Mirror) ->
     text = to_text(add(*(t.expression for t in offset.terms)))
     start = _at_start(add(*(t.expression for t in offset.terms)), mirror)
     message = f"psi {row.name} was integrated because {touched} is tangible: phi: {text} - ({start}) = 0"
-    return Diagnostic("N501", message, row.place)
+    return Diagnostic("N501", _loops_named(message, row.nest), row.place)
+
+
+def _loops_named(text: str, nest: Nest) -> str:
+    """Canonical loop variables as i, j, k, with their ranges."""
+    ranges = []
+    for k, loop in enumerate(nest):
+        text = text.replace(loop.index, "ijklmn"[k])
+        ranges.append(f"{'ijklmn'[k]} in {to_text(loop.first)}..{to_text(loop.last)}")
+    return f"{text} for {', '.join(ranges)}" if ranges else text
 
 
 def _at_start(expression: Node, mirror: Mirror) -> str:

@@ -26,7 +26,7 @@ from sysdyn.compiler.hamiltonian import hamiltonian
 from sysdyn.compiler.integration import integrate
 from sysdyn.compiler.kane import kane
 from sysdyn.compiler.lagrangian import lagrangian
-from sysdyn.compiler.primal import primal
+from sysdyn.compiler.primal import Step, primal
 from sysdyn.compiler.program import Program
 from sysdyn.compiler.program_text import verify_program
 from sysdyn.compiler.reflection import reflect
@@ -61,6 +61,7 @@ class CompiledModel:
     backend: str
     text: str
     notes: tuple[Diagnostic, ...]
+    steps: tuple[Step, ...]
     timings: tuple[Timing, ...]
 
     def bind(self, overrides: Overrides | None = None) -> Binding:
@@ -94,7 +95,7 @@ def compile_network(
     timings: list[Timing] = []
     reflected = formulation.startswith("co_")
     with _timed("primal", timings):
-        network, inverted = primal(reflect(network) if reflected else network)
+        network, inverted, steps = primal(reflect(network) if reflected else network)
     with _timed("energies", timings):
         model = energies.energies(network)
         energies.verify_energies(model)
@@ -110,7 +111,8 @@ def compile_network(
         verify_program(program)
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
-    return CompiledModel(network, model, form, program, backend, text, (*inverted, *notes, *found), tuple(timings))
+    said = (*inverted, *notes, *found)
+    return CompiledModel(network, model, form, program, backend, text, said, steps, tuple(timings))
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+from sysdyn.compiler.primal.account import Step, account
 from sysdyn.compiler.primal.balances import balances
 from sysdyn.compiler.primal.bounds import Sizes
 from sysdyn.compiler.primal.contents import Contents, at_stores
@@ -25,10 +26,12 @@ from sysdyn.dsl.expression import Node, variables
 from sysdyn.dsl.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
 
 
-def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...]]:
-    """The same model in coordinates, and notes about inverted laws; ModelError where that cannot be."""
+def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...], tuple[Step, ...]]:
+    """The same model in coordinates, notes about inverted laws, and what became of nodes and branches; ModelError where
+    that cannot be.
+    """
     if not network.branches and not network.nodes:
-        return network, ()
+        return network, (), ()
     sizes = Sizes(network)
     incidence = Incidence(network, sizes)
     classes = series(incidence, network.read)
@@ -50,7 +53,7 @@ def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...]]:
         read=frozenset(),
         **_statements(network, said, nodes.constraints, reader),
     )
-    return found, tuple(said.notes)
+    return found, tuple(said.notes), account(network, classes, nodes)
 
 
 def _pieces(elements: tuple[Element, ...], classes: Series) -> dict[str, list[Piece]]:

@@ -65,3 +65,35 @@ def test_a_file_where_the_folder_should_be(tmp_path, capsys):
     assert run(["compile", write(tmp_path, PENDULUM), "-o", "out"]) == 5
     assert Path("out").read_text() == "mine"
     assert "out" in capsys.readouterr().err
+
+
+def test_explain_accounts_for_every_node_and_branch(tmp_path, capsys):
+    text = """from std.electrical import resistor, capacitor, voltage
+
+model line {
+  param n = 4
+  node v[0..n], w[1..n]: electrical
+  Vs: voltage(v = 1 V) v[0] -> ground
+  for i in 1..n {
+    R[i]: resistor(R = 1 ohm) v[i - 1] -> w[i]
+    S[i]: resistor(R = 2 ohm) w[i] -> v[i]
+    C[i]: capacitor(C = 1 mF) v[i] -> ground
+  }
+}
+"""
+    assert run(["compile", write(tmp_path, text), "--explain", "-o", "out"]) == 0
+    said = capsys.readouterr().err
+    table = {tuple(line.split("  ", 1)) for line in said.splitlines() if line[:2] in ("P1", "P2", "P3")}
+    lines = {(rule, " ".join(rest.split())) for rule, rest in table}
+    assert lines == {
+        ("P2", "branches Vs, -R[1], -S[1] coordinate Vs: one flow"),
+        ("P2", "branches R[2..n - 1], S[2..n - 1] coordinate R: one flow"),
+        ("P2", "branches C[1..n], R[n], S[n] coordinate C: one flow"),  # at the open end they are in series
+        ("P3", "node v[1..n - 1] psi v: the sum of its flows is zero; its effort is the multiplier"),
+        ("P2", "node v[0] merged: two branches, one flow"),
+        ("P2", "node v[n] merged: two branches, one flow"),
+        ("P2", "node w[1..n] merged: two branches, one flow"),
+        ("P3", "node ground electrical reference of its component: no row"),
+    }
+    assert "note N601: the law of C was inverted" in said
+    assert "for i in 2..n - 2" in said

@@ -58,7 +58,7 @@ def lead():
 
 
 def test_lead_filter_has_three_coordinates_and_one_constraint():
-    net, _ = primal(lead().network())
+    net, _, _ = primal(lead().network())
     assert [c.name for c in net.coordinates] == ["Vs", "R1", "C"]
     assert [(c.kind, c.name) for c in net.constraints] == [("psi", "b")]
     model = compiled(lead().network())
@@ -68,8 +68,8 @@ def test_lead_filter_has_three_coordinates_and_one_constraint():
 
 
 def test_a_network_in_coordinates_is_left_alone():
-    net, _ = primal(lead().network())
-    assert primal(net) == (net, ())
+    net, _, _ = primal(lead().network())
+    assert primal(net) == (net, (), ())
 
 
 def test_a_read_node_keeps_its_row():
@@ -79,7 +79,7 @@ def test_a_read_node_keeps_its_row():
     net.C("B", 1.0, "c")
     assert coordinates(net) == ["Vs", "R1", "C", "B"]
     net.read.add("c")
-    found, _ = primal(net.network())
+    found, _, _ = primal(net.network())
     assert [c.name for c in found.coordinates] == ["Vs", "R1", "C", "A", "B"]
     assert [c.name for c in found.constraints] == ["b", "c"]
 
@@ -92,7 +92,7 @@ def test_series_circuit_is_one_coordinate():
     net.R("R", 0.3, "b", "a")
     net.L("L", 2.0, "b", "c")
     net.C("C", 0.5, None, "c", of=ELECTRICAL)
-    found, _ = primal(net.network())
+    found, _, _ = primal(net.network())
     assert [c.name for c in found.coordinates] == ["C"]
     assert not found.constraints
     model = compiled(net.network())
@@ -154,7 +154,7 @@ def test_masses_and_springs_have_no_constraints():
     net.C("k1", 1 / 3.0, "x")
     net.C("k2", 1 / 5.0, "y", "x")
     net.C("k3", 1 / 7.0, "y", "z")
-    found, _ = primal(net.network())
+    found, _, _ = primal(net.network())
     assert [c.name for c in found.coordinates] == ["x", "y", "z"]
     assert not found.constraints
     stiffness = np.array([[8.0, -5.0, 0], [-5.0, 12.0, -7.0], [0, -7.0, 7.0]])
@@ -272,7 +272,7 @@ def transactor(kind):
 
 def test_a_controlled_flow_source_never_loads_its_control_port(tmp_path):
     """Seed README, section 7.1: as a psi it would give i1 = -0.0093, v2 = 0.1594."""
-    found, _ = primal(transactor("flow"))
+    found, _, _ = primal(transactor("flow"))
     assert [c.kind for c in found.constraints if c.name == "G.law"] == ["gamma"]
     trace, outcome = solve(lambda: transactor("flow"), 5.0, tmp_path)
     assert outcome.final
@@ -291,7 +291,7 @@ def test_a_flow_source_of_time_is_a_flow_constraint(tmp_path):
         watched = {"a": of("a", "ne"), "S": of("S", "be"), "P": x.mul(of("S", "be"), of("S", "bf"))}
         return net.network(observe=watched, init=[(of("C", "be"), 0.3)])
 
-    found, _ = primal(network())
+    found, _, _ = primal(network())
     assert {(c.kind, c.name) for c in found.constraints} == {("psi", "S.law"), ("psi", "a")}
     trace, _ = solve(network, 4.0, tmp_path)
     expected = reduced(lambda t, v: [(np.sin(2 * t) - v[0] / 2) / 0.5], [0.3], 4.0)[0]
@@ -339,7 +339,7 @@ def test_a_law_that_reads_the_effort_of_a_kinetic_store(tmp_path):
         watched = {"L": of("L", "be"), "f": of("L", "bf"), "p": of("L", "bp"), "d": of("d", "ne")}
         return net.network(observe=watched, init=start)
 
-    found, _ = primal(network())
+    found, _, _ = primal(network())
     assert [s.name for s in found.states] == ["L.p"]
     assert [u.name for u in found.unknowns] == ["L.e"]
     trace, _ = solve(network, 2.0, tmp_path)
@@ -477,7 +477,7 @@ def test_odd_networks_are_no_crash():
     empty = Net()
     empty.node("v", ELECTRICAL, (1, x.param("n")))
     empty.R("R", 1.0, ("v", x.index("i")), loops=(("i", 1, x.param("n")),))
-    found, _ = primal(empty.network(params={"n": 0.0}))
+    found, _, _ = primal(empty.network(params={"n": 0.0}))
     assert not found.coordinates
 
 

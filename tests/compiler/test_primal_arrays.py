@@ -242,20 +242,20 @@ def test_the_transmission_line_has_one_text():
 
 
 def test_a_run_is_one_coordinate():
-    net, _ = primal(sized(run(), 50))
+    net, _, _ = primal(sized(run(), 50))
     assert [(c.name, c.shape) for c in net.coordinates] == [("C", ())]
     assert not net.constraints
-    net, _ = primal(sized(run(True), 50))
+    net, _, _ = primal(sized(run(True), 50))
     assert [(c.name, c.shape) for c in net.coordinates] == [("Vs", ()), ("C", ()), ("T", ())]
     assert [c.name for c in net.constraints] == ["m"]
 
 
 def test_each_island_has_its_reference():
-    net, _ = primal(sized(islands(), 9))
+    net, _, _ = primal(sized(islands(), 9))
     rows = {c.name: [(loop.first, loop.last) for loop in c.loops] for c in net.constraints}
     whole = [(x.const(1), x.param("n"))]
     assert rows == {"a": whole, "c": whole}
-    net, _ = primal(sized(plain_islands(), 9))
+    net, _, _ = primal(sized(plain_islands(), 9))
     assert [c.name for c in net.coordinates] == ["C"]
     assert not net.constraints
 
@@ -317,7 +317,7 @@ def test_rows_are_cut_where_classes_change():
     loops = (Loop("i", x.const(1), n()),)
     row = Constraint("gamma", "g", (i(),), x.sub(x.var("z", "e", i()), x.var("R", "bf", i())), loops, ONE, PLACE)
     unknown = Unknown("z", ((x.const(1), n()),), ONE, PLACE)
-    found, _ = primal(sized(line(), 5, constraints=(row,), unknowns=(unknown,)))
+    found, _, _ = primal(sized(line(), 5, constraints=(row,), unknowns=(unknown,)))
     pieces = [(c.at, c.loops[0].first, c.loops[0].last) for c in found.constraints if c.name == "g"]
     assert pieces == [((i(),), x.const(1), x.const(1)), ((i(),), x.const(2), x.param("n"))]
 

@@ -52,7 +52,7 @@ def test_stores_in_series_keep_their_own_contents(tmp_path):
         watched = {"C": of("C", "be"), "B": of("B", "be"), "q": of("B", "bq"), "a": of("a", "ne")}
         return starting(pair(), (of("C", "be"), 3.0), (of("B", "be"), 2.0), observe=watched)
 
-    net, _ = primal(starting(pair(), *start))
+    net, _, _ = primal(starting(pair(), *start))
     assert [c.name for c in net.coordinates] == ["C"]
     assert [repr(k.target) for k in net.initials] == ["C"]
     assert number(net.initials[0].value) == 1.5
@@ -77,7 +77,7 @@ def test_equal_contents_need_no_parameter():
 
 
 def test_a_follower_alone_pins_the_class_at_nothing():
-    net, _ = primal(starting(pair(), (of("B", "bq"), 2.0)))
+    net, _, _ = primal(starting(pair(), (of("B", "bq"), 2.0)))
     assert [(repr(k.target), number(k.value)) for k in net.initials] == [("C", 0.0)]
     assert number(net.parameters[0].values[0]) == 2.0
 
@@ -87,7 +87,7 @@ def test_an_opposed_follower():
     net.node("a", HYDRAULIC)
     net.C("C", 0.5, "a")
     net.C("B", 0.25, "a")
-    found, _ = primal(starting(net, (of("C", "be"), 2.0), (of("B", "be"), 5.0)))
+    found, _, _ = primal(starting(net, (of("C", "be"), 2.0), (of("B", "be"), 5.0)))
     assert [c.name for c in found.coordinates] == ["C"]
     assert number(found.parameters[0].values[0]) == 1.25 + 1.0
 
@@ -106,7 +106,7 @@ def charged_run(**more):
 def test_a_run_of_stores(tmp_path):
     n = x.param("n")
     start = (of("C", "be", i()), x.index("i"), ("i", 1, n))
-    net, _ = primal(charged_run(init=(start,)))
+    net, _, _ = primal(charged_run(init=(start,)))
     assert [(c.name, c.shape) for c in net.coordinates] == [("C", ())]
     assert [(repr(k.target), number(k.value), k.loops) for k in net.initials] == [("C", 0.75, ())]
     content = next(p for p in net.parameters if p.name == "C.content")
