@@ -69,6 +69,7 @@ class Context:
         self.source = SourceText("", "")
         self.file_scope = self.scope
         self._unknown = ("E101", "unknown name '{}'")
+        self.lenient = False  # what the chosen level lacks is a note (language, decision 5)
         self.statics = False  # static quantities are in sight (expect static)
 
     @contextmanager
@@ -124,6 +125,15 @@ class Context:
             yield
         finally:
             self._unknown = before
+
+    @contextmanager
+    def leniently(self) -> Iterator[None]:
+        """What the chosen level of an instance lacks and another has is a note, and the statement is left out."""
+        before, self.lenient = self.lenient, True
+        try:
+            yield
+        finally:
+            self.lenient = before
 
     @contextmanager
     def loop(self, name: str, first: Node, last: Node, unique: bool = False) -> Iterator[Loop]:

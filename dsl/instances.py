@@ -16,7 +16,7 @@ from sysdyn.dsl.diagnostics import Place, Related, Report
 from sysdyn.dsl.elements import Elements
 from sysdyn.dsl.head import Head
 from sysdyn.dsl.laws import ONE_PORTS, TWO_PORTS, own_variables
-from sysdyn.dsl.levels import choose_level
+from sysdyn.dsl.levels import choose_level, elsewhere
 from sysdyn.dsl.parameters import Argument
 from sysdyn.dsl.parts import Nested, flatten
 from sysdyn.dsl.symbols import (
@@ -130,14 +130,14 @@ class Instances(Elements):
             chain=chain,
         )
         level, body = choose_level(self, component, s, path)
-        space.level = level
+        space.level, space.elsewhere = level, elsewhere(component, level)
         self._fill(symbol, s, component, space, list(flatten(body)))
 
     def _fill(
         self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: list[Nested]
     ) -> None:
         head = Head(body)
-        arguments = self._arguments(s, component, head)
+        arguments = self._arguments(s, component, head, space)
         inputs = self._connect(s, component, head, space)
         solve_units(self, s, space, head, arguments, inputs)
         symbol.spaces.append(space)
@@ -153,8 +153,12 @@ class Instances(Elements):
             self.bodies.append((space, body))
             self.announce(body)
 
-    def _arguments(self, s: syntax.Instance, component: ComponentSymbol, head: Head) -> dict[str, Argument]:
+    def _arguments(
+        self, s: syntax.Instance, component: ComponentSymbol, head: Head, space: Space
+    ) -> dict[str, Argument]:
+        """Values of parameters; those that a level chosen by the scene has no use for are left out."""
         found: dict[str, Argument] = {}
+        others = set(space.elsewhere) - set(head.parameters) if space.path in self.levels else ()
         for arg in s.args or ():
             if arg.name is None:
                 names = ", ".join(head.parameters)
@@ -163,6 +167,10 @@ class Instances(Elements):
                 )
             if arg.name in head.inputs:
                 head.given[arg.name] = arg.value
+                continue
+            if arg.name in others:
+                message = f"'{s.decl.name}' has no parameter '{arg.name}' at level {space.level}: left out"
+                self.report.note("N905", message, Place(self.resolver.source, arg.span))
                 continue
             if arg.name not in head.parameters:
                 near = nearest(arg.name, (*head.parameters, *head.inputs))

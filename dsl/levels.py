@@ -37,6 +37,18 @@ def choose_level(
     return chosen, (*base, *_extended(frame, component, levels, levels[chosen], ()))
 
 
+def elsewhere(component: ComponentSymbol, chosen: str | None) -> dict[str, str]:
+    """Names that other levels than the chosen one declare, with the first of these levels."""
+    found: dict[str, str] = {}
+    for level in component.body:
+        if isinstance(level, syntax.Level) and level.name.name != chosen:
+            for statement in level.body:
+                for decl in getattr(statement, "decls", (getattr(statement, "decl", None),)):
+                    if decl is not None:
+                        found.setdefault(decl.name, level.name.name)
+    return found
+
+
 def _extended(
     frame: Instances,
     component: ComponentSymbol,

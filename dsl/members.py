@@ -351,6 +351,13 @@ class Members(Names):
         if space.scope.is_broken(e.name):
             raise Failed
         level = f" at level {space.level}" if space.level else ""
+        if e.name in space.elsewhere and self.lenient:
+            message = f"'{self._shown(e.base)}' has no '{e.name}'{level}: left out"
+            self.report.note("N905", message, self.place(e.span))
+            raise Failed
+        if e.name in space.elsewhere:
+            message = f"'{self._shown(e.base)}' has no member '{e.name}'{level}"
+            raise self.fail("E102", message, e.span, help=f"level {space.elsewhere[e.name]} has it")
         names = [n for n in space.scope.symbols if n]
         near = nearest(e.name, (*names, *BRANCH) if branch is not None else names)
         help_ = f"nearest: '{near}'" if near else None

@@ -230,7 +230,7 @@ class SceneReader:
             self.guarded(self._item, item)
 
     def _item(self, item: syntax.TraceItem) -> None:
-        with self.resolver.unknown_as("E905", "trace '{}' does not exist"):
+        with self.resolver.leniently(), self.resolver.unknown_as("E905", "trace '{}' does not exist"):
             value = self.resolver.resolve(item.expr)
         if isinstance(value, Vector):
             raise self.resolver.fail(
@@ -271,7 +271,11 @@ class SceneReader:
             raise self.resolver.fail("E906", "accuracy must be positive and less than 1", s.value.span)
         names = []
         for target in s.on:
-            node = self.resolver.scalar(target).node
+            try:
+                with self.resolver.leniently():
+                    node = self.resolver.scalar(target).node
+            except Failed:
+                continue  # it has been said
             if node not in self._raw:
                 text = format_expression(target)
                 raise self.resolver.fail(

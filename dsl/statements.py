@@ -122,7 +122,8 @@ class Statements(Declarations):
         """`init ref = value`, in a model or (override) in a scene."""
         with ExitStack() as stack:
             target_syntax = self._sliced(s.target, stack)
-            target = self.resolver.scalar(target_syntax)
+            with self.resolver.leniently():
+                target = self.resolver.scalar(target_syntax)
             message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
             value = self.resolver.wanted(s.initial.value, target.dimension or NONE, "E207", message)
             for inner in ex.variables(value):

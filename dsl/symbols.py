@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -209,6 +209,7 @@ class Space:
     component: str = ""
     chain: tuple[str, ...] = ()  # components around, for the check against recursion
     level: str | None = None
+    elsewhere: Mapping[str, str] = field(default_factory=dict)  # what other levels declare, and one of these levels
     bound: dict[str, Typed] = field(default_factory=dict)  # e f q p of the component's single branch
     ends: dict[str, Any] = field(default_factory=dict)  # of its branches (instances.Ends)
     laws: dict[str, Place] = field(default_factory=dict)  # branches that have a law

@@ -201,7 +201,7 @@ def test_levels_are_chosen_by_the_scene():
 
 def test_a_member_that_the_level_lacks():
     report = network(LEVELS.replace("trace P.r.f", "trace P.l.f"), "plain")[1]
-    assert [(d.code, "simple" in d.message) for d in report] == [("E102", True)]
+    assert [(d.code, "simple" in d.message) for d in report] == [("N905", True)]
 
 
 def test_self_containing_component():

@@ -1,0 +1,61 @@
+"""What a level lacks and another has (language, decision 5): a note in traces and initial values, else an error."""
+
+import pytest
+from sysdyn.dsl import load
+from sysdyn.dsl.diagnostics import Report, SourceText
+
+TEXT = """from std.transduce import dc_motor
+from std.electrical import voltage
+
+model drive {
+  node a: electrical
+  node s: rotation
+  V: voltage(v = 1 V) a -> ground
+  M: dc_motor(K = 1 V.s/rad, R = 1 ohm, L = 1 mH, J = 1e-3 kg.m^2, b = 0 N.m.s/rad) p = a, n = ground, shaft = s
+%s}
+
+scene run of drive {
+  time 0 s to 1 s
+%s}
+"""
+
+
+@pytest.fixture
+def found(tmp_path):
+    def read(model="", scene="", levels=()):
+        report = Report()
+        source = SourceText(str(tmp_path / "drive.sd"), TEXT % (model, scene))
+        document = load.document(source, report)
+        network = load.network(document, document.models["drive"], document.scenes["run"], report, levels=levels)
+        return network, [(d.code, d.message) for d in report]
+
+    return read
+
+
+IDEAL = (("M", "ideal"),)
+ARGUMENTS = [("N905", f"'M' has no parameter '{name}' at level ideal: left out") for name in "RLJb"]
+
+
+def test_a_scene_may_choose_a_level_without_these_parameters(found):
+    network, said = found(levels=IDEAL)
+    assert said == ARGUMENTS
+    assert len(network.branches) == 3  # the source and the two sides of the gyrator
+
+
+def test_traces_and_initial_values_are_left_out(found):
+    network, said = found("  init M.Jr.f = 2 rad/s\n", "  trace s.f, M.La.f\n  accuracy 1e-6 on M.La.f\n", IDEAL)
+    left = [message for code, message in said if (code, message) not in ARGUMENTS]
+    assert left == [f"'M' has no '{name}' at level ideal: left out" for name in ("Jr", "La", "La")]
+    assert [o.name for o in network.observations] == ["s.f"]
+    assert not network.initials
+    assert found("  init M.Jr.f = 2 rad/s\n", "  trace s.f, M.La.f\n")[1] == []
+
+
+def test_elsewhere_it_is_an_error_that_names_the_level(found):
+    network, said = found("  let i = M.La.f\n", "  trace s.f\n", IDEAL)
+    assert network is None
+    assert ("E102", "'M' has no member 'La' at level ideal") in said
+
+
+def test_what_no_level_has_is_an_error(found):
+    assert [code for code, _ in found("", "  trace M.Lb.f\n")[1]] == ["E102"]
