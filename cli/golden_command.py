@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import USAGE, UsageError
+from sysdyn.cli.failures import SOLVER, USAGE, UsageError
 from sysdyn.cli.options import FORMULATIONS, Setting
 
 if TYPE_CHECKING:
@@ -29,7 +29,8 @@ def command() -> None:
     """Golden traces: results of a project's models that are kept and checked.
 
     Each model has a folder golden/NAME with golden.toml (tolerances, reasons), and for each scene a thinned trace and
-    its structure. Keep the folder in git and let CI run 'sysdyn golden check'.
+    its structure. Keep the folder in git and let CI run 'sysdyn golden check'. Each of the commands takes --json,
+    --quiet and --color.
     """
 
 
@@ -163,6 +164,7 @@ def check(
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
     from sysdyn.cli.diff_command import write
     from sysdyn.cli.diffing import junit
+    from sysdyn.cli.golden.changes import page
     from sysdyn.cli.golden.checking import checkable
 
     wrong = sorted((c for c in cases if c.exit), key=lambda c: -c.ratio)
@@ -173,7 +175,7 @@ def _report(console: Console, cases: Sequence[Case], junit_file: str | None, htm
     if junit_file:
         write(junit_file, junit([(c.label, c.seconds, c.cases) for c in cases]))
     if html_file:
-        write(html_file, _page(cases))
+        write(html_file, page(cases))
     if not console.quiet and "-" not in (junit_file, html_file):
         if wrong:
             console.data(f"{len(wrong)} of {len(cases)} checks failed; worst: {wrong[0].label}: {wrong[0].message}")
@@ -185,47 +187,47 @@ def _report(console: Console, cases: Sequence[Case], junit_file: str | None, htm
     return console.finish(max((c.exit for c in cases), default=0))
 
 
-def _page(cases: Sequence[Case]) -> str:
-    from html import escape
-
-    from sysdyn.cli.comparison_page import document
-
-    parts = [f"<h1>{sum(c.exit != 0 for c in cases)} of {len(cases)} checks failed</h1>"]
-    for case in sorted(cases, key=lambda c: c.exit == 0):
-        word = "good" if case.exit == 0 else "bad"
-        parts.append(f'<h2>{escape(case.label)}</h2><p class="{word}">{escape(case.message)}</p>')
-        wrong = [text for _, text in case.cases if text is not None]
-        if wrong:
-            parts.append("<ul>" + "".join(f"<li>{escape(text)}</li>" for text in wrong) + "</ul>")
-        parts.append(case.page)
-    return document("golden traces", "\n".join(parts))
-
-
 def _mutants(console: Console, goldens: Sequence[Golden]) -> int:
     """`check --mutate`: exit 1 where a golden does not notice a change that it could have noticed."""
     from dataclasses import asdict
 
     from sysdyn.cli.golden.checking import mutate
+    from sysdyn.cli.golden.runs import Stopped
+    from sysdyn.runtime.comparison.verdict import Incomparable
 
     found: list[Mutant] = []
+    code = 0
     for golden in goldens:
-        for mutant in mutate(golden):
-            found.append(mutant)
-            word = {True: "noticed", False: "MISSED", None: "skipped"}[mutant.noticed]
-            by = "" if mutant.noticed is None else f", {mutant.ratio:.3g} of the limit"
-            console.say(f"{word:8} {mutant.golden} {mutant.parameter}{by}")
+        try:
+            for mutant in mutate(golden):
+                found.append(mutant)
+                word = {True: "noticed", False: "MISSED", None: "skipped"}[mutant.noticed]
+                by = "" if mutant.noticed is None else f", {mutant.ratio:.3g} of the limit"
+                console.say(f"{word:8} {mutant.golden} {mutant.parameter}{by}")
+        except Stopped as error:
+            console.complain(f"{golden.label}: {error}", error.code)
+            code = max(code, error.code)
+        except Incomparable as error:
+            console.complain(f"{golden.label}: {error}", SOLVER)
+            code = max(code, SOLVER)
     tried = [m for m in found if m.noticed is not None]
-    missed = [m for m in found if not m.noticed]
+    missed = [m for m in found if m.noticed is False]
+    zeros = len(found) - len(tried)
     console.result = {
         "mutants": [asdict(m) for m in found],
         "tried": len(tried),
         "noticed": sum(bool(m.noticed) for m in tried),
+        "insensitive": sum(m.insensitive for m in tried),
     }
     if not console.quiet:
-        console.data(f"{console.result['noticed']} of {len(tried)} changes of 1 % are noticed")
+        counts = console.result
+        some = f", {counts['insensitive']} have no effect" if counts["insensitive"] else ""
+        console.data(f"{counts['noticed']} of {len(tried)} changes of 1 % are noticed{some}")
         for m in missed:
             console.data(f"  {m.golden}: {m.parameter}: {m.reason}")
-    return console.finish(1 if any(m.noticed is False for m in found) else 0)
+        if zeros:
+            console.data(f"  {zeros} parameters are 0: a share of them changes nothing")
+    return console.finish(max(code, 1 if any(m.noticed is False and not m.insensitive for m in found) else 0))
 
 
 @_add("accept")
@@ -239,6 +241,7 @@ def accept(
 ) -> int:
     """Show what changed in the goldens NAME... and, with a reason, record them anew."""
     from sysdyn.cli.golden import book
+    from sysdyn.cli.golden.changes import what_changed
 
     if reason is not None and not reason.strip():
         raise UsageError("--reason is empty: say why the change is right")
@@ -251,7 +254,7 @@ def accept(
         if found is None:
             code = max(code, 1)
             continue
-        change, text = _change(golden, wanted, found)
+        change, text = what_changed(golden, wanted, found)
         changes.append({"golden": golden.label, "change": change})
         if not console.quiet:
             console.data(f"{golden.label}: {text}")
@@ -273,49 +276,6 @@ def _again(console: Console, golden: Golden) -> Recorded | None:
 
     only = golden.formulations[0] if len(golden.formulations) == 1 else None
     return _measured(console, request_of(golden, accuracy=None, formulation=only), golden.rtol, golden.atol)
-
-
-def _change(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str | None, str]:
-    """(one line, all of it) of what differs between what is kept and what was found; None: nothing."""
-    from sysdyn.cli.diffing import differences, headline, table
-    from sysdyn.cli.golden.checking import changed, loaded, tolerance_of
-    from sysdyn.runtime.comparison.verdict import Incomparable
-    from sysdyn.runtime.failures import TraceError
-
-    lines, first = [], None
-    try:
-        verdict = differences(loaded(golden), found.trace, tolerance_of(golden))
-        if not verdict.equal:
-            first = headline(verdict)
-            lines += [first, table(verdict)]
-    except (Incomparable, TraceError, OSError) as error:
-        first = str(error)
-        lines.append(first)
-    try:
-        kept = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        kept = {}
-        lines.append(f"{golden.structure}: {error}")
-    new = json.loads(json.dumps(found.structure))
-    for name in dict.fromkeys((*kept, *new)):
-        if name not in kept or name not in new:
-            lines.append(f"formulation {name} is {'new' if name in new else 'gone'}")
-            continue
-        facts = dict.fromkeys((*kept[name], *new[name]))
-        lines += [
-            f"{name}: {changed(k, kept[name].get(k), new[name].get(k))}"
-            for k in facts
-            if kept[name].get(k) != new[name].get(k)
-        ]
-    if wanted.rtol != golden.rtol:
-        lines.append(f"rtol {golden.rtol:g} becomes {wanted.rtol:g}")
-    for name in ("energy", "constraints"):
-        before, after = getattr(golden, name), getattr(found, name)
-        if after > 10.0 * before:
-            lines.append(f"bound of audit.{name}: {before:.2g} becomes {after:.2g}")
-    if not lines:
-        return None, "nothing changed"
-    return first or lines[0], "\n".join(lines)
 
 
 @_add("list")

@@ -16,6 +16,7 @@ from sysdyn.cli.diffing import as_json, cases, common, differences, headline
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.runs import Run, Stopped, between, run
+from sysdyn.cli.golden.structures import changed
 from sysdyn.cli.running import Request
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.recorded import Recorded
@@ -25,6 +26,10 @@ from sysdyn.runtime.failures import TraceError
 DIFFERENT, SOLVER, INPUT_OUTPUT = 1, 3, 5
 SHARE = 0.01
 """By which `--mutate` changes a parameter."""
+NO_EFFECT = 0.05
+"""Of the limit: what a changed parameter moves by less is the difference of two integrations."""
+ELEMENTS = 4
+"""Elements of a parameter array that it changes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +60,16 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One parameter changed by SHARE.  noticed: None where it could not be changed (reason says why)."""
+    """One parameter changed by SHARE.  noticed: None where it could not be changed (reason says why); insensitive: not
+    noticed because nothing that is traced depends on it.
+    """
 
     golden: str
     parameter: str
     noticed: bool | None
     ratio: float
     reason: str
+    insensitive: bool = False
 
 
 def request_of(golden: Golden, **options: Any) -> Request:
@@ -86,6 +94,17 @@ def loaded(golden: Golden) -> Arrays:
             source.events,
             source.time_unit,
         )
+
+
+def structure_of(golden: Golden, formulation: str) -> dict[str, Any]:
+    """The kept structure of one formulation.  Raises TraceError, OSError."""
+    text = golden.structure.read_bytes()
+    try:
+        found = json.loads(text)["formulations"][formulation]
+        found["quantities"] = list(map(str, found["quantities"]))
+        return dict(found)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise TraceError(f"{golden.structure}: not readable: {type(error).__name__}: {error}") from error
 
 
 def check(
@@ -115,11 +134,11 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
 
     try:
         kept = loaded(golden)
-        structure = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"][formulation]
+        structure = structure_of(golden, formulation)
     except (Incomparable, TraceError) as error:
         return stopped(INPUT_OUTPUT, str(error))
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        return stopped(INPUT_OUTPUT, f"{golden.structure}: {type(error).__name__}: {error}")
+    except OSError as error:
+        return stopped(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
     try:
         options = {"formulation": formulation, "backend": backend, "method": method or None}
         one = run(request_of(golden, **options), between(kept.time))
@@ -177,23 +196,6 @@ def _structural(kept: dict[str, Any], found: dict[str, Any]) -> list[tuple[str, 
     return [(f"structure: {name}", None if a == b else changed(name, a, b)) for name, a, b in facts]
 
 
-def changed(name: str, kept: Any, found: Any) -> str:
-    """What changed in one fact: the numbers, or the first lines that are not in the other."""
-    if not (isinstance(kept, list) and isinstance(found, list)):
-        return f"{name} is {found}, recorded {kept}"
-
-    def text(item: Any) -> str:
-        return " ".join(map(str, item)) if isinstance(item, list) else str(item)
-
-    gone = [text(item) for item in kept if item not in found]
-    new = [text(item) for item in found if item not in kept]
-    if not gone and not new:
-        return f"{name} are in another order"
-    parts = [f"'{new[0]}' is new" if new else "", f"'{gone[0]}' is gone" if gone else ""]
-    more = max(len(new) - 1, 0) + max(len(gone) - 1, 0)
-    return f"{name}: {', '.join(p for p in parts if p)}" + (f" and {more} more" if more else "")
-
-
 def _meters(golden: Golden, one: Run) -> list[tuple[str, str | None]]:
     """The meters against their bounds."""
     found: list[tuple[str, str | None]] = []
@@ -210,33 +212,53 @@ def _meters(golden: Golden, one: Run) -> list[tuple[str, str | None]]:
 def mutate(golden: Golden) -> Iterator[Mutant]:
     """Each parameter of the scene changed by SHARE: does the golden notice?  Raises Stopped where no run succeeds."""
     kept = loaded(golden)
-    known = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"]
     formulation = golden.formulations[0]
+    structure = structure_of(golden, formulation)
     base = run(request_of(golden, formulation=formulation), between(kept.time))
-    for name, value in base.parameters.items():
+    for name in _some(base.parameters):
+        value = base.parameters[name]
         if value == 0.0 or not np.isfinite(value):
             yield Mutant(golden.label, name, None, 0.0, f"it is {value:g}: a share of it changes nothing")
             continue
         settings = (*golden.settings, (name, repr(value * (1.0 + SHARE))))
         try:
             one = run(request_of(golden, formulation=formulation, settings=settings), between(kept.time))
-            verdict = _verdict(golden, kept, one, known[formulation])
+            verdict = _verdict(golden, kept, one, structure)
         except (Stopped, UsageError, Incomparable) as error:
             message = error.message if isinstance(error, UsageError) else str(error)
             yield Mutant(golden.label, name, True, np.inf, f"the model refuses it: {message}")
             continue
         worst = verdict.worst
         ratio = worst.worst.ratio if worst else 0.0
-        reason = "" if not verdict.equal else _insensitive(base, one, ratio)
-        yield Mutant(golden.label, name, not verdict.equal, ratio, reason)
+        if not verdict.equal:
+            yield Mutant(golden.label, name, True, ratio, "")
+            continue
+        effect = _effect(base, one, tolerance_of(golden))
+        insensitive = effect < NO_EFFECT
+        reason = f"it moves the traced quantities by {effect:.2g} of the limit: " + (
+            "none depends on it"
+            if insensitive
+            else "trace one that depends more on it, or record with a smaller --rtol"
+        )
+        yield Mutant(golden.label, name, False, ratio, reason, insensitive)
 
 
-def _insensitive(base: Run, mutant: Run, ratio: float) -> str:
-    one, two = base.trace.values, mutant.trace.values
-    same = all(np.array_equal(one[name], values) for name, values in two.items() if name in one)
-    if same and base.trace.time.size == mutant.trace.time.size:
-        return "no traced quantity depends on it"
-    return f"the traced quantities move by {ratio:.2g} of the limit: trace one that depends on it, or a smaller rtol"
+def _some(parameters: dict[str, float]) -> list[str]:
+    """Names of parameters; of an array at most ELEMENTS elements, its ends among them."""
+    families: dict[str, list[str]] = {}
+    for name in parameters:
+        families.setdefault(name.partition("[")[0], []).append(name)
+    picked = []
+    for names in families.values():
+        count = min(len(names), ELEMENTS)
+        picked += [names[round(k * (len(names) - 1) / max(count - 1, 1))] for k in range(count)]
+    return picked
+
+
+def _effect(base: Run, mutant: Run, tolerance: Tolerance) -> float:
+    """How far the change moves the traces, in limits."""
+    worst = differences(base.trace, mutant.trace, tolerance).worst
+    return worst.worst.ratio if worst else 0.0
 
 
 def checkable(case: Case) -> dict[str, Any]:

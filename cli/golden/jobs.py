@@ -47,7 +47,8 @@ def _one(golden: Golden, root: Path, options: Sequence[str]) -> list[Case]:
     message = f"the check {how}: {last}"
     seconds = time.monotonic() - began
     wrong = (("run", message),)
-    return [Case(golden.label, "", "", "", INPUT_OUTPUT, message, float("inf"), None, None, seconds, wrong)]
+    code = ran.returncode if ran.returncode > 1 else INPUT_OUTPUT
+    return [Case(golden.label, "", "", "", code, message, float("inf"), None, None, seconds, wrong)]
 
 
 def _case(item: dict[str, Any]) -> Case:

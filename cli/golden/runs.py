@@ -20,7 +20,7 @@ from sysdyn.runtime.trace import Trace
 
 INSTANTS = 2000
 """Rows of each run besides its steps: what has no stored rate is a line between them."""
-PARTS = 8
+PARTS = 16
 """Parts of each cell of the kept trace at whose ends a run has rows too: dense where the curves are not smooth."""
 CLAIMS = ("E907", "E909")
 """Expectations are judged by `simulate`, at the scene's own accuracy."""

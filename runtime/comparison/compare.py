@@ -1,34 +1,19 @@
-"""Two traces into a verdict, block by block: memory holds the instants of both and a block of one quantity.
+"""Two traces into a verdict: units, names, span and events; their quantities by quantities.py.
 
-The instants of both traces divide the common span into cells in which both curves are cubics.  In each cell the largest
-difference is compared with the limit in closed form; cells beyond it are judged by the tube in value and time
-(tube.py).  Where a whole cell of one is a whole cell of the other and only one has rates, both are lines there: the
-rows say all that both know.  Limits stand on the reference's nominal magnitudes in both directions, so the verdict is
-symmetric but for those.
+Limits stand on the reference's nominal magnitudes in both directions, so the verdict is symmetric but for those.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.comparison.curve import (
-    Curve,
-    Flags,
-    Floats,
-    Ints,
-    bernstein,
-    cells_at,
-    largest_magnitude,
-    value_at,
-    whole_cells,
-)
-from sysdyn.runtime.comparison.tube import band, outside
+from sysdyn.runtime.comparison.curve import Floats
+from sysdyn.runtime.comparison.quantities import Pair, compared, lonely, ratio_of
 from sysdyn.runtime.comparison.verdict import (
     SHARE,
-    About,
     Compared,
     Event,
     Incomparable,
@@ -39,10 +24,6 @@ from sysdyn.runtime.comparison.verdict import (
     rank,
 )
 
-BLOCK = 1 << 16
-"""Cells at a time: about 30 arrays of half a megabyte."""
-FIRST = 64
-"""Cells beyond the limit that are judged by the tube at first: most often they decide."""
 LONELY = 10_000
 """Rows that share their instant with both neighbours: more of them are no trace."""
 PAIRS = 64
@@ -71,7 +52,7 @@ def compare(ref: Source, test: Source, tolerance: Tolerance, convert: Convert = 
     pairs, unmatched, notes = _matched(ref, test, convert)
     if not pairs and not any(c.status == "unit" for c in unmatched):
         raise Incomparable(_nothing_common(ref, test))
-    found = _compared(ref, test, times, pairs, asked, rescaled[0])
+    found = compared(ref, test, times, pairs, asked, rescaled[0])
     missing = [c.name for c in unmatched if c.status == "missing"]
     extra = [c.name for c in unmatched if c.status == "extra"]
     renamed = _renamed(ref, test, times, missing, extra, asked, rescaled[0], convert)
@@ -97,27 +78,11 @@ def _sound(which: str, time: Floats) -> None:
     if back.size:
         k = int(back[0])
         raise Incomparable(f"time of the {which} goes back from {time[k]:.9g} to {time[k + 1]:.9g} in row {k + 2}")
-    if np.count_nonzero(_lonely(time)) > LONELY and time.size > 1:
+    if np.count_nonzero(lonely(time)) > LONELY and time.size > 1:
         raise Incomparable(f"the {which} has more than {LONELY} rows at instants that others share")
 
 
-def _lonely(time: Floats) -> Flags:
-    """Rows that are the end of no cell."""
-    step = np.diff(time) > 0.0
-    return ~(np.append(step, False) | np.insert(step, 0, False))
-
-
-@dataclass(frozen=True, slots=True)
-class _Pair:
-    """A quantity of both: its name in each; scale, offset: from the test's unit to the reference's."""
-
-    ref: About
-    test: About
-    scale: float
-    offset: float
-
-
-def _matched(ref: Source, test: Source, convert: Convert) -> tuple[list[_Pair], list[Compared], tuple[str, ...]]:
+def _matched(ref: Source, test: Source, convert: Convert) -> tuple[list[Pair], list[Compared], tuple[str, ...]]:
     pairs, unmatched, notes = [], [], []
     for name, about in ref.quantities.items():
         if name not in test.quantities:
@@ -131,7 +96,7 @@ def _matched(ref: Source, test: Source, convert: Convert) -> tuple[list[_Pair], 
             continue
         if other.unit != about.unit:
             notes.append(f"{name}: the test's '{other.unit}' is converted to '{about.unit}'")
-        pairs.append(_Pair(about, other, *conversion))
+        pairs.append(Pair(about, other, *conversion))
     for name, about in test.quantities.items():
         if name not in ref.quantities:
             unmatched.append(Compared(name, "extra", Worst(math.inf), about.unit, note="the reference lacks it"))
@@ -164,288 +129,11 @@ def _renamed(
             if conversion is None or any(new == taken for _, taken in found) or tried == PAIRS:
                 continue
             tried += 1
-            pair = _Pair(ref.quantities[old], test.quantities[new], *conversion)
-            if _compared(ref, test, times, [pair], tolerance, time_scale)[0].equal:
+            pair = Pair(ref.quantities[old], test.quantities[new], *conversion)
+            if compared(ref, test, times, [pair], tolerance, time_scale)[0].equal:
                 found.append((old, new))
                 break
     return found
-
-
-# ---- quantities
-
-
-@dataclass(slots=True)
-class _State:
-    """What is known of a pair so far."""
-
-    pair: _Pair
-    nominal: float
-    limit: float
-    worst: Worst
-    status: str = "equal"
-    note: str = ""
-
-
-def _compared(
-    ref: Source,
-    test: Source,
-    times: tuple[Floats, Floats],
-    pairs: Sequence[_Pair],
-    tolerance: Tolerance,
-    time_scale: float,
-) -> list[Compared]:
-    """All pairs, blocks outside, quantities inside.  time_scale: of the test's time."""
-    states = [_state(ref, pair, tolerance, times[0].size) for pair in pairs]
-    tau = tolerance.tau or 0.0
-    for block in _blocks(*times):
-        rows = tuple(_rows(time, block, tau) for time in times)
-        inner = tuple(cells_at(t[a:b], block.left) for t, (a, b) in zip(times, rows, strict=True))
-        cells = (inner[0], inner[1])
-        for state in states:
-            if state.status == "nominal":
-                continue
-            curves = _curves(ref, test, times, rows, state.pair, time_scale)
-            if block.last or block.first:
-                _ends(state, curves, block, tau)
-            _nonfinite(state, curves, tau)
-            _block(state, curves, cells, block, tau)
-    return [_result(state) for state in states]
-
-
-def _state(ref: Source, pair: _Pair, tolerance: Tolerance, rows: int) -> _State:
-    nominal = pair.ref.nominal
-    if nominal is None:
-        nominal = 0.0
-        for first in range(0, rows, BLOCK):
-            values = ref.read(pair.ref.name, first, min(first + BLOCK, rows))[0]
-            nominal = max(nominal, float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)))
-    if not (math.isfinite(nominal) and nominal >= 0.0):
-        note = f"its nominal magnitude in the reference is {nominal:g}"
-        return _State(pair, nominal, math.nan, Worst(math.inf), "nominal", note)
-    return _State(pair, nominal, tolerance.atol + tolerance.rtol * nominal, Worst())
-
-
-def _result(state: _State) -> Compared:
-    status = "nonfinite" if state.status == "nominal" else state.status
-    if status == "equal" and state.worst.ratio > 1.0:
-        status = "differs"
-    return Compared(
-        state.pair.ref.name, status, state.worst, state.pair.ref.unit, state.nominal, state.limit, state.note
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Block:
-    """Cells of the common grid: left, right [m] s; first, last: it touches the ends; same: rows of both are equal."""
-
-    left: Floats
-    right: Floats
-    first: bool
-    last: bool
-    same: bool
-
-
-def _blocks(ref: Floats, test: Floats) -> Iterator[_Block]:
-    """The common span in blocks; one empty block where it is a point or there is none."""
-    low, high = max(ref[0], test[0]), min(ref[-1], test[-1])
-    same = ref.size == test.size and np.array_equal(ref, test)
-    edges = ref if same else np.concatenate([ref, test])
-    edges = np.unique(edges[(edges >= low) & (edges <= high)])
-    if edges.size < 2:
-        yield _Block(edges[:0], edges[:0], True, True, same)
-        return
-    for first in range(0, edges.size - 1, BLOCK):
-        part = edges[first : first + BLOCK + 1]
-        yield _Block(part[:-1], part[1:], first == 0, first + BLOCK >= edges.size - 1, same)
-
-
-def _rows(time: Floats, block: _Block, tau: float) -> tuple[int, int]:
-    """Rows that a block needs: those of its cells, those within tau, and all at its ends."""
-    if not block.left.size:
-        return 0, time.size
-    first = 0 if block.first else int(np.searchsorted(time, block.left[0] - tau, side="left")) - 1
-    last = time.size if block.last else int(np.searchsorted(time, block.right[-1] + tau, side="right")) + 1
-    return max(first, 0), min(last, time.size)
-
-
-def _curves(
-    ref: Source,
-    test: Source,
-    times: tuple[Floats, Floats],
-    rows: tuple[tuple[int, int], ...],
-    pair: _Pair,
-    time_scale: float,
-) -> tuple[Curve, Curve]:
-    """The rows of both, the test's in the units of the reference."""
-    (a, b), (c, d) = rows
-    values, rates = ref.read(pair.ref.name, a, b)
-    one = Curve(times[0][a:b], values, rates)
-    values, rates = test.read(pair.test.name, c, d)
-    if (pair.scale, pair.offset, time_scale) != (1.0, 0.0, 1.0):
-        values = values * pair.scale + pair.offset
-        rates = None if rates is None else rates * (pair.scale / time_scale)
-    return one, Curve(times[1][c:d], values, rates)
-
-
-def _block(state: _State, curves: tuple[Curve, Curve], cells: tuple[Ints, Ints], block: _Block, tau: float) -> None:
-    """Cells of one block: the largest difference, then the tube where it is beyond the limit."""
-    if not block.left.size:
-        return
-    pieces = [
-        whole_cells(curve, cell) if block.same else bernstein(curve, cell, block.left, block.right)
-        for curve, cell in zip(curves, cells, strict=True)
-    ]
-    _as_lines(pieces, curves, cells, block)
-    with np.errstate(invalid="ignore", over="ignore"):
-        difference = pieces[1] - pieces[0]
-        size = np.abs(difference)
-    bound = size.max(axis=0)
-    if not math.isfinite(float(bound.max())):
-        defined = [np.isfinite(curve.values) for curve in curves]
-        whole = [d[cell] & d[cell + 1] for d, cell in zip(defined, cells, strict=True)]
-        one = np.flatnonzero(whole[0] != whole[1])
-        if one.size:
-            _undefined(state, float(block.left[one[0]]), "only one of the traces is a number there")
-        bad = ~np.isfinite(bound)
-        wild = np.flatnonzero(bad & whole[0] & whole[1])
-        if wild.size:
-            _undefined(state, float(block.left[wild[0]]), "the difference is beyond floating point")
-        bound = np.where(bad, 0.0, bound)
-        size = np.where(bad, 0.0, size)
-    deviation = np.maximum(size[0], size[3])
-    best = max(float(deviation.max()), state.worst.ratio * state.limit if math.isfinite(state.worst.ratio) else 0.0)
-    x = np.where(size[3] > size[0], 1.0, 0.0)
-    inner = np.flatnonzero((bound > best) | ((bound > state.limit) & (deviation <= state.limit)))
-    if inner.size:
-        deviation[inner], x[inner] = largest_magnitude(difference[:, inner])
-    beyond = np.flatnonzero(deviation > state.limit)
-    if beyond.size and tau > 0.0:
-        moment = block.left + x * (block.right - block.left)
-        _forgive(deviation, moment, beyond, state, curves, block, tau)
-        k = int(np.argmax(deviation))
-        _keep(state, float(deviation[k]), float(moment[k]), k, pieces, block)
-        return
-    k = int(np.argmax(deviation))
-    _keep(state, float(deviation[k]), float(block.left[k] + x[k] * (block.right[k] - block.left[k])), k, pieces, block)
-
-
-def _as_lines(pieces: list[Floats], curves: tuple[Curve, Curve], cells: tuple[Ints, Ints], block: _Block) -> None:
-    """Cells of both traces at once of which only one has rates are compared as lines: the other says no more there."""
-    lines = [_lines(curve, cell) for curve, cell in zip(curves, cells, strict=True)]
-    mixed = lines[0] != lines[1]
-    if mixed.any() and not block.same:
-        for curve, cell in zip(curves, cells, strict=True):
-            mixed &= (curve.time[cell] == block.left) & (curve.time[cell + 1] == block.right)
-    if not mixed.any():
-        return
-    for piece in pieces:
-        first, last = piece[0, mixed], piece[3, mixed]
-        with np.errstate(invalid="ignore", over="ignore"):
-            piece[1, mixed], piece[2, mixed] = first + (last - first) / 3.0, last - (last - first) / 3.0
-
-
-def _lines(curve: Curve, cell: Ints) -> Flags:
-    """Cells without a rate at one of their ends."""
-    if curve.rates is None:
-        return np.ones(cell.size, dtype=np.bool_)
-    known = np.isfinite(curve.rates)
-    return ~(known[cell] & known[cell + 1])
-
-
-def _forgive(
-    deviation: Floats,
-    moment: Floats,
-    beyond: Ints,
-    state: _State,
-    curves: tuple[Curve, Curve],
-    block: _Block,
-    tau: float,
-) -> None:
-    """Replace differences beyond the limit by distances from the tube, the largest first, until no other can win."""
-    order = beyond[np.argsort(-deviation[beyond], kind="stable")]
-    best, size = 0.0, FIRST
-    while order.size:
-        now, order = np.sort(order[:size]), order[size:]
-        found = outside(*curves, block.left[now], block.right[now], moment[now], state.limit, tau)
-        deviation[now] = np.minimum(found.distance, deviation[now])
-        moment[now] = np.where(found.distance > 0.0, found.time, moment[now])
-        best = max(best, float(deviation[now].max()))
-        if order.size and best > state.limit and best >= 0.5 * deviation[order[0]]:
-            # distances are at most the differences: the worst is known within a factor of two
-            deviation[order] = np.minimum(deviation[order], best)
-            return
-        size *= 8
-
-
-def _keep(state: _State, deviation: float, moment: float, k: int, pieces: Sequence[Floats], block: _Block) -> None:
-    ratio = _ratio(deviation, state.limit)
-    if ratio > state.worst.ratio or (math.isnan(state.worst.time) and ratio == state.worst.ratio):
-        width = block.right[k] - block.left[k]
-        x = np.array([(moment - block.left[k]) / width if width > 0.0 else 0.0])
-        reference, test = (float(value_at(b[:, k : k + 1], x)[0]) for b in pieces)
-        state.worst = Worst(ratio, moment, reference, test)
-
-
-def _ratio(deviation: float, limit: float) -> float:
-    if deviation == 0.0:
-        return 0.0
-    return deviation / limit if limit > 0.0 else math.inf
-
-
-def _undefined(state: _State, time: float, note: str) -> None:
-    if state.status != "nonfinite":
-        state.status, state.note, state.worst = "nonfinite", note, Worst(math.inf, time)
-
-
-def _nonfinite(state: _State, curves: tuple[Curve, Curve], tau: float) -> None:
-    """Each row that is no number has one of the same kind at the same instant in the other trace."""
-    kinds = [_kinds(curve.values) for curve in curves]
-    if not (kinds[0].any() or kinds[1].any()):
-        return
-    for one, two, which in ((0, 1, "reference"), (1, 0, "test")):
-        rows = np.flatnonzero(kinds[one])
-        if not rows.size:
-            continue
-        time = curves[two].time
-        at = curves[one].time[rows]
-        found = np.zeros(rows.size, dtype=bool)
-        near = np.searchsorted(time, at)
-        for step in (-1, 0, 1):
-            k = np.clip(near + step, 0, time.size - 1)
-            found |= (np.abs(time[k] - at) <= tau) & (kinds[two][k] == kinds[one][rows])
-        inside = (at >= time[0] - tau) & (at <= time[-1] + tau)
-        bad = np.flatnonzero(~found & inside)
-        if bad.size:
-            value = curves[one].values[rows[bad[0]]]
-            _undefined(state, float(at[bad[0]]), f"the {which} is {value:g} there")
-            state.worst = replace(state.worst, **{which: float(value)})
-
-
-def _kinds(values: Floats) -> Ints:
-    """0 a number, 1 NaN, 2 +Inf, 3 -Inf [n]."""
-    return np.where(np.isfinite(values), 0, np.where(np.isnan(values), 1, np.where(values > 0, 2, 3)))
-
-
-def _ends(state: _State, curves: tuple[Curve, Curve], block: _Block, tau: float) -> None:
-    """Rows that are the end of no cell: single points, more than two rows at one instant, jumps at the very ends."""
-    for one, two in ((0, 1), (1, 0)):
-        curve, other = curves[one], curves[two]
-        for k in np.flatnonzero(_lonely(curve.time)):
-            instant, value = float(curve.time[k]), float(curve.values[k])
-            if not math.isfinite(value):
-                continue
-            low, high = band(other, instant, tau)
-            if low > high:
-                continue  # the coverage says so
-            distance = float(max(low - value, value - high, 0.0))
-            ratio = _ratio(distance, state.limit)
-            if ratio > state.worst.ratio:
-                nearest = float(low if value < low else high)
-                pair = (value, nearest) if one == 0 else (nearest, value)
-                state.worst = Worst(ratio, instant, *pair)
-
-
-# ---- the traces as a whole
 
 
 def _coverage(times: tuple[Floats, Floats], tau: float) -> list[Compared]:
@@ -474,7 +162,7 @@ def _events(ref: Source, test: Source, rescaled: tuple[float, float], tau: float
             note = f"event {k + 1} is '{b.name}' at {b.time:.9g}, in the reference '{a.name}' at {a.time:.9g}"
             return [Compared("events", "events", Worst(math.inf, a.time, a.time, b.time), "s", note=note)]
         gap = abs(b.time - a.time)
-        ratio = _ratio(gap, tau) if math.isfinite(gap) else math.inf
+        ratio = ratio_of(gap, tau) if math.isfinite(gap) else math.inf
         if ratio >= worst.ratio:
             worst = Worst(ratio, a.time, a.time, b.time)
     if len(one) != len(two):

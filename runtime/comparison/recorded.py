@@ -87,7 +87,8 @@ class Recorded:
         nominal = item.attrs.get("nominal")
         if nominal is not None:
             array = np.asarray(nominal)
-            nominal = float(array) if array.ndim == 0 and array.dtype.kind in "fiu" else math.nan
+            nominal = float(array.ravel()[0]) if array.size == 1 and array.dtype.kind in "fiu" else math.nan
+            nominal = nominal or None  # a run that was killed has not yet said one
         return About(name, _text(item.attrs.get("units", "1")), nominal)
 
     def _events(self, found: Any) -> tuple[Event, ...]:

@@ -1,6 +1,7 @@
 """`sysdyn golden`: a project's goldens recorded, checked, sabotaged, accepted."""
 
 import json
+import sys
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
@@ -251,6 +252,23 @@ def test_broken_goldens_are_said(project, capsys, jobs):
     assert "not readable as a trace" in out
     assert "swing.json" in out
     assert out.startswith("4 of 8 checks failed")
+
+
+def test_a_check_that_is_killed_costs_no_other(project, capsys, monkeypatch):
+    killed = project / "python"
+    killed.write_text(
+        f"""#!/bin/sh
+case "$*" in *pendulum*) kill -9 $$;; esac
+exec {sys.executable} "$@"
+"""
+    )
+    killed.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(killed))
+    code, found = run_json(capsys, "golden", "check", "--jobs", "2")
+    assert code == 5
+    messages = {c["golden"]: c["message"] for c in found["result"]["checks"]}
+    assert "killed by signal 9" in messages["pendulum/swing"]
+    assert messages["spring/ring"].startswith("equal")
 
 
 BROKEN_BOOKS = ["", "[", "version = 9", "version = 1\nmodel = 3", "version = 1\nmodel = 'a'\nscenes = 4"]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from corpus import bouncing, oscillator
 from sysdyn.cli.golden.trace_file import write_trace
-from sysdyn.runtime.comparison import compare as comparison
+from sysdyn.runtime.comparison import quantities
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
@@ -48,7 +48,7 @@ def test_blocks_do_not_change_the_verdict(file, tmp_path, monkeypatch):
     write_trace(tmp_path / "other.h5", other.arrays(), {}, 1e9)
     whole = [(c.name, c.worst) for c in verdict(file, tmp_path / "other.h5").quantities]
     for block in (7, 64):
-        monkeypatch.setattr(comparison, "BLOCK", block)
+        monkeypatch.setattr(quantities, "BLOCK", block)
         pieces = [(c.name, c.worst) for c in verdict(file, tmp_path / "other.h5").quantities]
         for (name, one), (_, two) in zip(whole, pieces, strict=True):
             assert one.ratio == pytest.approx(two.ratio, rel=1e-9), name
