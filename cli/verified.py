@@ -9,10 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from sysdyn.cli.agreement import Bounds, Gap, gaps
+from sysdyn.cli.agreement import ROUNDING, Bounds, Gap, gaps
 from sysdyn.cli.twins import Twins
 from sysdyn.runtime.simulate import Outcome
 from sysdyn.runtime.trace import Trace
+
+BOOKS = 10.0
+"""Energy balance allowed: times the accuracy asked, of the largest energy stored, dissipated or supplied."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,17 @@ class Run:
     def energy(self) -> float:
         """Largest |energy balance| (J)."""
         return float(np.max(np.abs(self.trace["audit.energy"].values), initial=0.0))
+
+    @property
+    def turnover(self) -> float:
+        """Largest energy that was stored, dissipated or supplied (J)."""
+        return self.trace["audit.energy"].nominal or 0.0
+
+    @property
+    def books(self) -> float:
+        """Energy balance in units of what is allowed: BOOKS x accuracy of the turnover."""
+        allowed = max(BOOKS * self.accuracy, ROUNDING) * self.turnover
+        return self.energy / allowed if allowed > 0.0 else (np.inf if self.energy > 0.0 else 0.0)
 
     @property
     def constraints(self) -> float:

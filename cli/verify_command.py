@@ -99,7 +99,13 @@ def _complaints(found: Verified) -> list[str]:
         for t in found.twins
         if not t.agree
     ]
-    return [*shortened(pairs), *carriers]
+    books = [
+        f"{run.name}: the energy balance is off by {run.energy:.2g} J of {run.turnover:.2g} J, "
+        f"{run.books:.3g} times what is allowed"
+        for run in found.runs
+        if run.books > 1.0 and not run.failure
+    ]
+    return [*shortened(pairs), *shortened(books), *carriers]
 
 
 def _apart(gap: Gap) -> str:

@@ -12,10 +12,12 @@ initial positions become initial contents of the stores between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
+from sysdyn.compiler.initially import initially
+from sysdyn.compiler.linkages import with_linkages
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Place
 from sysdyn.dsl.expression import Node
@@ -49,7 +51,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    network = _with_contents(_from_stores(as_elements(network)))
+    network = with_linkages(_with_contents(_from_stores(as_elements(network))))
     bare = network
     network = _with_positions(network)
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
@@ -261,40 +263,28 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
 
 def _with_contents(network: Network) -> Network:
     """Initial positions of common-flow nodes as initial displacements of the potential stores between them."""
-    given: dict[_At, Initial] = {}
+    positions: dict[str, list[Initial]] = {}
     for initial in network.initials:
         if initial.target.op == "var" and initial.target.data[1] == "nq":
-            given[initial.target.data[0], initial.target.args] = initial
+            positions.setdefault(initial.target.data[0], []).append(initial)
+    given = {(name, i.target.args): i for name, found in positions.items() for i in found}
     written = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] in ("bq", "be")}
     added = []
     for b in network.branches:
         if b.kind != "potential" or b.domain.common != "flow" or b.name in written or b.on is not None:
             continue
-        ends = [_start(t, given, b) for t in (b.plus, b.minus)]
+        ends = [_start(t, positions) for t in (b.plus, b.minus)]
         value = ex.sub(ends[0][0], ends[1][0])
         target = ex.var(b.name, "bq", *b.at)
         added.append(Initial(target, value, ends[0][1] and ends[1][1], b.loops, b.place))
     return replace(network, initials=(*network.initials, *added, *_chained(network, given)))
 
 
-def _start(
-    terminal: Terminal | None, given: Mapping[_At, Initial], branch: Branch
-) -> tuple[Node, bool]:
+def _start(terminal: Terminal | None, positions: Mapping[str, Sequence[Initial]]) -> tuple[Node, bool]:
     """The initial position of a terminal over the branch's loops, and whether it is fixed; ~ 0 where none is."""
     if terminal is None or terminal.node is None:
         return ex.const(0.0), True
-    for (name, at), initial in given.items():
-        if name == terminal.node:
-            change = {}
-            fits = True
-            for own, asked in zip(at, terminal.at, strict=True):
-                if own.op == "index":
-                    change[own] = asked
-                elif own is not asked:
-                    fits = False
-            if fits:
-                return ex.substitute(initial.value, change), initial.fixed
-    return ex.const(0.0), False
+    return initially(positions.get(terminal.node, ()), terminal.at) or (ex.const(0.0), False)
 
 
 def _chained(network: Network, given: Mapping[_At, Initial]) -> Iterator[Initial]:

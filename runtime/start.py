@@ -234,19 +234,33 @@ def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) 
     in the magnitudes of the solution too.
     """
     at, best = x, Solution(x, np.inf, np.zeros(0))
-    for number in range(_RESCALINGS):
+    empty = None
+    for _ in range(_RESCALINGS):
+        scale = starter.scale(t, at)
         found = solve(_problem(starter, t, at, guess, rows=starter.every, free=free), best.x)
-        if number and best.residual >= EXACT and not found.residual < best.residual:
-            break
+        if empty is not None and found.residual >= EXACT and not found.residual < best.residual:
+            if at is empty:
+                break
+            at = empty
+            continue
         best = found
         if not np.isfinite(best.residual):
             break
-        at = starter.without_noise(best.x, starter.scale(t, at))
-        size = _row_scale(starter, t, at, starter.scale(t, at))[starter.every]
-        own, clean = (np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0) for x in (best.x, at))
-        if best.residual < EXACT and own < OWN:
-            return Solution(at, best.residual, best.scaled) if clean < max(own, EXACT) else best, True
+        at = starter.without_noise(best.x, scale)
+        # what is far below its magnitude may be zero, which has none of its own
+        empty = np.where(free & (np.abs(at) < OWN * scale), 0.0, at)
+        for candidate in (at, empty) if best.residual < EXACT else ():
+            if _own(starter, t, candidate, candidate) < OWN:
+                return Solution(candidate, best.residual, best.scaled), True
+            if candidate is at and _own(starter, t, at, best.x) < OWN:
+                return best, True
     return best, False
+
+
+def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
+    """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution."""
+    size = _row_scale(starter, t, magnitudes, starter.scale(t, magnitudes))[starter.every]
+    return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:

@@ -49,6 +49,8 @@ class TraceWriter:
         self._layout = Layout(tuple(columns), observed, dict(attributes), tuple(parameters))
         self._waiting: list[Floats] = []
         self._late: list[Floats] = []  # rows that the hidden store lacks
+        self._energies: Floats | None = None
+        self._turned_over = 0.0
         self._numbers, self._flushed = 0, time.monotonic()
         self._visible: Store | None = None
         self._hidden: Store | None = None
@@ -77,8 +79,17 @@ class TraceWriter:
         if rows.size:
             self._waiting.append(rows)
             self._numbers += rows.size
+            self._energy(rows[:, 2:6])
         if self._numbers > MANY or time.monotonic() - self._flushed > FLUSH_SECONDS:
             self.flush()
+
+    def _energy(self, rows: Floats) -> None:
+        """Largest of kinetic energy, change of potential energy, energy dissipated and supplied (J)."""
+        if self._energies is None:
+            self._energies = np.array([0.0, rows[0, 1], 0.0, 0.0])
+        most = np.abs(rows - self._energies).max()
+        if np.isfinite(most):
+            self._turned_over = max(self._turned_over, float(most))
 
     def flush(self) -> None:
         """All rows so far stand in the trace."""
@@ -118,6 +129,7 @@ class TraceWriter:
         sizes = {
             column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns
         }
+        sizes["/audit/energy"] = {"nominal": self._turned_over}
         self._turn({**sizes, "/": {**attributes, "final": np.int64(final)}})
         self.discard()
 

@@ -1,0 +1,38 @@
+"""A start is found whatever the last digits of its iterations are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sysdyn.cli.running import Request, run
+from sysdyn.dsl.diagnostics import Report
+from sysdyn.runtime import start
+from test_seed import SEED, settings_of
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("model", "formulation"),
+    [("rack_pinion", "co_lagrangian"), ("lever", "co_hamiltonian"), ("ebers_moll", "lagrangian")],
+)
+def test_last_digits_do_not_decide(tmp_path, monkeypatch, model, formulation, seed):
+    random = np.random.default_rng(seed)
+    exact = start.solve
+
+    def shaken(problem, x):
+        found = exact(problem, x)
+        return replace(found, x=found.x * (1.0 + 2e-16 * random.standard_normal(found.x.size)))
+
+    monkeypatch.setattr(start, "solve", shaken)
+    report = Report()
+    settings = tuple((name, repr(value)) for name, value in settings_of(model, seed % 3).items())
+    request = Request(
+        str(SEED / f"{model}.sd"),
+        scene="reference",
+        formulation=formulation,
+        accuracy=1e-3,
+        settings=settings,
+        until="0.01",
+        output=str(tmp_path / "trace.h5"),
+    )
+    assert run(request, report) is not None, [d.message for d in report]
