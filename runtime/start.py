@@ -10,7 +10,7 @@ seeded perturbations of the free unknowns are tried.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -221,10 +221,20 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
         if not rows.any() or not may.any():
             continue
-        found = solve(_problem(starter, t, x, guess, rows=rows, free=may), x)
-        if found.residual < EXACT:
-            x = found.x
+        problem = _problem(starter, t, x, guess, rows=rows, free=may)
+        for shaken in (x, *_shaken(x, may, problem.scale)):
+            found = solve(problem, shaken)
+            if found.residual < EXACT:
+                x = found.x
+                break
     return x
+
+
+def _shaken(x: Floats, free: Mask, scale: Floats) -> Iterator[Floats]:
+    """Points around x, always the same: where a guess lies on a singular point."""
+    random = np.random.default_rng(20)
+    for amplitude in _AMPLITUDES:
+        yield x + np.where(free, amplitude * scale * random.standard_normal(x.size), 0.0)
 
 
 def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -270,12 +280,9 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     if holds:
         return best, True
     best, holds = _rescaled(starter, t, x, guess, free)
-    scale = starter.scale(t, x)
-    random = np.random.default_rng(20)
-    for amplitude in _AMPLITUDES:
+    for shaken in _shaken(x, free, starter.scale(t, x)):
         if holds:
             break
-        shaken = x + np.where(free, amplitude * scale * random.standard_normal(x.size), 0.0)
         found, holds = _rescaled(starter, t, shaken, guess, free)
         if holds or found.residual < best.residual:
             best = found

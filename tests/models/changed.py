@@ -120,3 +120,28 @@ CHANGED = {
 
 STIFF = {"diode_circuit": ("Radau", 1e-10), "rectifier_motor_crank": ("LSODA", 1e-11)}
 """Methods and tolerances of the witness where DOP853 would take too many steps."""
+
+EXTREME = {
+    "dc_motor": [{"R": 0.0, "b": 0.0, "be": -0.25}],
+    "electrical_transformer": [{"L1": 0.0}, {"L2": 0.0, "be": -2.0}, {"R1": 0.0, "R2": 0.0}],
+    "fluid_transformer": [{"R": 0.0, "be": -1.8}],
+    "gear_pair": [{"J1": 0.0}, {"J2": 0.0, "be": -0.4}, {"b": 0.0}],
+    "lcr_nonlinear": [{"k": 0.0}],
+    "lever": [{"m1": 0.0}, {"m2": 0.0, "be": -1.5}, {"k": -0.5, "b": 0.0}],
+    "mass_spring": [{"k": 0.0}],
+    "mechanical_gyrator": [{"be": 0.0}],
+    "nonlinear_spring": [{"k1": 0.0, "b": 0.0}, {"k3": 0.0, "k1": -0.3}],
+    "pd_pump": [{"b": 0.0, "be": -0.5}],
+    "pendulum_spring": [{"b": 0.0, "k": 30.0}],
+    "rack_pinion": [{"J": 0.0}, {"m": 0.0, "be": -0.15}, {"k": -10.0, "b": 0.0}],
+    "ram_cylinder": [{"m": 0.0}, {"I1": 0.0, "A": -0.8}, {"k": -5.0, "R": 0.0, "b": 0.0}],
+    "rectifier_motor_crank": [{"M": 0.0}, {"b": 0.0, "J": 0.04}],
+    "redundant_pendulum": [{"l": 2.0, "om_0": 3.0}],
+    "rolling_disk": [{"M": 0.0}],
+    "slider_crank": [{"m2": 0.0, "b": 0.4, "tau": 1.5}, {"m2": 0.0, "l": -2.0}],
+    "solenoid": [{"b": 0.0, "k": 0.0}],
+    "two_link_arm": [{"F3": 0.0, "m1": 0.01}],
+    "two_tank": [{"F0": -0.5}],
+    "voice_coil": [{"be": -5.0, "b": 0.0}, {"k": -1.0, "R": 0.0}],
+}
+"""Moduli of zero and of the other sign: no inertia, no stiffness, no loss, a ratio that turns round."""

@@ -1,9 +1,13 @@
 """What a trace says at the first instant: every quantity is consistent there, also what only hidden rates determine."""
 
+from pathlib import Path
+
 import pytest
 from sysdyn.cli.running import Request, run
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.runtime.trace import Trace
+
+ROOT = Path(__file__).resolve().parents[2]
 
 SERIES = """
 model series {
@@ -65,3 +69,17 @@ def test_capacitors_in_series(tmp_path, formulation):
     """One current through all: minus the coil's."""
     found = first(tmp_path, LADDER, formulation)
     assert found == pytest.approx({"i1": -2.0, "i2": -2.0, "v": 3.0}, rel=1e-9)
+
+
+def test_a_guess_on_a_singular_point_starts_alike_in_both_formulations(tmp_path):
+    """What nothing determines stays at its guess: b ~ 0 is where b^2 has no slope."""
+    path = ROOT / "tests" / "mutation" / "held.sd"
+    for formulation in ("lagrangian", "hamiltonian"):
+        report = Report()
+        request = Request(str(path), formulation=formulation, until="0.1", output=str(tmp_path / "t.h5"))
+        ran = run(request, report)
+        assert ran is not None
+        trace = Trace.open(tmp_path / "t.h5")
+        assert abs(trace["b"][0]) == pytest.approx(0.4, rel=1e-9)
+        assert abs(trace["d'"][0]) <= 1e-9
+        assert trace["a'"][0] == pytest.approx((0.05 - 0.1 * trace["b"][0]) / 0.3, rel=1e-9)

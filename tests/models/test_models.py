@@ -1,10 +1,13 @@
 """Every model of the repository: clean, in the canonical layout, and its scenes run and keep their promises."""
 
 import json
+import os
+import time
 import tomllib
 
 import numpy as np
 import pytest
+from model_runs import trace_of
 from reduced import ROOT
 from sysdyn.cli.main import run
 from sysdyn.runtime.trace import Trace
@@ -149,3 +152,98 @@ def test_chain_of_1000_links_takes_100_steps(tmp_path, capsys):
     assert trace.time[-1] > 0.02
     assert np.max(np.abs(trace["audit.energy"].values)) < 1e-3
     assert np.max(trace["audit.constraints"].values) < 1e-9
+
+
+def counts(name, capsys):
+    """Static counts of each scene of a model."""
+    assert run(["check", "--json", str(MODELS / f"{name}.sd")]) == 0
+    targets = result(capsys)["result"]["files"][0]["targets"]
+    return {t["scene"]: {k: t[k] for k in ("coordinates", "m1", "m2", "dof", "index")} for t in targets}
+
+
+def test_the_lead_filter_is_the_books(capsys):
+    """Example 6.4: three charges, one displacement constraint, index 2; `order == 1` stands in the model."""
+    found = counts("gallery/lead_filter", capsys)["charges"]
+    assert found == {"coordinates": 3, "m1": 1, "m2": 0, "dof": 2, "index": 2}
+    assert "expect static: order == 1" in (MODELS / "gallery" / "lead_filter.sd").read_text()
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_the_drive_closes_its_books(tmp_path, capsys, formulation):
+    """Section 6.1 from network text: n = 6, m = 2; half a second of mains, speed and position come to a period."""
+    found = counts("gallery/rectifier_motor_slider", capsys)["start"]
+    assert (found["coordinates"], found["m1"] + found["m2"], found["dof"]) == (6, 2, 4)
+    options = ("--formulation", formulation, "--until", "0.5")
+    trace = traced(tmp_path, "gallery/rectifier_motor_slider", "start", *options)
+    balance, supplied = trace["audit.energy"].values, trace["supplied"].values
+    assert supplied[-1] > 10.0
+    assert np.max(np.abs(balance)) < 1e-4 * np.max(np.abs(supplied))
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_the_books_own_drive_closes_its_books(tmp_path, formulation):
+    """The same in the book's seven coordinates."""
+    text = (MODELS / "seed" / "rectifier_motor_crank.sd").read_text()
+    text = text.replace("trace q3/C", "trace audit.supplied as supplied, q3/C")
+    trace = trace_of(tmp_path, text, formulation=formulation, accuracy=1e-5)
+    supplied = np.max(np.abs(trace["supplied"].values))
+    assert supplied > 10.0
+    assert np.max(np.abs(trace["audit.energy"].values)) < 1e-4 * supplied
+
+
+def line_text(tmp_path, n):
+    """The C text of the line with n sections."""
+    file = str(MODELS / "gallery/transmission_line.sd")
+    assert run(["compile", "-q", file, "--set", f"n={n}", "-o", str(tmp_path / str(n))]) == 0
+    return (tmp_path / str(n) / "residual.c").read_text()
+
+
+def test_the_line_has_one_c_text_for_every_length(tmp_path):
+    assert line_text(tmp_path, 10) == line_text(tmp_path, 100_000)
+
+
+def ladder(n, times):
+    """Voltages of nodes n/2 and n of the line's ladder at multiples of a step, by its matrix exponential."""
+    from scipy.linalg import expm
+
+    length, per_l, per_c, per_r, rise = 1000.0, 250e-9, 100e-12, 1e-3, 1e-6
+    dx = length / n
+    coil, cap, loss, load = per_l * dx, per_c * dx, per_r * dx, np.sqrt(per_l / per_c)
+    # currents i[0..n-1], voltages v[0..n-1], and the source with its three derivatives
+    a = np.zeros((2 * n + 4, 2 * n + 4))
+    i, v, u = np.arange(n), n + np.arange(n), 2 * n
+    a[i, i], a[i, v] = -loss / coil, -1.0 / coil
+    a[i[1:], v[:-1]], a[0, u] = 1.0 / coil, 1.0 / coil
+    a[v, i], a[v[:-1], i[1:]], a[v[-1], v[-1]] = 1.0 / cap, -1.0 / cap, -1.0 / (load * cap)
+    a[[u, u + 1, u + 2], [u + 1, u + 2, u + 3]] = 1.0
+    size = np.ones(2 * n + 4)
+    size[u + 1 :] = rise ** -np.arange(1.0, 4.0)  # derivatives in their own scale
+    step = expm(a * size / size[:, None] * (times[1] - times[0]))
+    x = np.zeros(2 * n + 4)
+    x[u:] = 0.0, 0.0, 6.0, -12.0  # 3 s^2 - 2 s^3
+    found = [x[[v[n // 2 - 1], v[-1]]]]
+    for t in times[1:]:
+        x = step @ x
+        if abs(t - rise) < 1e-12:
+            x[u:] = 1.0, 0.0, 0.0, 0.0
+        found.append(x[[v[n // 2 - 1], v[-1]]])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+def test_the_line_meets_the_exponential_of_its_ladder(tmp_path, formulation):
+    times = np.arange(101) * 1e-7
+    options = ("--set", "n=200", "--accuracy", "1e-6", "--formulation", formulation)
+    trace = traced(tmp_path, "gallery/transmission_line", "edge", *options)
+    places = [int(np.argmin(np.abs(trace.time - t))) for t in times]
+    found = np.array([trace["v[n\N{DIVISION SLASH}2].e"].values[places], trace["v[n].e"].values[places]]).T
+    assert np.max(np.abs(found - ladder(200, times))) < 1e-5
+
+
+@pytest.mark.skipif(os.environ.get("SYSDYN_LONG") != "1", reason="ten seconds: SYSDYN_LONG=1")
+def test_a_line_of_100000_sections_takes_its_first_step(tmp_path, capsys):
+    began = time.monotonic()
+    file = str(MODELS / "gallery/transmission_line.sd")
+    assert run(["simulate", file, "--max-steps", "1", "-o", str(tmp_path / "line.h5")]) == 3
+    assert "in 1 steps" in capsys.readouterr().err
+    assert time.monotonic() - began < 10.0
