@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from sysdyn.compiler.descriptor import BLOCKS, HOME, Block, Equations, Kernel, Summand
 from sysdyn.compiler.terms import Nest
-from sysdyn.dsl.expression import Node, add, is_const
+from sysdyn.dsl.expression import Node, add, is_const, without_signals
 from sysdyn.dsl.network import Loop
 
 _Bounds = tuple[tuple[Node, Node], ...]
@@ -31,6 +31,7 @@ class Assembly:
 
     def add(self, block: str, owner: str, at: Sequence[Node], nest: Nest, expression: Node) -> None:
         """Add an expression to the rows of `owner` in a block, for all iterations of the nest."""
+        expression = without_signals(expression)
         if is_const(expression, 0.0):
             return
         key = (self._numbers[HOME.get(block, block), owner], tuple(at))

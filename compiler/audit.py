@@ -21,6 +21,7 @@ from sysdyn.dsl.expression import (
     mul,
     neg,
     rate,
+    signals_held,
     sub,
     substitute,
     var,
@@ -51,8 +52,7 @@ def add_audit(assembly: Assembly, model: EnergyModel) -> None:
         into("supplied", work.loops, mul(work.effort, add(*power)))
     for row in model.rows:
         for term in row.terms if row.kind in ("phi", "psi") else ():
-            at_rest = {f: const(0.0) for f in local_variables(term.expression, m.rate)}
-            still = explicit(term.expression) if row.kind == "phi" else substitute(term.expression, at_rest)
+            still = explicit(term.expression) if row.kind == "phi" else _at_rest(term.expression, m.rate)
             multiplier = var(row.name, "kappa" if row.kind == "phi" else "mu", *row.at)
             into("supplied", term.loops, mul(multiplier, still))
 
@@ -61,6 +61,12 @@ def explicit(expression: Node) -> Node:
     """Derivative by time at fixed coordinates and their rates: time, states and implicit unknowns move."""
     moving = (n for n in variables(expression) if n.op == "time" or (n.data[1] in ("s", "e") and not n.data[2]))
     return differential(expression, {n: _rate(n) for n in sorted(moving, key=lambda n: n.number)})
+
+
+def _at_rest(expression: Node, kind: str) -> Node:
+    """What is left of a flow constraint where no flow is; signals keep their values."""
+    held, signals = signals_held(expression)
+    return substitute(substitute(held, {f: const(0.0) for f in local_variables(held, kind)}), signals)
 
 
 def _along(expression: Node, kind: str) -> Node:

@@ -28,6 +28,7 @@ from sysdyn.dsl.expression import (
     is_const,
     mul,
     neg,
+    signals_held,
     substitute,
     topological,
     var,
@@ -92,12 +93,13 @@ def _entries(row: Row, families: Mapping[str, Family]) -> Entries:
     """Coefficients of the flows of a row, all of the row's own element."""
     found: Entries = {}
     for term in row.terms:
-        for flow in local_variables(term.expression, "f"):
+        held, signals = signals_held(term.expression)
+        for flow in local_variables(held, "f"):
             name = flow.data[0]
             whole = tuple((loop.first, loop.last) for loop in row.nest) == families[name].shape
             if flow.args != row.at or term.loops != row.nest or not whole:
                 raise _impossible(row, f"psi {row.name} joins flows of several elements ('{flow!r}')")
-            slope = derivative(term.expression, flow)
+            slope = substitute(derivative(held, flow), signals)
             found[name] = add(found[name], slope) if name in found else slope
     return {name: value for name, value in found.items() if not is_const(value, 0.0)}
 

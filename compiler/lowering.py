@@ -20,7 +20,18 @@ from sysdyn.compiler.momenta import given, inertial, resolved
 from sysdyn.compiler.observing import add_initials, add_observations, observed, pins_and_equations
 from sysdyn.compiler.terms import Nest, counter, local_variables
 from sysdyn.dsl.diagnostics import Place
-from sysdyn.dsl.expression import Node, derivative, differential, mul, neg, time_derivative, var, variables
+from sysdyn.dsl.expression import (
+    Node,
+    derivative,
+    differential,
+    mul,
+    neg,
+    signals_held,
+    substitute,
+    time_derivative,
+    var,
+    variables,
+)
 from sysdyn.dsl.expression import rate as rate_of
 from sysdyn.dsl.network import Loop
 
@@ -221,8 +232,9 @@ class _Lowering:
         m = self.model.mirror
         kind, name = (m.coordinate, "kappa") if row.kind == "phi" else (m.rate, "mu")
         multiplier = var(row.name, name, *row.at)
-        for node in local_variables(expression, kind):
-            value = mul(derivative(expression, node), multiplier)
+        held, signals = signals_held(expression)
+        for node in local_variables(held, kind):
+            value = mul(substitute(derivative(held, node), signals), multiplier)
             self._effort(f"{row.kind}_reaction", node, nest, value)
 
     def _effort(self, block: str, on: Node, nest: Nest, value: Node) -> None:

@@ -100,7 +100,8 @@ def constraints(model: Elaborator, report: Report) -> None:
     """E501, E502, E503, E511, E518 on phi and psi."""
     for constraint in model.parts.constraints:
         what = f"{constraint.kind} {constraint.name}"
-        nodes = unknowns_of(constraint.expression)
+        expression, _ = ex.signals_held(constraint.expression)
+        nodes = unknowns_of(expression)
         accelerations = [n for n in nodes if n.data[2]]
         if accelerations:
             message = f"{what} contains {accelerations[0]}: accelerations are results, not data"
@@ -122,7 +123,7 @@ def constraints(model: Elaborator, report: Report) -> None:
             message = f"{what} contains no flow" + (": it is a phi" if nodes else "")
             report.error("E511", message, constraint.place, help="a relation between displacements is a phi")
         elif constraint.kind == "psi":
-            pair = _nonlinear(constraint.expression, flows)
+            pair = _nonlinear(expression, flows)
             if pair:
                 message = f"{what} is not linear in the flows: {pair[0]}*{pair[1]}"
                 help_ = "a nonlinear rate condition is not workless: gamma with an implicit effort"

@@ -60,7 +60,7 @@ class Context:
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
         self.constraints: dict[str, list[Constraint]] = {}
-        self._values: dict[Definition, Value | None] = {}
+        self._values: dict[tuple[Definition, bool], Value | None] = {}
         self._active: list[Definition] = []
         self._loops: list[Loop] = []
         self._bound: dict[str, Typed] = {}  # loop variables, function arguments, an element's own variables
@@ -70,6 +70,7 @@ class Context:
         self.file_scope = self.scope
         self._unknown = ("E101", "unknown name '{}'")
         self.lenient = False  # what the chosen level lacks is a note (language, decision 5)
+        self.virtual = False  # outputs and inputs are signals, held by virtual displacements
         self.statics = False  # static quantities are in sight (expect static)
 
     @contextmanager
@@ -125,6 +126,15 @@ class Context:
             yield
         finally:
             self._unknown = before
+
+    @contextmanager
+    def virtually(self) -> Iterator[None]:
+        """Read the law of a modulus or a flow constraint: outputs and inputs stay marked as signals."""
+        before, self.virtual = self.virtual, True
+        try:
+            yield
+        finally:
+            self.virtual = before
 
     @contextmanager
     def leniently(self) -> Iterator[None]:

@@ -303,9 +303,34 @@ def call(name: str, *args: Node) -> Node:
         return mul(x, x, linear(3.0, ((-2.0, x),)))
     if name in ("min", "max") and len(args) > 2:
         return call(name, call(name, *args[:-1]), args[-1])
+    if name == "signal":
+        return signal(args[0])
     if all(a.op == "const" for a in args):
         return const(FUNCTIONS[name](*(a.data for a in args)))
     return _make("call", name, args)
+
+
+def signal(node: Node) -> Node:
+    """A signal's value: differentiated in full, but held by virtual displacements (language, decision 25)."""
+    return _make("call", "signal", (node,)) if variables(node) else node
+
+
+def signals_held(root: Node) -> tuple[Node, dict[Node, Node]]:
+    """Root with an opaque parameter for each signal, and what puts the signals back."""
+    found = [n for n in topological([root]) if n.op == "call" and n.data == "signal"]
+    change = {node: param(f"#signal {k}") for k, node in enumerate(found)}
+    return (substitute(root, change), {new: old for old, new in change.items()}) if found else (root, {})
+
+
+def without_signals(root: Node) -> Node:
+    """Root with signals as plain values."""
+    done: dict[Node, Node] = {}
+    if not any(n.op == "call" and n.data == "signal" for n in topological([root])):
+        return root
+    for node in topological([root]):
+        marked = node.op == "call" and node.data == "signal"
+        done[node] = done[node.args[0]] if marked else rebuild(node, tuple(done[a] for a in node.args))
+    return done[root]
 
 
 def compare(operator: str, left: Node, right: Node) -> Node:
@@ -402,6 +427,7 @@ def variables(root: Node) -> frozenset[Node]:
 
 
 _ONE_ARGUMENT: Mapping[str, Callable[[Node], Node]] = {
+    "signal": lambda x: const(1.0),
     "sin": lambda x: call("cos", x),
     "cos": lambda x: neg(call("sin", x)),
     "tan": lambda x: linear(1.0, ((1.0, product(1.0, ((2.0, call("tan", x)),))),)),

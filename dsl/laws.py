@@ -137,7 +137,8 @@ def ratio_of(
     dimension = branch_dimension(me.domain, letter)
     name = me.name.partition("#")[0]
     message = f"law of '{name}': {side} is in {dim.show(dimension)}, the law in {{}}"
-    node = context.wanted(value, dimension, "E208", message)
+    with context.virtually():
+        node, signals = ex.signals_held(context.wanted(value, dimension, "E208", message))
     far = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == partner.family.name}
     near = [
         n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")
@@ -158,7 +159,7 @@ def ratio_of(
         shown = (near or flows or [far[expected]])[0]
         message = f"{kind} ratio of '{name}' depends on {shown}, a flow or effort of its own ports"
         raise context.fail("E317", message, span, help="ratios may depend on displacements and signals")
-    return _normal(kind, letter, number, ratio)
+    return _normal(kind, letter, number, ex.substitute(ratio, signals) if signals else ratio)
 
 
 def _normal(kind: str, letter: str, number: int, ratio: Node) -> RatioOf:

@@ -185,21 +185,24 @@ class Names(Context):
             help_ = "break it with a state or an implicit closed by a gamma"
             self.report.error("E105", f"circular definition: {' -> '.join(chain)}", place, help=help_)
             raise Failed
-        if symbol in self._values:
-            value = self._values[symbol]
+        key = symbol, self.virtual
+        if key in self._values:
+            value = self._values[key]
             if value is None:
                 raise Failed
             return value
-        self._values[symbol] = None
+        self._values[key] = None
         self._active.append(symbol)
         placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         try:
             with self.space(symbol.space), self.bound({**dict(symbol.bound), **placeholders}):
                 value = self.resolve(symbol.expression)
                 self._declared(symbol, value)
+                if self.virtual and symbol.kind in ("output", "input"):
+                    value = _signal(value)
         finally:
             self._active.pop()
-        self._values[symbol] = value
+        self._values[key] = value
         return value
 
     def _declared(self, symbol: Definition, value: Value) -> None:
@@ -283,3 +286,10 @@ def pick(value: Vector, at: tuple[Node, ...]) -> Typed:
     for k in range(len(value.items) - 2, -1, -1):
         node = ex.conditional(ex.compare("==", at[0], ex.const(value.first + k)), value.items[k].node, node)
     return Typed(node, value.items[0].dimension)
+
+
+def _signal(value: Value) -> Value:
+    """The value marked as one that virtual displacements hold."""
+    if isinstance(value, Vector):
+        return Vector(tuple(Typed(ex.signal(v.node), v.dimension) for v in value.items), value.first)
+    return Typed(ex.signal(value.node), value.dimension, value.truth)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 
 from sysdyn.dsl import dimensions as dim
 from sysdyn.dsl import expression as ex
@@ -37,7 +37,8 @@ class Statements(Declarations):
             raise self.resolver.fail(
                 "N608", f"{s.kind} {s.decl.name}: 'while' is not supported yet (planned: events)", guard.span
             )
-        left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
+        with self.resolver.virtually() if s.kind == "psi" else nullcontext():
+            left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
         dimension = self._sides(f"{s.kind} {s.decl.name}", left, right, s.right)
         own = tuple(
             self.resolver.whole_number(i, "an index") for i in s.decl.indices if not isinstance(i, syntax.Range)

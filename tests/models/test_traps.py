@@ -67,14 +67,7 @@ scene go of chopper {
 """
 
 
-@pytest.mark.parametrize(
-    "formulation",
-    [
-        pytest.param(f, marks=pytest.mark.xfail(strict=True, reason="Psi_f is not taken with signals frozen"))
-        for f in PRIMAL
-    ]
-    + list(FOUR[2:]),
-)
+@pytest.mark.parametrize("formulation", FOUR)
 def test_a_ratio_that_is_a_signal_is_held_in_virtual_displacements(tmp_path, formulation):
     """0.1 i' = 10 (0.5 + 0.1 i) - 2 i: the duty follows the current, the reaction does not know."""
     trace = trace_of(tmp_path, CHOPPER, formulation=formulation)
