@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
+from sysdyn.cli.columns import aligned
 from sysdyn.cli.unit_text import conversion
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.curve import Floats
@@ -115,12 +116,7 @@ def table(verdict: Verdict, shown: int = SHOWN) -> str:
         ("quantity", "verdict", "times limit", "at [s]", "reference", "test", "limit", "unit")
     ]
     rows += [_row(c) for c in (*differing, *equal[:shown])]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    left = (0, 1, 7)
-    lines = []
-    for row in rows:
-        cells = [t.ljust(w) if k in left else t.rjust(w) for k, (t, w) in enumerate(zip(row, widths, strict=True))]
-        lines.append("  ".join(cells).rstrip())
+    lines = [aligned(rows, right=range(2, 7))]
     if len(equal) > shown:
         lines.append(f"... {len(equal) - shown} more within their limits")
     lines += [f"note: {note}" for note in verdict.notes]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from sysdyn.cli.columns import aligned
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError
 from sysdyn.cli.options import FORMULATIONS, Setting
@@ -305,9 +306,8 @@ def list_(console: Console, folder: str) -> int:
                 "accepted": [{"reason": a.reason, "change": a.change} for a in g.accepted],
             }
         )
-    widths = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))]
     console.result = {"goldens": items}
-    console.data("\n".join("  ".join(t.ljust(w) for t, w in zip(r, widths, strict=True)).rstrip() for r in rows))
+    console.data(aligned(rows))
     return console.finish()
 
 

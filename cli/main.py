@@ -16,6 +16,7 @@ COMMANDS = {
     "fmt": "Bring model texts into the canonical layout.",
     "golden": "Golden traces of a project: record, check, accept, list.",
     "plot": "Draw quantities of a trace.",
+    "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
     "verify": "Compare the formulations and methods of a scene.",
 }

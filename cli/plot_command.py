@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -14,27 +15,33 @@ from sysdyn.cli.failures import UsageError
 if TYPE_CHECKING:
     from sysdyn.runtime.trace import Trace
 
-KINDS = (".png", ".svg")
+KINDS = (".png", ".svg", ".html")
+WIDTH = 100
+"""Columns of a summary that goes to no terminal."""
 
 
 @with_console("plot")
 @click.argument("trace")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("-o", "output", metavar="FILE.png|.svg", help="Default: the trace's name with .png, here.")
+@click.option("-o", "output", metavar="FILE.png|.svg|.html", help="Default: the trace's name with .png, here.")
 def command(console: Console, trace: str, names: tuple[str, ...], output: str | None) -> int:
     """Draw quantities of TRACE over time: those named, or all of them.
 
     Further traces may follow TRACE (names of existing .h5 files): they are drawn over the first.
-    audit/energy and audit/constraints are the meters of the run.
+    audit/energy and audit/constraints are the meters of the run. An .html zooms: wheel, drag, double click. Without -o
+    a summary goes to standard output too: one line a quantity.
     """
     files = [trace, *(name for name in names if _is_trace(name))]
     wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
     traces = [(_label(file), _open(file)) for file in files]
     target = _target(trace, output, console)
     drawn = _quantities([t for _, t in traces], wanted)
-    from sysdyn.cli.picture import picture  # matplotlib: half a second that a wrong name need not wait for
+    data = _drawn(traces, drawn, target.suffix.lower())
+    if output is None and not console.quiet:
+        from sysdyn.cli.sparkline import summary
 
-    data = picture(traces, drawn, "svg" if target.suffix.lower() == ".svg" else "png")
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
+        console.data(summary(traces, drawn, width))
     if output == "-":
         sys.stdout.buffer.write(data)
     else:
@@ -42,6 +49,17 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
         console.say(f"{target}: {', '.join(drawn)}")
     console.result = {"picture": output if output == "-" else str(target), "traces": files, "quantities": drawn}
     return console.finish()
+
+
+def _drawn(traces: list[tuple[str, Trace]], names: list[str], kind: str) -> bytes:
+    if kind == ".html":
+        from sysdyn.cli.page.plots import page
+
+        titles = dict.fromkeys(str(t.attributes.get("title", label)) for label, t in traces)
+        return page(" and ".join(titles), traces, names).encode()
+    from sysdyn.cli.picture import picture  # matplotlib: half a second that a wrong name need not wait for
+
+    return picture(traces, names, kind.removeprefix("."))
 
 
 def _is_trace(name: str) -> bool:
@@ -60,8 +78,6 @@ def _target(trace: str, output: str | None, console: Console) -> Path:
         return Path("-.png")
     target = Path(output) if output is not None else Path(f"{_label(trace)}.png")
     kind = target.suffix.lower()
-    if kind == ".html":
-        raise UsageError("pictures in .html are not supported yet (planned: reports); .png and .svg are")
     if kind not in KINDS:
         raise UsageError(f"'{target}': a picture is one of {', '.join(KINDS)}")
     return target

@@ -25,7 +25,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.diagnostics import Place, Report
 from sysdyn.dsl.network import Network, Scene
 from sysdyn.dsl.units import si_text
-from sysdyn.runtime.failures import SolverFailure
+from sysdyn.runtime.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.simulate import Options, Outcome, Progress, simulate
 from sysdyn.runtime.trace import Parameter
 
@@ -273,6 +273,9 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         outcome = simulate(
             prepared.manifest, prepared.arrays, prepared.carrier, options, start=started.state, facts=started.facts
         )
+    except NoSuchForm as error:
+        report.error("E607", str(error), prepared.network.place)
+        return None
     except ValueError as error:
         raise UsageError(str(error)) from error
     except SolverFailure as error:
@@ -292,6 +295,7 @@ _CAUSES = {
     "error_test": "the local error cannot be brought below the tolerance",
     "singular": "the iteration matrix is singular",
     "nonfinite": "an equation is not a number",
+    "stiff": "the equations are stiff, an explicit method is held to tiny steps: take radau or bdf",
     "step_too_small": "the step size fell below the resolution of time",
     "max_steps": "the limit of steps is reached",
     "max_wall": "the limit of wall time is reached",

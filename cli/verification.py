@@ -275,7 +275,8 @@ def _read(ran: Ran, options: Options) -> Run:
     accuracy = min([options.accuracy or ACCURACY, *(wanted for _, wanted in options.accuracy_on)])
     claims = tuple((claim.text, claim.ok) for claim in ran.claims)
     trace = Trace.open(ran.outcome.trace)
-    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure)
+    stores = any(ran.prepared.compiled.energies.functions.values())
+    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure, stores)
 
 
 def _multipliers(expression: ex.Node) -> list[ex.Node]:

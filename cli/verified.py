@@ -20,7 +20,11 @@ BOOKS = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run of the scene.  accuracy: as asked; expects: text, and whether it held; failure: where it stopped."""
+    """One run of the scene.
+
+    accuracy: as asked; expects: text, and whether it held; failure: where it stopped; stores: the model has an energy
+    or a content, so that its balance is more than works that cancel.
+    """
 
     formulation: str
     method: str
@@ -29,6 +33,7 @@ class Run:
     expects: tuple[tuple[str, bool | None], ...]
     trace: Trace
     failure: str | None
+    stores: bool
 
     @property
     def name(self) -> str:
@@ -49,6 +54,8 @@ class Run:
     def books(self) -> float:
         """Energy balance in units of what is allowed: BOOKS x accuracy of the turnover."""
         allowed = max(BOOKS * self.accuracy, ROUNDING) * self.turnover
+        if not self.stores:
+            return 0.0
         return self.energy / allowed if allowed > 0.0 else (np.inf if self.energy > 0.0 else 0.0)
 
     @property

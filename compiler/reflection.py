@@ -135,8 +135,8 @@ def _read(network: Network) -> Iterable[str]:
 
 
 def _with_positions(network: Network) -> Network:
-    """Quadratures q' = f for displacements that traces and expectations read and no potential store holds."""
-    roots = [o.expression for o in network.observations]
+    """Quadratures q' = f for displacements that traces, expectations and dynamics read and no potential store holds."""
+    roots = [n.expression for n in (*network.observations, *network.dynamics)]
     roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
     held = {b.name for b in network.branches if b.kind == "potential"}
     wanted: dict[tuple[str, str], None] = {}
@@ -191,7 +191,10 @@ def _with_position(
     return replace(
         network,
         states=(*network.states, State(name, shape, domain.displacement, place)),
-        dynamics=(*network.dynamics, Dynamic(state, rate, loops, place)),
+        dynamics=(
+            *(replace(d, expression=read(d.expression)) for d in network.dynamics),
+            Dynamic(state, rate, loops, place),
+        ),
         initials=(*network.initials, *starts),
         observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
         expectations=tuple(

@@ -9,8 +9,10 @@ import ctypes as c
 
 MAX_ORDER = 5
 STAGES = 3
+DOPRI_STAGES = 16
+DOPRI_DENSE = 7
 ROW_HEAD = 8
-CAUSES = ("", "newton", "error_test", "singular", "nonfinite", "step_too_small", "stopped", "memory")
+CAUSES = ("", "newton", "error_test", "singular", "nonfinite", "step_too_small", "stopped", "memory", "stiff")
 
 ROWS = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p, c.c_void_p)
 """sd_rows and sd_entries: frame, t, y, yd, out."""
@@ -57,6 +59,7 @@ class System(c.Structure):
         ("k_f", _P),
         ("k_slot_q", _P),
         ("k_slot_f", _P),
+        ("k_scale", _P),
         ("held", _I),
         ("clear", _I),
         *[(name, _P) for name in ["held_row", "held_unknown", "held_slot", "cleared"]],
@@ -99,6 +102,8 @@ class Stepper(c.Structure):
         ("system", _P),
         ("n", _I),
         *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
+        ("nodes", _I),
+        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd"]],
     ]
 
 
@@ -168,6 +173,7 @@ class Bdf(c.Structure):
         ("cause", _I),
         ("bad_row", _I),
         ("bad_column", _I),
+        ("project", _P),
         ("stepper", Stepper),
     ]
 
@@ -196,6 +202,43 @@ class Radau(c.Structure):
         *[(name, _P) for name in ["w", "gz"]],
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
         *[(name, _L) for name in ["factorisations", "taken"]],
+        *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],
+        ("project", _P),
+        ("stepper", Stepper),
+    ]
+
+
+class Underlying(c.Structure):
+    """sd_underlying."""
+
+    _fields_ = [
+        *[(name, _P) for name in ["system", "matrix", "applied", "position", "velocity", "linear"]],
+        *[(name, _I) for name in ["n", "first", "solved", "direct"]],
+        *[(name, _P) for name in ["unknown", "rate", "column", "source", "from_rate", "magnitude"]],
+        ("tolerance", _D),
+        *[(name, _P) for name in ["jy", "jyd", "values", "r", "step", "rest", "memory"]],
+        *[(name, _I) for name in ["ready", "bad_row", "bad_column"]],
+    ]
+
+
+class Dopri(c.Structure):
+    """sd_dopri."""
+
+    _fields_ = [
+        ("system", _P),
+        ("underlying", _P),
+        ("n", _I),
+        ("tested", _I),
+        *[(name, _D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, _P) for name in ["atol", "magnitude", "test", "power"]],
+        ("track", _I),
+        *[(name, _D) for name in ["patience", "t", "h", "h_used", "error_accepted"]],
+        *[(name, _I) for name in ["rejected", "dense", "stiff", "smooth"]],
+        *[(name, _P) for name in ["phi", "yd"]],
+        *[(name, _P * DOPRI_STAGES) for name in ["y", "rate"]],
+        ("f", _P * DOPRI_DENSE),
+        *[(name, _P) for name in ["ee", "weight", "memory"]],
+        *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
         *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],
         ("stepper", Stepper),
     ]

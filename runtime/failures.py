@@ -31,10 +31,14 @@ class TraceError(Exception):
     """The trace cannot be written or read."""
 
 
+class NoSuchForm(ValueError):  # noqa: N818
+    """The asked index form or method is impossible for the model (E607); the message says what is possible."""
+
+
 class SolverFailure(Exception):  # noqa: N818 (a name of the house)
     """The integration stopped at `time` [s] with step `step` [s].
 
-    cause: newton, error_test, singular, nonfinite, step_too_small, max_steps, max_wall, memory.
+    cause: newton, error_test, singular, nonfinite, step_too_small, stiff, max_steps, max_wall, memory.
     unknown: name of the unknown in the way, row: its row; None where the cause has no place.
     """
 

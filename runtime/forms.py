@@ -3,9 +3,12 @@
 A form is a list of calls with their tables `at` (where unknown families begin) and `to` (where row families
 begin); nothing else distinguishes the forms (q' = f are rows of the runtime's own):
   3     as written (2, 1 or 0 where the model's index is that): phi and psi
-  2     stabilised (Gear, Gupta, Leimkuhler 1985): q' - f + Phi_q^T nu = 0, phi and phi_rate, multipliers nu
+  2     stabilised (Gear, Gupta, Leimkuhler 1985): q' - f + Phi_q^T nu = 0, phi and phi_rate, multipliers nu; the row of
+        each q is weighted (metric.py)
   2v    phi_rate in the place of phi
   1     phi_acceleration in the place of phi, psi_rate of psi
+  0     as 1, momentum_rate in the place of momentum: linear in the slopes, what the underlying equation is made of
+  constraints   what holds between displacements, flows and momenta alone (no rows q' - f)
   settled   all rows that hold at a consistent point: as written and hidden (no rows q' - f)
   start     the same, dynamics_rate and the block `initial`
 """
@@ -42,6 +45,14 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
         ("psi_rate", "psi_rate"),
         *_TAIL,
     ),
+    "0": (
+        *_HEAD,
+        ("momentum_rate", "momentum_rate"),
+        ("phi_acceleration", "phi_acceleration"),
+        ("psi_rate", "psi_rate"),
+        *_TAIL,
+    ),
+    "constraints": (("momentum", "momentum"), ("phi", "phi"), ("phi_rate", "phi_rate"), ("psi", "psi")),
     "settled": (
         *_HEAD,
         ("momentum", "momentum"),
@@ -58,6 +69,8 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
 }
 FORMS["start"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"), ("initial", "initial"))
 """form -> (block, group of rows it is added to); blocks a model lacks are skipped."""
+BARE = ("constraints", "settled", "start")
+"""Forms without rows q' - f."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +176,7 @@ def plan(description: Description, name: str) -> Form:
     at, kind, extended = _layout(description)
     written = len(kind)
     k_q, k_f, first = _kinematics(description, at)
-    bare = name in ("settled", "start")
+    bare = name in BARE
     if bare:
         k_rows, number = np.zeros(0, np.int32), 0
     else:

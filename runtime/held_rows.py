@@ -16,6 +16,8 @@ _ROWS = {
     "2": {"kappa": "phi_rate", "nu": "phi", "mu": "psi"},
     "2v": {"kappa": "phi_rate", "mu": "psi"},
     "1": {"kappa": "phi_acceleration", "mu": "psi_rate"},
+    "0": {"kappa": "phi_acceleration", "mu": "psi_rate"},
+    "constraints": {},
     "settled": {"kappa": "phi_acceleration", "mu": "psi_rate"},
     "start": {"kappa": "phi_acceleration", "mu": "psi_rate"},
 }

@@ -13,8 +13,8 @@ from sysdyn.runtime.scales import balanced
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.system import System
 
-NUDGE = 1e-3
-"""Move of an implicit unknown, as part of its size: small enough for the exponential of a diode."""
+NUDGES = (1e-3, 1e-6, 1e-9)
+"""Moves of an implicit unknown, as parts of its size: the least is small enough for the exponential of a diode."""
 VANISHING = 1e-7
 """A slope below this part of the one beside it vanishes."""
 
@@ -32,20 +32,26 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
     for group, family, first in system.form.groups:
         if group == "gamma":
             gamma[first : first + system.description.rows[family].size] = True
-    beside = y.copy()
-    beside[implicit] += NUDGE * balanced(system, y, system.jacobian(state.t, y, yd)[0])[implicit]
     columns = system.pattern.columns_of()
-    slopes = []
-    for point in (y, beside):
+
+    def slopes(point: Floats) -> Floats:
         values = np.where(gamma[system.pattern.row], np.abs(system.jacobian(state.t, point, yd)[0]), 0.0)
         largest = np.zeros(system.unknowns)
         np.maximum.at(largest, columns, values)
-        slopes.append(largest[implicit])
-    found = (slopes[1] > 0.0) & (slopes[0] <= VANISHING * slopes[1])
+        return np.asarray(largest[implicit])
+
+    size = balanced(system, y, system.jacobian(state.t, y, yd)[0])[implicit]
+    here = slopes(y)
+    found = np.ones(implicit.size, dtype=bool)
+    for nudge in NUDGES:
+        beside = y.copy()
+        beside[implicit] += nudge * size
+        there = slopes(beside)
+        found &= np.isfinite(there) & (there > 0.0) & (here <= VANISHING * there)
     if not found.any() or system.rows > DENSE:
         return ()
-    here, there = _conditions([_matrix(system, state.t, point, yd) for point in (y, beside)])
-    if here > VANISHING * there:
+    at, off = _conditions([_matrix(system, state.t, point, yd) for point in (y, beside)])
+    if at > VANISHING * off:
         return ()
     return tuple(system.name(int(k)) for k in implicit[found])
 

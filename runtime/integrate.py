@@ -1,4 +1,4 @@
-"""One integration by the core's BDF: from a consistent state to rows of observed values.
+"""One integration by a method of the core: from a consistent state to rows of observed values.
 
 The core advances in chunks of about 50 ms; between them rows are handed to `sink`, progress is shown, and Ctrl-C,
 --max-steps and --max-wall are honoured.  Values at output instants are moved onto the constraints and their hidden
@@ -12,11 +12,13 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel, SolverFailure
 from sysdyn.runtime.least_norm import LeastNorm
 from sysdyn.runtime.methods import Method
+from sysdyn.runtime.metric import kinematic_scale
 from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.request import LONGEST, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.restart import Restart
@@ -26,10 +28,13 @@ from sysdyn.runtime.settled import Settler
 from sysdyn.runtime.start import ConsistentState
 from sysdyn.runtime.structure import DENSE, null_place
 from sysdyn.runtime.system import System
+from sysdyn.runtime.underlying import Underlying
 from sysdyn.runtime.unknown_roles import Roles, roles
 
 CHUNK_SECONDS = 0.05
 CHUNK_STEPS = 1 << 20
+PROJECTED = ("1", "0")
+"""Forms whose rows let the constraints drift: accepted points are moved onto them."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -51,12 +56,23 @@ class Integration:
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, jyd, request.index)
         self.magnitude = self._magnitudes()
+        if system.form.name == "2":
+            jy, jyd = self._weighted(jy, jyd)
         self._linear(jy, jyd)
-        self.settler = self._settler()
+        self.settler = self._settler("settled", self.roles.state[: system.form.written])
         stops = None if request.fixed_step else request.stops
         self.segments = segments(start.t, request.t_end, stops)
         self._stepper()
         self._driver()
+
+    def _weighted(self, jy: Floats, jyd: Floats) -> tuple[Floats, Floats]:
+        """The Jacobian with the factors of the rows q' - f; the magnitudes of nu follow them."""
+        scale = kinematic_scale(self.system, self.magnitude, jy, jyd)
+        if (scale == self.system.kinematic_scale).all():
+            return jy, jyd
+        self.system.kinematic_scale[:] = scale
+        self.magnitude = self._magnitudes()
+        return self.system.jacobian(self.start.t, self.y, self.yd)
 
     def _magnitudes(self) -> Floats:
         found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd)
@@ -66,6 +82,11 @@ class Integration:
         return np.ascontiguousarray(found)
 
     def _linear(self, jy: Floats, jyd: Floats) -> None:
+        self.underlying: Underlying | None = None
+        if self.request.method == "dopri":
+            self.underlying = Underlying(self.system, self.magnitude, jy, jyd)
+            self.linear, self._order = self.underlying.linear, None
+            return
         pattern = self.system.pattern
         span = max(self.request.t_end - self.start.t, 1e-300)
         self._order = column_order(pattern, jy + 1e3 / span * jyd)
@@ -75,17 +96,14 @@ class Integration:
         if not self.linear:
             raise MemoryError
 
-    def _settler(self) -> Settler:
+    def _settler(self, name: str, state: NDArray[np.bool_]) -> Settler:
         form = self.system.form
         n = form.written
-        kinematics = (form.k_q, form.k_f)
-        return Settler(
-            self.system.another("settled"), kinematics, self.magnitude[:n], self._time, self.roles.state[:n]
-        )
+        return Settler(self.system.another(name), (form.k_q, form.k_f), self.magnitude[:n], self._time, state)
 
     def _stepper(self) -> None:
         request = self.request
-        self.method = Method(request.method, self.system, self.linear, self._order)
+        self.method = Method(request.method, self.system, self.linear, self._order, self.underlying)
         self._atol = None if request.atol is None else np.full(self.system.unknowns, request.atol)
         self._smooth = self.roles.differential.astype(np.int32)
         method = self.method.contents
@@ -98,8 +116,13 @@ class Integration:
         method.track = 1
         if request.method == "radau":
             method.smooth = lib.pointer(self._smooth)
-        else:
+        elif request.method == "bdf":
             method.max_order = request.max_order
+        else:
+            method.patience = request.stiff_steps
+        if request.method != "dopri" and self.system.form.name in PROJECTED:
+            self._project = self._settler("constraints", np.ones(self.system.form.written, dtype=bool))
+            method.project = self._project.address
         self.method.start(self.start.t, self.y, self.yd)
 
     def _driver(self) -> None:
@@ -194,11 +217,12 @@ class Integration:
     def statistics(self) -> Statistics:
         """Counters so far; residuals and Jacobians of the settling at output instants not included."""
         method, core = self.method.contents, self.system.core
+        residuals, matrices = (0, 0) if self.underlying is None else self.underlying.evaluations
         return Statistics(
             method.steps,
             method.rejected_steps,
-            core.residual_evaluations,
-            core.jacobian_evaluations,
+            core.residual_evaluations + residuals,
+            core.jacobian_evaluations + matrices,
             self.linear.contents.factorisations,
             method.newton_failures,
         )
@@ -264,9 +288,10 @@ class Integration:
         )
 
     def __del__(self) -> None:
-        for name, free in (("run_", "sd_run_free"), ("linear", "sd_linear_free")):
-            if getattr(self, name, None):
-                getattr(lib.core, free)(getattr(self, name))
+        if getattr(self, "run_", None):
+            lib.core.sd_run_free(self.run_)
+        if getattr(self, "linear", None) and self.underlying is None:
+            lib.core.sd_linear_free(self.linear)
 
 
 def integrate(

@@ -12,18 +12,26 @@ from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.patterns import Pattern
 from sysdyn.runtime.system import System
+from sysdyn.runtime.underlying import Underlying
 
 
 class Method:
-    """"bdf" or "radau" on one system.  linear: the core's real factorisation; order: its column order (None: dense)."""
+    """One of "bdf", "radau", "dopri" on one system.
 
-    def __init__(self, name: str, system: System, linear: Any, order: Ints | None) -> None:
+    linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri.
+    """
+
+    def __init__(
+        self, name: str, system: System, linear: Any, order: Ints | None, underlying: Underlying | None = None
+    ) -> None:
         self.name = name
         self._complex: int | None = None
         self._core: Any = None
         if name == "radau":
             self._complex = _complex_linear(system.pattern, order)
             self._core = lib.core.sd_radau_new(c.byref(system.core), linear, self._complex)
+        elif underlying is not None:
+            self._core = lib.core.sd_dopri_new(c.byref(system.core), underlying.core)
         else:
             self._core = lib.core.sd_bdf_new(c.byref(system.core), linear)
         if not self._core:

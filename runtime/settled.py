@@ -122,6 +122,11 @@ class Settler:
         core.kinematics = self._k[0].size
         lib.reader(core.scale, self._moves)[:] = self.scale
 
+    @property
+    def address(self) -> int:
+        """Of the core's structure."""
+        return c.addressof(self.core.contents)
+
     def settle(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
         """y, yd [unknowns as written] moved onto the rows; False where that failed (then they are as given)."""
         a, b = self.system._buffer(y), self.system._buffer(yd)

@@ -20,7 +20,7 @@ from sysdyn.runtime import core_library as lib
 from sysdyn.runtime.accuracy import FINEST, Achieved, Sampled, control
 from sysdyn.runtime.carrier import Carrier
 from sysdyn.runtime.description import Description, Floats, Ints, describe, element
-from sysdyn.runtime.failures import SolverFailure
+from sysdyn.runtime.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.integrate import Integration
 from sysdyn.runtime.rates import determined
 from sysdyn.runtime.request import COMPARED, STEP, TRACE, Finished, Request, Statistics
@@ -28,11 +28,14 @@ from sysdyn.runtime.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure import Structure, index_of, structure
 from sysdyn.runtime.system import System
 from sysdyn.runtime.trace import Column, Parameter, TraceWriter, columns_of
+from sysdyn.runtime.underlying import obstacle
 
 FINE = 1e-4
 """Accuracy from which method auto takes radau."""
 LONG = 1000
-"""Steps of the bdf after which method auto tries radau."""
+"""Steps of the bdf after which method auto tries radau, and of a stiff dopri."""
+STIFF = 1e5
+"""Steps that a stiff dopri which was asked for still takes."""
 ROUND_OFF = 1e-12
 """Of the largest quantity of the same unit."""
 FINEST_RADAU = 1e-17
@@ -120,9 +123,15 @@ class Outcome:
     failure: SolverFailure | None = None
 
 
-def choose_index(wanted: str, facts: Structure) -> tuple[str, int, tuple[str, ...]]:
-    """Form of the runtime, its index, warnings.  Raises ValueError for what does not exist."""
+def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[str, int, tuple[str, ...]]:
+    """Form of the runtime, its index, warnings.  Raises NoSuchForm for a method that cannot integrate the form."""
     written = facts.index
+    if wanted == "auto" and method == "dopri":
+        wanted = "0"
+    if method == "dopri" and wanted != "0":
+        raise NoSuchForm(f"method dopri integrates the underlying equation, index 0, and index {wanted} was asked for")
+    if wanted == "0":
+        return "0", 1, ()
     if written is None:
         return "3", 2, ("the model's index could not be determined: integrated as written",)
     if wanted == "auto":
@@ -138,23 +147,26 @@ def choose_index(wanted: str, facts: Structure) -> tuple[str, int, tuple[str, ..
     if wanted == "2v":
         return "2v", min(written, 2), ()
     if wanted == "1":
-        return "1", min(written, 1), ("index 1: the constraints drift between the instants of the trace",)
-    raise ValueError(f"index {wanted} is not available with methods bdf, radau")
+        return "1", min(written, 1), ()
+    raise ValueError(f"index {wanted}: auto, 3, 2, 2v, 1 or 0")
 
 
 def choose_method(options: Options) -> str:
     """The method of the core, or euler, with which a simulation begins; ValueError for what does not exist.
 
     auto: radau from an accuracy of FINE on, else bdf.  Measured over the seed's models (CPU of radau over that of bdf,
-    geometric mean): 1.08 at 1e-2, 0.78 at 1e-4 and 1e-6, about 0.5 at 1e-9.
+    geometric mean): 1.08 at 1e-2, 0.78 at 1e-4 and 1e-6, about 0.5 at 1e-9.  The underlying equation (index 0) is
+    begun with dopri.
     """
+    if options.method == "auto" and options.index == "0":
+        return "dopri"
     if options.method == "auto":
         wanted = [options.accuracy or 1.0, *(accuracy for _, accuracy in options.accuracy_on)]
         own = options.rtol is not None or options.atol is not None
         return "radau" if min(wanted) <= FINE and not own else "bdf"
-    if options.method in ("bdf", "radau", "euler"):
+    if options.method in ("bdf", "radau", "dopri", "euler"):
         return options.method
-    raise ValueError(f"method {options.method} is not available yet: bdf, radau, euler")
+    raise ValueError(f"method {options.method}: auto, bdf, radau, dopri or euler")
 
 
 def instants(options: Options) -> tuple[Floats, Ints]:
@@ -226,7 +238,8 @@ class _Runs:
             magnitude=magnitude,
             index=self.index,
             stops=options.stops,
-            method="radau" if self.method == "radau" else "bdf",
+            method="bdf" if self.method == "euler" else self.method,
+            stiff_steps=LONG if options.method == "auto" else STIFF,
             least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
             max_order=1 if self.method == "euler" else lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
@@ -377,6 +390,12 @@ def _observed_names(description: Description) -> tuple[str, ...]:
     return tuple(element(row.name, row.shape, k) for row in rows for k in range(row.size))
 
 
+def _listed(names: tuple[str, ...]) -> str:
+    """The first names and how many more, with their verb."""
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
+
+
 def _targets(runs: _Runs, options: Options) -> Floats:
     """Accuracy wanted of each stored quantity; infinite where none is."""
     target = np.full(len(runs.columns), np.inf if options.accuracy is None else options.accuracy)
@@ -413,7 +432,7 @@ def _achieved(runs: _Runs, options: Options) -> Achieved:
 
 
 def _chosen(runs: _Runs, options: Options) -> Achieved:
-    """With method auto: where one method fails, or the bdf needs more than LONG steps, the other begins anew.
+    """With method auto: where one method fails, or the bdf needs more than LONG steps, another begins anew.
 
     Lightly damped oscillations hold the bdf of orders 3 to 5, which are not A-stable, to steps of the fastest of them:
     a line of 10000 sections takes it 25 times the work of radau.
@@ -426,7 +445,7 @@ def _chosen(runs: _Runs, options: Options) -> Achieved:
         limited = failure.cause == "max_steps" and runs.most_steps == options.max_steps
         if limited or failure.cause in ("max_wall", "memory"):
             raise
-        runs.method, runs.patience = "radau" if runs.method == "bdf" else "bdf", None
+        runs.method, runs.patience = "bdf" if runs.method == "radau" else "radau", None
         return _achieved(runs, options)
 
 
@@ -457,8 +476,14 @@ def simulate(
         written = written.without(facts.left_out)
         start = consistent_start(written, options.t_start)
         facts = replace(facts, index=index_of(written, start)[0], undetermined=())
-    form, index, warnings = choose_index(options.index, facts)
+    form, index, warnings = choose_index(options.index, facts, options.method)
     system = written if form == "3" else written.another(form)
+    missing = obstacle(system, start) if form == "0" else ()
+    if missing:
+        raise NoSuchForm(
+            f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "
+            "constraints and the gammas (coordinates without inertia): index 2 or 3 with bdf or radau"
+        )
     name = {"3": str(facts.index), "2": "2"}.get(form, form)
     options = replace(options, attributes={**options.attributes, "index": name})
     runs = _Runs(system, start, options, index, method)

@@ -101,6 +101,8 @@ class System:
             calls[k] = self.call(
                 call.block, call.at, call.to, form.rows, dy=slots[2 * k + 2], dyd=slots[2 * k + 3]
             )
+        self.calls, self._slots = calls, slots
+        self.kinematic_scale = np.ones(form.k_row.size)
         self._scratch = np.zeros(entries)
         cleared = np.flatnonzero(np.isin(self.pattern.row, held[0])).astype(np.int32)
         held_row, held_unknown = (item.astype(np.int32) for item in held)
@@ -119,6 +121,7 @@ class System:
             k_f=lib.pointer(form.k_f),
             k_slot_q=lib.pointer(slots[0]),
             k_slot_f=lib.pointer(slots[1]),
+            k_scale=lib.pointer(self.kinematic_scale),
             held=held_row.size,
             clear=cleared.size,
             held_row=lib.pointer(held_row),
@@ -148,6 +151,19 @@ class System:
             slot_dy=lib.pointer(dy),
             slot_dyd=lib.pointer(dyd),
         )
+
+    def slots_dy(self, call: int) -> Ints:
+        """Places in the pattern of the entries that a call adds to dF/dy."""
+        return self._slots[2 * call + 2]
+
+    def structural(self) -> tuple[Mask, Mask]:
+        """Which places of the pattern [entries] some block writes in dF/dy, in dF/dyd (rows q' - f left out)."""
+        in_y, in_rate = np.zeros(self.pattern.entries, dtype=bool), np.zeros(self.pattern.entries, dtype=bool)
+        for k in range(len(self.form.calls)):
+            in_y[self._slots[2 * k + 2]] = True
+            in_rate[self._slots[2 * k + 3]] = True
+        in_y[self._slots[-1]] = True
+        return in_y, in_rate
 
     def observer(self, block: str) -> lib.Call | None:
         """A call of observe, observe_rate, observe_scale or audit whose rows begin at 0."""

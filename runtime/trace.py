@@ -167,6 +167,15 @@ class Quantity:
         return iter(self.values)
 
 
+@contextlib.contextmanager
+def _damaged(path: Path) -> Iterator[None]:
+    """What h5py raises of a file whose layout makes no sense as TraceError."""
+    try:
+        yield
+    except (KeyError, TypeError, AttributeError, OverflowError, MemoryError) as error:
+        raise TraceError(f"{path}: not readable as a trace: {error}") from error
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, bytes | np.bytes_):
         return value.decode("utf-8")
@@ -189,14 +198,17 @@ class Trace:
         import h5py
 
         path = Path(file)
-        with input_output(path), h5py.File(path, "r") as source:
+        with _damaged(path), input_output(path), h5py.File(path, "r") as source:
             data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
             if "time" not in data:
                 raise ValueError("no data set 'time': not a trace")
             group = {
-                f"{key}.{name}": item for key in ("audit",) for name, item in source.get(key, {}).items()
+                f"{key}.{name}": item
+                for key in ("audit",)
+                for name, item in source.get(key, {}).items()
+                if isinstance(item, h5py.Dataset)
             }
-            rates = dict(source.get("derivatives", {}).items())
+            rates = {n: item for n, item in source.get("derivatives", {}).items() if isinstance(item, h5py.Dataset)}
             length = min(
                 item.shape[0] for item in (*data.values(), *group.values(), *rates.values()) if item.ndim == 1
             )

@@ -21,6 +21,8 @@ from sysdyn.runtime.description import Description, Floats, element
 from sysdyn.runtime.failures import TraceError
 
 BLOCK = 1024
+HEAD = 1 << 16
+"""Bytes for what is not numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +101,8 @@ class Store:
         self.path = path
         self._length = 0
         self._closed = False
+        self._sets: list[tuple[Any, int]] = []
+        self._room(0)
         self._file = h5py.File(path, "w", libver=("earliest", "v110"))
         try:
             _set(self._file.attrs, {**layout.attributes, "final": np.int64(0)})
@@ -157,9 +161,14 @@ class Store:
         self._file.flush()
 
     def _room(self, rows: int) -> None:
-        """Refuses to begin what the disk cannot hold."""
+        """Refuses to begin what the disk, or a limit on the size of files, cannot hold."""
         blocks = rows // BLOCK + 2
-        need = len(self._sets) * blocks * BLOCK * 8 // (1 if rows >= BLOCK else 4) + (1 << 16)
+        whole = len(self._sets) * blocks * BLOCK * 8
+        need = whole // (1 if rows >= BLOCK else 4) + HEAD
+        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+        size = self.path.stat().st_size if self.path.exists() else 0
+        if limit != resource.RLIM_INFINITY and limit < size + whole + HEAD:
+            raise OSError(27, "the trace would outgrow the limit on the size of files")
         disk = os.statvfs(self.path.parent)
         if disk.f_bavail * disk.f_frsize < need:
             raise OSError(28, "no space left on the disk for the trace")

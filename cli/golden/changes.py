@@ -6,12 +6,12 @@ import json
 from collections.abc import Sequence
 from html import escape
 
-from sysdyn.cli.comparison_page import document
 from sysdyn.cli.diffing import differences, headline, table
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.checking import Case, loaded, tolerance_of
 from sysdyn.cli.golden.recording import Recorded
 from sysdyn.cli.golden.structures import changed
+from sysdyn.cli.page.document import document
 from sysdyn.runtime.comparison.verdict import Incomparable
 from sysdyn.runtime.failures import TraceError
 

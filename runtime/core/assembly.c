@@ -8,7 +8,7 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
 {
     memset(r, 0, (size_t)system->rows * sizeof *r);
     for (int32_t i = 0; i < system->kinematics; i++)
-        r[system->k_row[i]] = yd[system->k_q[i]] - y[system->k_f[i]];
+        r[system->k_row[i]] = system->k_scale[i] * (yd[system->k_q[i]] - y[system->k_f[i]]);
     for (int32_t c = 0; c < system->calls; c++)
         system->call[c].rows(&system->call[c].frame, t, y, yd, r);
     for (int32_t i = 0; i < system->held; i++)
@@ -32,8 +32,8 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
     memset(jy, 0, (size_t)system->entries * sizeof *jy);
     memset(jyd, 0, (size_t)system->entries * sizeof *jyd);
     for (int32_t i = 0; i < system->kinematics; i++) {
-        jyd[system->k_slot_q[i]] += 1.0;
-        jy[system->k_slot_f[i]] -= 1.0;
+        jyd[system->k_slot_q[i]] += system->k_scale[i];
+        jy[system->k_slot_f[i]] -= system->k_scale[i];
     }
     for (int32_t c = 0; c < system->calls; c++) {
         const sd_call *call = &system->call[c];

@@ -285,6 +285,20 @@ static int too_small(const sd_bdf *bdf)
     return bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), left) && bdf->h < left;
 }
 
+/* The new point moved onto every constraint; the correction moves with it, and so do the differences made of it. */
+static void project(sd_bdf *bdf)
+{
+    size_t size = (size_t)bdf->n * sizeof(double);
+    memcpy(bdf->predicted, bdf->y, size);
+    memcpy(bdf->predicted_d, bdf->yd, size);
+    if (sd_settle_point(bdf->project, bdf->t, bdf->predicted, bdf->predicted_d))
+        return;
+    for (int32_t i = 0; i < bdf->n; i++) {
+        bdf->ee[i] += bdf->predicted[i] - bdf->y[i];
+        bdf->y[i] = bdf->predicted[i];
+    }
+}
+
 int sd_bdf_step(sd_bdf *bdf)
 {
     int32_t error_failures = 0, order_next = 1;
@@ -326,6 +340,8 @@ int sd_bdf_step(sd_bdf *bdf)
     bdf->cause = SD_FINE;
     double t = bdf->t + bdf->h;
     bdf->t = fabs(bdf->t_end - t) <= 1e-12 * bdf->h ? bdf->t_end : t;
+    if (bdf->project)
+        project(bdf);
     sd_bdf_accept(bdf, order_next);
     return SD_FINE;
 }

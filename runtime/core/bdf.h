@@ -41,6 +41,7 @@ typedef struct sd_bdf {
     int64_t steps, rejected_steps, newton_failures, newton_iterations;
     int64_t taken;            /* steps since the last start */
     int32_t cause, bad_row, bad_column;
+    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
     sd_stepper stepper;
 } sd_bdf;
 

@@ -394,6 +394,20 @@ static void accept(sd_radau *radau, double error, int iterations)
         radau->h = fmin(next, radau->h_max);
 }
 
+/* the new point moved onto every constraint, and q' with f */
+static void project(sd_radau *radau)
+{
+    size_t size = (size_t)radau->n * sizeof(double);
+    memcpy(radau->point, radau->phi, size);
+    memcpy(radau->point_d, radau->yd, size);
+    if (sd_settle_point(radau->project, radau->t, radau->point, radau->point_d))
+        return;
+    memcpy(radau->phi, radau->point, size);
+    for (int32_t i = 0; i < radau->n; i++)
+        if (radau->smooth[i])
+            radau->slope[0][i] = radau->yd[i] = radau->point_d[i];
+}
+
 int sd_radau_step(sd_radau *radau)
 {
     int singular = 0, iterations = 0, failures = 0;
@@ -452,5 +466,7 @@ int sd_radau_step(sd_radau *radau)
     }
     radau->cause = SD_FINE;
     accept(radau, error, iterations);
+    if (radau->project)
+        project(radau);
     return SD_FINE;
 }

@@ -49,6 +49,7 @@ typedef struct sd_radau {
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;
     int32_t cause, bad_row, bad_column;
+    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
     sd_stepper stepper;
 } sd_radau;
 

@@ -53,9 +53,21 @@ static void audit(const sd_run *run, double t, const double *y, const double *yd
 static void integrate(sd_run *run, double to, double *dissipated, double *supplied, double *end)
 {
     static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
+    const sd_stepper *stepper = run->stepper;
     double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from), out[4], sum[2] = {0.0, 0.0};
     if (!run->audit || half == 0.0) {
         *dissipated = *supplied = 0.0;
+        return;
+    }
+    if (stepper->nodes && to == *stepper->t) {
+        *dissipated = *supplied = 0.0;
+        for (int32_t k = 0; k < stepper->nodes; k++) {
+            if (stepper->node_weight[k] == 0.0)
+                continue;
+            audit(run, from + stepper->node[k] * (to - from), stepper->node_y[k], stepper->node_yd[k], out);
+            *dissipated += (to - from) * stepper->node_weight[k] * out[2];
+            *supplied += (to - from) * stepper->node_weight[k] * out[3];
+        }
         return;
     }
     for (int k = -1; k <= 1; k += 2) {

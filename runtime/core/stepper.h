@@ -1,6 +1,6 @@
 /* What the driver of an integration asks of a method: steps, values within the last step, a start.
  *
- * Every method (bdf.h, radau.h) holds one of these about itself; run.c knows methods by nothing else.
+ * Every method (bdf.h, radau.h, dopri.h) holds one of these about itself; run.c knows methods by nothing else.
  */
 #ifndef SYSDYN_STEPPER_H
 #define SYSDYN_STEPPER_H
@@ -16,7 +16,8 @@ enum sd_cause {
     SD_NONFINITE = 4,  /* the residual is not finite: row */
     SD_STEP = 5,       /* the step size fell below what t resolves */
     SD_STOPPED = 6,    /* a callback of the caller failed */
-    SD_MEMORY = 7
+    SD_MEMORY = 7,
+    SD_STIFF = 8       /* an explicit method is held to tiny steps by stability */
 };
 
 typedef struct sd_stepper {
@@ -34,6 +35,11 @@ typedef struct sd_stepper {
     void (*refine)(void *self, sd_settle *settle);
     /* from (t, y, yd) with step h (0: chosen) */
     void (*start)(void *self, double t, const double *y, const double *yd, double h);
+    /* a quadrature of the method's own order over the last step (nodes 0: values of `dense` serve): instants and
+     * weights as parts of the step, y, yd [n] there */
+    int32_t nodes;
+    const double *node, *node_weight;
+    double *const *node_y, *const *node_yd;
 } sd_stepper;
 
 #endif

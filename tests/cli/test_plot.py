@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.picture import curve, panels_of, unit_text
+from sysdyn.cli.panels import curve, panels_of, unit_text
+from sysdyn.cli.sparkline import sparkline
 from sysdyn.runtime.trace import Quantity, Trace
 from texts import PENDULUM, write
 
@@ -40,7 +41,31 @@ def test_pictures(capsys):
 
 
 @pytest.mark.usefixtures("traces")
-@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_a_summary_without_a_file(capsys):
+    assert run(["plot", "a.h5", "b.h5", "x", "speed"]) == 0
+    head, *lines = capsys.readouterr().out.splitlines()
+    assert head.split() == ["quantity", "unit", "min", "max", "0", "to", "1", "s"]
+    assert [line.split()[:3] for line in lines] == [
+        [name, label, unit] for name, unit in (("x,", "m"), ("speed,", "m/s")) for label in "ab"
+    ]
+    assert all(len(line) <= 100 for line in lines)
+    assert run(["plot", "-q", "a.h5"]) == 0
+    assert run(["plot", "a.h5", "-o", "a.svg"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_sparklines():
+    time = np.linspace(0.0, 1.0, 5)
+    assert sparkline(time, time, 0.0, 1.0, 8) == "▁▂▃▄▅▆▇█"
+    assert sparkline(time, 0.0 * time + 3.0, 0.0, 1.0, 4) == "▅▅▅▅"
+    assert sparkline(time, time, 0.0, 2.0, 8) == "▁▃▅▇█   "
+    assert sparkline(time, time * np.nan, 0.0, 1.0, 8) == ""
+    spike = np.where(np.arange(10_001) == 5000, 9.0, 0.0)
+    assert max(sparkline(np.linspace(0.0, 1.0, 10_001), spike, 0.0, 1.0, 20)) > "▁"
+
+
+@pytest.mark.usefixtures("traces")
+@pytest.mark.parametrize("kind", ["png", "svg", "html"])
 def test_the_same_trace_gives_the_same_bytes(kind):
     for name in ("one", "two"):
         assert run(["plot", "-q", "a.h5", "-o", f"{name}.{kind}"]) == 0
@@ -53,9 +78,8 @@ def test_the_same_trace_gives_the_same_bytes(kind):
     [
         (["a.h5", "sped"], "nearest: 'speed'"),
         (["a.h5", "qqqqq"], "there are: "),
-        (["a.h5", "-o", "a.html"], ".html are not supported yet (planned: reports)"),
-        (["a.h5", "-o", "a.pdf"], "a picture is one of .png, .svg"),
-        (["a.h5", "-o", "a"], "a picture is one of .png, .svg"),
+        (["a.h5", "-o", "a.pdf"], "a picture is one of .png, .svg, .html"),
+        (["a.h5", "-o", "a"], "a picture is one of .png, .svg, .html"),
     ],
 )
 def test_wrong_usage(arguments, said, capsys):
