@@ -273,9 +273,40 @@ def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
     return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
 
 
+def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
+    """X with everything else as the implicit unknowns at their guesses make it: of two roots of a gamma the iteration
+    then begins at that of the guess.
+
+    Left out are gammas that are not linear, held what their text guesses of implicit unknowns (all that stand in them,
+    where it guesses none).
+    """
+    implicit = np.append(starter.kinds == "e", np.zeros(starter.rates.size, dtype=bool))
+    gammas = starter.groups("gamma")
+    if not gammas.any() or not implicit.any():
+        return x
+    scale = starter.scale(t, x)
+    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * scale))
+    bent = np.zeros(starter.settled.rows, dtype=bool)
+    bent[starter.rows[here != there]] = True
+    bent &= gammas
+    written = np.append(starter.given.written, np.zeros(starter.rates.size, dtype=bool))
+    own = bent[starter.rows] & implicit[starter.columns]
+    own_rows, own_columns = starter.rows[own], starter.columns[own]
+    said = np.zeros(starter.settled.rows, dtype=bool)
+    said[own_rows[written[own_columns]]] = True
+    held = np.zeros(x.size, dtype=bool)
+    held[own_columns[written[own_columns] | ~said[own_rows]]] = True
+    if not held.any():
+        return x
+    rows = starter.every & ~bent & ~starter.groups("gamma_rate")
+    may = free & ~held & starter.following(t, x)
+    found = solve(_problem(starter, t, x, guess, rows=rows, free=may), x)
+    return found.x if found.residual < EXACT else x
+
+
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """What follows from the staged state; where nothing does, everything at once, then from perturbed points."""
-    x = _stages(starter, t, guess.copy(), guess, free)
+    x = _beside_gammas(starter, t, _stages(starter, t, guess.copy(), guess, free), guess, free)
     best, holds = _rescaled(starter, t, x, guess, free & starter.following(t, x))
     if holds:
         return best, True

@@ -82,4 +82,4 @@ def test_a_guess_on_a_singular_point_starts_alike_in_both_formulations(tmp_path)
         trace = Trace.open(tmp_path / "t.h5")
         assert abs(trace["b"][0]) == pytest.approx(0.4, rel=1e-9)
         assert abs(trace["d'"][0]) <= 1e-9
-        assert trace["a'"][0] == pytest.approx((0.05 - 0.1 * trace["b"][0]) / 0.3, rel=1e-9)
+        assert trace["a'"][0] == pytest.approx((0.05 - 0.1 * trace["b"][0]) / 0.3, rel=1e-5)

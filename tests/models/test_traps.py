@@ -228,7 +228,6 @@ scene go of load {
 """
 
 
-@pytest.mark.xfail(strict=True, reason="the start ends at 5997 A, 0.17 V: the node's effort is guessed as 0 V")
 def test_the_start_is_the_root_at_the_guess(tmp_path):
     trace = trace_of(tmp_path, LOAD)
     assert trace["v"].values[0] == pytest.approx(180.0 + np.sqrt(180.0**2 - 60.0), rel=1e-6)
