@@ -21,9 +21,9 @@ from sysdyn.dsl.network import Shape
 KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
 AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
 BLOCKS = (
-    "dynamics", "dynamics_rate", "phi_reaction", "psi_reaction", "momentum", "momentum_rate", "phi", "phi_rate",
-    "phi_acceleration", "psi", "psi_rate", "gamma", "gamma_rate", "lambda", "observe", "observe_rate", "observe_scale",
-    "audit", "initial",
+    "dynamics", "dynamics_rate", "phi_reaction", "phi_normal", "psi_reaction", "momentum", "momentum_rate", "phi",
+    "phi_rate", "phi_acceleration", "psi", "psi_rate", "gamma", "gamma_rate", "lambda", "observe", "observe_rate",
+    "observe_scale", "audit", "initial",
 )  # fmt: skip
 # the block whose row families a block shares
 HOME = {
@@ -143,7 +143,7 @@ def _verify_summand(block: str, summand: Summand, bound: set[str], known: set[tu
             assert not (kind == "q" and order), f"{block} reads the derivative of a displacement"
             rated = ("f", "p", "s", "e", "kappa", "mu") if block == "dynamics_rate" else ("f", "p", "s", "e")
             assert order == 0 or kind in rated, (block, node)
-    if block in ("phi", "phi_rate", "phi_reaction", "psi_reaction", "psi", "gamma"):
+    if block in ("phi", "phi_rate", "phi_reaction", "phi_normal", "psi_reaction", "psi", "gamma"):
         late = [n for n in variables(summand.expression) if n.op == "var" and n.data[2] and n.data[1] != "s"]
         assert not late, (block, late)
 

@@ -1,11 +1,10 @@
 """EnergyModel -> DescriptorForm of Kane: Lagrange's balances projected on the motions that Psi leaves free.
 
-    q' = f;   B^T (M f' - Upsilon) = 0;   0 = Psi        where Psi_f B = 0
+    q' = f;   B^T (M f' + Phi_q^T kappa - Upsilon) = 0;   0 = Phi;   0 = Psi        where Psi_f B = 0
 
 (book, afterword; Kane, Levinson: Dynamics, 1985, 4.6).  Psi needs no multipliers: its reactions do no work along the
 columns of B.  B is found by elimination without division, so that it is regular wherever a pivot is; one that is a
-number comes first.  A reaction that something reads is kept with Psi_f Psi_f^T mu = Psi_f (Upsilon - M f') as its row.
-Displacement constraints are refused: their stabilised form needs the balances of all coordinates.
+number comes first.  A reaction that something reads is kept with Psi_f Psi_f^T mu = Psi_f (Upsilon - ...) as its row.
 """
 
 from __future__ import annotations
@@ -70,9 +69,6 @@ def projection(model: EnergyModel) -> Projection:
         message = "formulation kane: the model has no flow constraint that it could leave out"
         where = next((f.place for f in (*model.coordinates, *model.states, *model.unknowns)), None)
         raise ModelError((Diagnostic("E607", message, where, "formulation lagrangian"),))
-    held = next(iter(model.of_kind("phi")), None)
-    if held is not None:
-        raise _impossible(held, f"displacement constraint {held.name} stands beside psi {next(iter(rows))}")
     reduced = {name: dict(entries) for name, entries in rows.items()}
     pivots: dict[str, str] = {}
     for _ in rows:
@@ -191,6 +187,10 @@ class _Projected:
         for row in self.lagrange.rows:
             if row.block != "dynamics" or row.owner not in self.found.bound:
                 self.assembly.family(row)
+        if self.lagrange.block("phi_reaction") is not None:
+            for row in self.lagrange.rows:
+                if row.block == "dynamics":
+                    self.assembly.family(replace(row, block="phi_normal", kind="phi_normal"))
         multipliers = {f.owner: f for f in self.lagrange.families if f.kind == "mu"}
         for label in sorted(self.read):
             family = multipliers[label]
@@ -219,6 +219,8 @@ class _Projected:
                     if HOME.get(block.name, block.name) != "dynamics":
                         self.assembly.add(block.name, row.owner, summand.at, kernel.nest, summand.expression)
                         continue
+                    if block.name == "phi_reaction":
+                        self.assembly.add("phi_normal", row.owner, summand.at, kernel.nest, summand.expression)
                     self._balance(block.name, row.owner, summand.at, kernel.nest, summand.expression)
 
     def _balance(self, block: str, owner: str, at: tuple[Node, ...], nest: Nest, value: Node) -> None:

@@ -31,6 +31,7 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
     "2": (
         *_HEAD,
         ("phi_reaction", "kinematics"),
+        ("phi_normal", "kinematics"),
         ("momentum", "momentum"),
         ("phi", "phi"),
         ("phi_rate", "phi_rate"),
@@ -162,13 +163,10 @@ def _kinematics(description: Description, at: Ints) -> tuple[Ints, Ints, dict[st
     return np.concatenate(places_q).astype(np.int32), np.concatenate(places_f).astype(np.int32), first
 
 
-def _stabilised(rows: tuple[RowFamily, ...], to: Ints, first: dict[str, int]) -> Ints:
-    """`to` of phi_reaction that adds to the rows q' - f of the same coordinates."""
-    table = to.copy()
-    for k, row in enumerate(rows):
-        if row.block == "dynamics":
-            table[k] = first.get(row.owner, NOWHERE)
-    return table
+def _stabilised(rows: tuple[RowFamily, ...], home: str, first: dict[str, int]) -> Ints:
+    """`to` of a block that adds to the rows q' - f of the coordinates that its rows are of."""
+    places = [first.get(row.owner, NOWHERE) if row.block == home else NOWHERE for row in rows]
+    return np.array(places, dtype=np.int32)
 
 
 def plan(description: Description, name: str) -> Form:
@@ -186,10 +184,13 @@ def plan(description: Description, name: str) -> Form:
     groups: list[tuple[str, int, int]] = []
     calls: list[Planned] = []
     stabilised = name == "2" and "phi" in description.blocks
+    normal = "phi_normal" if "phi_normal" in description.blocks else "phi_reaction"
     for block, group in FORMS[name]:
         if block not in description.blocks or (
             group in ("kinematics", "phi_rate") and name == "2" and not stabilised
         ):
+            continue
+        if group == "kinematics" and block != normal:
             continue
         if group != "kinematics" and group not in tables:
             tables[group] = np.full(len(description.rows), NOWHERE, dtype=np.int32)
@@ -201,7 +202,7 @@ def plan(description: Description, name: str) -> Form:
             for k in description.families_of("kappa"):
                 nu[k] = len(kind)
                 kind += ["nu"] * description.families[k].size
-            calls.append(Planned(block, nu, _stabilised(description.rows, tables["dynamics"], first)))
+            calls.append(Planned(block, nu, _stabilised(description.rows, BASE.get(block, block), first)))
         else:
             calls.append(Planned(block, at, tables[group]))
     return Form(

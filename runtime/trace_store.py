@@ -1,6 +1,7 @@
 """One HDF5 file of a trace: its layout, rows appended in raw float64 blocks.
 
-/time (a dimension scale), one data set a traced quantity, /derivatives/<name>, /audit/energy, /audit/constraints,
+/time (a dimension scale), one data set a traced quantity, /derivatives/<name>, /audit/energy, /audit/constraints (and
+links to other members of the audit that are traced),
 /parameters/<name>, root attributes with `final`.  A disk that fills up raises: the handle is turned to memory before
 HDF5 closes the file, which otherwise ends in SIGSEGV at exit.
 """
@@ -120,6 +121,9 @@ class Store:
             data = self._data(column.name, column.unit, column.long_name, time)
             data.attrs["nominal"] = 0.0
             self._sets.append((data, 8 + column.place))
+            group, _, member = column.name.partition(".")
+            if group == "audit" and member not in ("energy", "constraints"):
+                self._file[f"/audit/{member}"] = data
             if column.derivative:
                 path = f"/derivatives/{column.name}"
                 unit = f"({column.unit})/s" if column.unit != "1" else "1/s"

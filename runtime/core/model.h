@@ -16,6 +16,7 @@
  *   dynamics          Lagrange: M f' - Y;  Hamilton: p' - U (coordinates with momentum), -U (without)
  *   dynamics_rate     the total time derivative of balances without inertia (reads yd of e, kappa, mu)
  *   phi_reaction      Phi_q^T kappa, added to the rows of dynamics
+ *   phi_normal        Phi_q^T kappa by coordinate, where the balances are not those of coordinates (Kane): for q' - f
  *   psi_reaction      Psi_f^T mu, added to the rows of dynamics
  *   momentum          p - dT/df (Hamilton), or dT/dp - f where the author gave T
  *   momentum_rate     its total time derivative

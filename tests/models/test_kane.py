@@ -51,6 +51,26 @@ scene s of belt {
 """
 
 
+HELD = """
+model rod {
+  coord x: translation = 1 m
+  coord y: translation = 0 m
+  coord th: rotation = 0 rad
+  energy T* = 1/2*2 kg*(x'^2 + y'^2) + 1/2*0.3 kg.m^2*th'^2
+  energy V = 2 kg*g0*y
+  phi rim: x^2 + y^2 = 1 m^2
+  psi roll: th' = 2 rad/m*x'*cos(th)
+  init y' = 0.3 m/s
+  init th' ~ 1 rad/s
+}
+
+scene s of rod {
+  time 0 s to 2 s
+  trace x, y, th, rim.multiplier every 10 ms
+}
+"""
+
+
 def simulated(tmp_path, path, formulation, **options):
     report = Report()
     output = tmp_path / f"{formulation}.h5"
@@ -85,6 +105,19 @@ def test_reactions_on_request(tmp_path, text):
         wanted = lagrange[name].values
         assert np.max(np.abs(kane[name].values - wanted)) <= 1e-6 * np.max(np.abs(wanted)), name
     assert abs(kane["audit/energy"].values).max() <= 1e-5
+
+
+def test_displacement_constraints_keep_their_multipliers(tmp_path):
+    path = tmp_path / "model.sd"
+    path.write_text(HELD)
+    _, lagrange = simulated(tmp_path, path, "lagrangian", accuracy=1e-7)
+    ran, kane = simulated(tmp_path, path, "kane", accuracy=1e-7)
+    assert [f.kind for f in ran.prepared.compiled.form.families if f.kind in ("kappa", "mu")] == ["kappa"]
+    assert ran.outcome.index == "2"
+    assert kane["audit/constraints"].values.max() <= 1e-9
+    for name in lagrange.names:
+        wanted = lagrange[name].values
+        assert np.max(np.abs(kane[name].values - wanted)) <= 1e-6 * np.max(np.abs(wanted)), name
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,249 @@
+"""Energy balance by element: what each stored, dissipated and supplied over the run.
+
+Elements: the integral of e f of each branch.  Statements: T*, T, V, V* by their value at start and end (T of T* by
+f.dT*/df - T*), content by f.dD/df, work by effort times the rate of its displacement.  Families are summed.  The powers
+are integrated by the solver in a run of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from sysdyn.cli.page.document import escape, table
+from sysdyn.compiler.energies import flows
+from sysdyn.compiler.terms import canonical, local_variables, split, terms
+from sysdyn.dsl import dimensions as dim
+from sysdyn.dsl.diagnostics import ModelError, Place
+from sysdyn.dsl.expression import Node, add, const, derivative, index, mul, neg, rate, reduction, sub, substitute, var
+from sysdyn.dsl.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
+from sysdyn.dsl.units import si
+from sysdyn.runtime.trace import Trace
+
+MOST = 400
+"""Elements and statements whose power is observed."""
+ROLES = {"kinetic": "held", "potential": "held", "dissipator": "out", "effort": "in", "flow": "in", "port": "through"}
+_RATES = {"T*": ("f", "nf", "bf"), "D": ("f", "nf", "bf"), "V*": ("f", "ne", "be"), "G": ("f", "ne", "be")}
+REST = 1e-6
+"""Of the largest energy: what is left below that is round-off and the solver's error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """An element or statement.  name: of its observation; power: expression is integrated, else an energy."""
+
+    name: str
+    label: str
+    role: str  # held out in through
+    power: bool
+    expression: Node
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Energy in J of an element over the run: held: change of what is stored, out: dissipated, in: supplied, through:
+    absorbed by one side of a coupling.
+    """
+
+    label: str
+    role: str
+    energy: float
+    place: Place | None
+
+
+def observed(network: Network) -> tuple[Network, tuple[Part, ...]]:
+    """The network with a quadrature and an observation of each part; what cannot be written is left out."""
+    parts: list[Part] = []
+    for found in (*_of_branches(network.branches), *_of_statements(network)):
+        parts += found
+        if len(parts) > MOST:
+            return network, ()
+    unit = si(dim.ENERGY)
+    states, dynamics, initials, extra = [], [], [], []
+    for part in parts:
+        value = part.expression
+        if part.power:
+            states.append(State(part.name, (), unit, part.place))
+            value = var(part.name, "s")
+            dynamics.append(Dynamic(value, part.expression, (), part.place))
+            initials.append(Initial(value, const(0.0), True, (), part.place))
+        extra.append(Observation(part.name, value, unit, part.label, part.place))
+    richer = replace(
+        network,
+        states=(*network.states, *states),
+        dynamics=(*network.dynamics, *dynamics),
+        initials=(*network.initials, *initials),
+        observations=(*network.observations, *extra),
+        expectations=(),
+        statics=(),
+        goldens=(),
+    )
+    return richer, tuple(parts)
+
+
+def shares(trace: Trace, parts: Sequence[Part]) -> tuple[Share, ...]:
+    """The energies of a run."""
+    found = []
+    if not trace.time.size:
+        return ()
+    for part in parts:
+        first, last = trace[part.name].values[[0, -1]]
+        found.append(
+            Share(part.label, part.role, float(first - last if part.role == "in" else last - first), part.place)
+        )
+    return tuple(found)
+
+
+def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
+    """One part a family of branches (its pieces added)."""
+    families: dict[str, list[Branch]] = {}
+    for branch in branches:
+        families.setdefault(branch.name, []).append(branch)
+    for name, pieces in families.items():
+        first = pieces[0]
+        if first.kind not in ROLES or first.domain.pseudo:
+            continue
+        power = [
+            _over(b.loops, mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at))) for b in pieces if b.kind in ROLES
+        ]
+        label = shown(name) + (f"[{_ranges(pieces)}]" if first.at else "")
+        yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place)]
+
+
+def shown(name: str) -> str:
+    """The name of a branch as an author knows it: `emf#2` is side 2 of emf."""
+    own, _, side = name.partition("#")
+    return f"{own}, side {side}" if side else own
+
+
+def _ranges(pieces: Sequence[Branch]) -> str:
+    if len(pieces) > 1:
+        return "…"
+    return ", ".join([f"{loop.first}..{loop.last}" for loop in pieces[0].loops] or list(map(str, pieces[0].at)))
+
+
+def _of_statements(network: Network) -> Iterator[list[Part]]:
+    counts: dict[str, int] = {}
+    statements: tuple[Energy | Work, ...] = (*network.energies, *network.works)
+    for statement in statements:
+        kind = statement.function if isinstance(statement, Energy) else "work"
+        counts[kind] = counts.get(kind, 0) + 1
+        label = f"{kind} (line {statement.place.start[0]})"
+        try:
+            role, power, value = _measure(statement)
+        except (ModelError, ValueError):  # a product over a range has no derivative here
+            continue
+        yield [Part(f"power of {kind} {counts[kind]}", label, role, power, value, statement.place)]
+
+
+def _measure(statement: Energy | Work) -> tuple[str, bool, Node]:
+    """Role, whether it is a power, and the expression."""
+    if isinstance(statement, Work):
+        return "in", True, neg(_work(statement))
+    if statement.function in ("D", "G"):
+        return "out", True, _content(statement)
+    return "held", False, _stored(statement)
+
+
+def _over(loops: Sequence[Loop], body: Node) -> Node:
+    for loop in reversed(loops):
+        body = reduction("sum", loop.index, loop.first, loop.last, body)
+    return body
+
+
+def _named(loops: Sequence[Loop], body: Node) -> Node:
+    """A sum over canonical loops, whose variables get names of their own."""
+    change = {index(loop.index): index(f"of{loop.index}") for loop in loops}
+    renamed = [Loop(f"of{loop.index}", substitute(loop.first, change), substitute(loop.last, change)) for loop in loops]
+    return _over(renamed, substitute(body, change))
+
+
+def _along(expression: Node, kinds: Sequence[str]) -> Node:
+    return add(*(mul(f, derivative(expression, f)) for f in local_variables(expression, kinds)))
+
+
+def _stored(statement: Energy) -> Node:
+    pieces = []
+    for term in terms(flows(statement.expression), statement.loops, statement.place):
+        kinds = _RATES.get(statement.function)
+        value = term.expression if kinds is None else sub(_along(term.expression, kinds), term.expression)
+        pieces.append(_named(term.loops, value))
+    return add(*pieces)
+
+
+def _content(statement: Energy) -> Node:
+    found = terms(flows(statement.expression), statement.loops, statement.place)
+    return add(*(_named(t.loops, _along(t.expression, _RATES[statement.function])) for t in found))
+
+
+def _work(statement: Work) -> Node:
+    nest, (effort, on) = canonical(statement.loops, flows(statement.effort), flows(statement.on))
+    pieces = []
+    for term in split(on, nest, statement.place):
+        moving = local_variables(term.expression, ("q", "nq", "bq"))
+        speed = add(*(mul(r, derivative(term.expression, q)) for q in moving if (r := rate(q)) is not None))
+        pieces.append(_named(term.loops[len(nest) :], speed))
+    return _named(nest, mul(effort, add(*pieces)))
+
+
+# ---- the section
+
+
+def section(found: Sequence[Share] | None, link: Sequence[str], balance: float) -> str:
+    """Bars and a table.  link: labels of the shares as HTML; balance: audit.energy at the end, J."""
+    if not found:
+        why = "there is no power in it, or its run failed or took long"
+        return f'<p class="soft">The energies of the elements were not measured: {why}.</p>'
+    words = {"held": "stored", "out": "dissipated", "in": "supplied", "through": "passed on"}
+    rows = []
+    for share, label in zip(found, link, strict=True):
+        rows.append([label, *(joules(share.energy) if share.role == c else "" for c in words)])
+    sums = {c: sum(s.energy for s in found if s.role == c) for c in words}
+    rest = sums["held"] + sums["out"] - sums["in"]
+    if abs(rest) > max(REST * max(abs(s.energy) for s in found), 10.0 * abs(balance)):
+        rows.append(["constraints and statements that move in time", "", "", joules(rest), ""])
+        sums["in"] += rest
+    rows.append(["<b>sum</b>", *(f"<b>{joules(sums[c])}</b>" if c != "through" else "" for c in words)])
+    heads = ["element or statement", *(f"{word} [J]" for word in words.values())]
+    line = f'<p class="soft">Stored + dissipated − supplied over the run: {joules(balance)} J (audit.energy).'
+    if any(s.role == "through" for s in found):
+        line += " A coupling passes on what its first side absorbs: its sides add up to nothing."
+    return _bars(found) + table(heads, rows, left=(0,)) + line + "</p>"
+
+
+def joules(value: float) -> str:
+    """An energy to four digits."""
+    return "–" if not np.isfinite(value) else f"{value:.4g}".replace("-", "−")
+
+
+def _bars(parts: Sequence[Share]) -> str:
+    """The largest as bars about zero."""
+    drawn = sorted((p for p in parts if p.role != "through" and np.isfinite(p.energy)), key=lambda p: -abs(p.energy))
+    drawn = [p for p in drawn[:24] if abs(p.energy) > 0.0]
+    if not drawn:
+        return ""
+    low, high = min(0.0, *(p.energy for p in drawn)), max(0.0, *(p.energy for p in drawn))
+    wide, left, step = 460.0, 190.0, 20
+    scale = wide / (high - low)
+    zero = left - low * scale
+    height = step * len(drawn) + 8
+    body = []
+    for k, p in enumerate(drawn):
+        x, w = zero + min(p.energy, 0.0) * scale, max(abs(p.energy) * scale, 0.5)
+        y = 4 + step * k
+        body.append(f'<text x="{left - 8:.0f}" y="{y + 13}" text-anchor="end">{escape(_short(p.label))}</text>')
+        body.append(f'<rect class="{p.role}" x="{x:.1f}" y="{y + 3}" width="{w:.1f}" height="{step - 7}"/>')
+        end = x + w if p.energy >= 0 else max(zero, x + w)
+        body.append(f'<text x="{end + 5:.1f}" y="{y + 13}">{joules(p.energy)} J</text>')
+    body.append(f'<line class="axis" x1="{zero:.1f}" x2="{zero:.1f}" y1="0" y2="{height}"/>')
+    key = (("held", "stored", "--ref"), ("out", "dissipated", "--bad"), ("in", "supplied", "--good"))
+    legend = "".join(f'<span><i style="background:var({c})"></i>{word}</span>' for _, word, c in key)
+    size = f'viewBox="0 0 780 {height}" width="780" height="{height}"'
+    svg = f'<svg class="bars" {size} role="img">{"".join(body)}</svg>'
+    return f'<div class="wide">{svg}</div><p class="legend">{legend}</p>'
+
+
+def _short(label: str) -> str:
+    return label if len(label) <= 28 else f"{label[:27]}…"

@@ -1,0 +1,146 @@
+"""From the options of `sysdyn report` to a study: compile, run, measure the energy of each element."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from sysdyn.cli import targets
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.prepare import Prepared, prepare
+from sysdyn.cli.report.balance import Share, observed, shares
+from sysdyn.cli.report.study import Study, sources_of
+from sysdyn.cli.running import Ran, Request, check_tolerances, integrate, options_of
+from sysdyn.cli.starting import start
+from sysdyn.cli.targets import Target
+from sysdyn.dsl import load
+from sysdyn.dsl.diagnostics import Report
+from sysdyn.dsl.network import Network
+from sysdyn.runtime.failures import TraceError
+from sysdyn.runtime.simulate import Options, Progress
+from sysdyn.runtime.trace import Trace
+
+LONG = 20.0
+"""Wall seconds of a run that is not repeated for the energies of its elements."""
+
+Stages = list[tuple[str, float, float]]
+
+
+def collect(request: Request, report: Report, progress: Progress | None = None) -> Study | None:
+    """The study; None where the report says why there is none.  Call within `expression.fresh()`."""
+    check_tolerances(request)
+    stages: Stages = []
+    began = time.monotonic()
+    with _timed("read", stages):
+        document = targets.read(request.file, report)
+        target = targets.one(document, request.file, request.model, request.scene, report)
+    if target is None:
+        return None
+    with _timed("check", stages):
+        settings, levels = request.settings, request.levels
+        network = load.network(target.document, target.model, target.scene, report, settings, levels=levels)
+    if network is None:
+        return None
+    prepared = _prepared(request, network, report, stages)
+    if prepared is None:
+        return None
+    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        return _study(request, target, prepared, report, stages, began, progress, Path(folder))
+
+
+def _study(
+    request: Request,
+    target: Target,
+    prepared: Prepared,
+    report: Report,
+    stages: Stages,
+    began: float,
+    progress: Progress | None,
+    folder: Path,
+) -> Study | None:
+    scene = prepared.network.scene
+    findings: list[str] = []
+    ran, trace, found = None, None, None
+    if request.until is None and (scene is None or scene.end is None):
+        with _timed("start", stages):
+            started = start(prepared, 0.0, report, request.redundancy)
+        findings.append("There is no 'time' in the scene: nothing was run.")
+    else:
+        options = options_of(request, target, prepared, report, began, progress)
+        if options is None:
+            return None
+        options = replace(options, output=str(folder / "trace.h5"), every=None)
+        with _timed("start, integration and trace", stages):
+            ran = integrate(target, prepared, options, report)
+        started = ran.started if ran is not None else None
+        if ran is not None:
+            trace = Trace.open(ran.outcome.trace)
+            _split(stages, ran)
+            findings += [text for text in (ran.failure, *ran.outcome.warnings) if text]
+            found = _energies(target, prepared, options, ran, folder, stages)
+    if started is None:
+        return None
+    sources = sources_of(target, prepared.network)
+    findings += [f"{d.code}: {d.message}" for d in report.diagnostics if d.severity != "note"]
+    return Study(
+        target, sources, prepared.network, prepared, started, ran, trace, found, tuple(findings), tuple(stages)
+    )
+
+
+def _prepared(request: Request, network: Network, report: Report, stages: Stages) -> Prepared | None:
+    """Compiled, with the compiler's own stages."""
+    made: Stages = []
+    with _timed("formulation, build and load", made):
+        prepared = prepare(network, report, formulation=request.formulation, backend=request.backend)
+    if prepared is not None:
+        own = [(t.stage, t.wall, t.cpu) for t in prepared.compiled.timings]
+        stages += own
+        ((name, wall, cpu),) = made
+        stages.append((name, max(wall - sum(s[1] for s in own), 0.0), max(cpu - sum(s[2] for s in own), 0.0)))
+    return prepared
+
+
+def _split(stages: Stages, ran: Ran) -> None:
+    """The integration apart from the start and the writing of the trace."""
+    name, wall, cpu = stages.pop()
+    inner = ran.outcome.timings
+    spent, busy = (float(inner.get(k, 0.0)) for k in ("wall_integrate_s", "cpu_integrate_s"))
+    stages.append(("integration", spent, busy))
+    stages.append((name.replace("integration and ", "structure and "), max(wall - spent, 0.0), max(cpu - busy, 0.0)))
+
+
+def _energies(
+    target: Target,
+    prepared: Prepared,
+    options: Options,
+    ran: Ran,
+    folder: Path,
+    stages: Stages,
+) -> tuple[Share, ...] | None:
+    """A second run to the first one's accuracy, in which the power of every element is observed; None without."""
+    network, parts = observed(prepared.network)
+    if not parts or ran.failure or ran.outcome.timings.get("wall_integrate_s", 0.0) > LONG:
+        return None
+    fixed = replace(options, output=str(folder / "energies.h5"), method=ran.outcome.method, progress=None)
+    own = tuple(o.name for o in prepared.network.observations)
+    if options.accuracy is not None and own:  # of the scene's quantities alone
+        fixed = replace(fixed, accuracy=None, accuracy_on=tuple((name, options.accuracy) for name in own))
+    with _timed("energies of the elements (a run of their own)", stages):
+        try:
+            report = Report()
+            rich = prepare(network, report, formulation=prepared.formulation, backend=prepared.backend)
+            again = None if rich is None else integrate(target, rich, fixed, report)
+            return None if again is None or again.failure else shares(Trace.open(again.outcome.trace), parts)
+        except (UsageError, TraceError):
+            return None
+
+
+@contextmanager
+def _timed(stage: str, stages: Stages) -> Iterator[None]:
+    wall, cpu = time.perf_counter(), time.process_time()
+    yield
+    stages.append((stage, time.perf_counter() - wall, time.process_time() - cpu))

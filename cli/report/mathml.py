@@ -1,0 +1,285 @@
+"""Expressions typeset as MathML.  Names of users become <mi> texts through `escape` and nothing else.
+
+Nodes share subexpressions, text does not: a node that would be larger than LARGEST stands as an ellipsis.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from sysdyn.dsl.expression import Node, topological
+from sysdyn.dsl.network import Loop
+
+LARGEST = 500
+"""Nodes of one expression that is written out."""
+SUM, PRODUCT, POWER, ATOM = range(4)
+"""How strongly a piece holds together."""
+
+_GREEK = dict(
+    zip(
+        ["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu"]
+        + ["xi", "omicron", "pi", "rho", "sigmaf", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega"],
+        "αβγδεζηθικλμνξοπρςστυφχψω",
+        strict=True,
+    )
+) | {"th": "θ", "om": "ω"}
+_NAME = re.compile(rf"({'|'.join(sorted(_GREEK, key=len, reverse=True))}|[^\W\d_])(?:_(\w+)|(\d+))?")
+_COUNTERS = "ijklmn"
+_SIGNS = {"==": "=", "!=": "≠", "<": "&lt;", "<=": "≤", ">": "&gt;", ">=": "≥"}
+
+
+def math(*pieces: str) -> str:
+    """A formula of pieces side by side."""
+    return f"<math>{''.join(pieces)}</math>"
+
+
+def mi(text: str) -> str:
+    """An identifier."""
+    return f"<mi>{escape(text)}</mi>"
+
+
+def mo(sign: str) -> str:
+    """An operator; sign is HTML."""
+    return f"<mo>{sign}</mo>"
+
+
+def row(*pieces: str) -> str:
+    """Pieces as one."""
+    return pieces[0] if len(pieces) == 1 else f"<mrow>{''.join(pieces)}</mrow>"
+
+
+def name(text: str, index: Sequence[str] = (), order: int = 0) -> str:
+    """A name, dotted as a rate, with what stands below it: `q1`, `tau_m` and `M.R` are q, tau and R with an index."""
+    *path, own = text.split(".")
+    found = _NAME.fullmatch(own)
+    below = [mi(".".join(path))] if any(path) else []
+    if found:
+        base = mi(_GREEK.get(found[1], found[1]))
+        lower = found[2] or found[3]
+        below = [*([f"<mn>{lower}</mn>" if lower.isdigit() else mi(lower)] if lower else []), *below]
+    else:
+        base = mi(own)
+    below += index
+    base = _dotted(base, order)
+    return base if not below else f"<msub>{base}{row(*_separated(below))}</msub>"
+
+
+def coordinate(text: str, index: Sequence[str] = (), order: int = 0) -> str:
+    """A displacement coordinate: its own name where that is a symbol, else q with the name below."""
+    return name(text, index, order) if _NAME.fullmatch(text) else _of("q", text, index, order)
+
+
+def _separated(pieces: Sequence[str]) -> list[str]:
+    found = [pieces[0]]
+    for piece in pieces[1:]:
+        found += [mo(","), piece]
+    return found
+
+
+def number(value: float) -> str:
+    """A number, a power of ten written as one."""
+    mantissa, _, exponent = f"{value:.12g}".partition("e")
+    if not exponent:
+        return f"<mn>{mantissa.replace('-', '−')}</mn>"
+    raised = f"<msup><mn>10</mn><mn>{str(int(exponent)).replace('-', '−')}</mn></msup>"
+    return raised if mantissa == "1" else row(f"<mn>{mantissa.replace('-', '−')}</mn>", mo("·"), raised)
+
+
+class Typesetter:
+    """Writes expressions of one model.  coordinates: families whose q and f are a name and its rate; complementary:
+    these are momenta and efforts.
+    """
+
+    def __init__(self, coordinates: Iterable[str] = (), *, complementary: bool = False) -> None:
+        self._coordinates = frozenset(coordinates)
+        self._complementary = complementary
+
+    def expression(self, root: Node) -> str:
+        """The expression as pieces of MathML."""
+        size: dict[Node, int] = {}
+        nodes = topological([root])
+        for node in nodes:
+            size[node] = min(1 + sum(size[a] for a in node.args), 10 * LARGEST)
+        made: dict[Node, tuple[str, int]] = {}
+        for node in nodes:
+            made[node] = (mo("…"), ATOM) if size[node] > LARGEST else self._node(node, [made[a] for a in node.args])
+        return made[root][0]
+
+    def held(self, root: Node) -> str:
+        """The expression, in parentheses where it is a sum."""
+        text = self.expression(root)
+        return row(mo("("), text, mo(")")) if root.op in ("sum", "cond", "cmp", "and", "or") else text
+
+    def bounds(self, nest: Sequence[Loop]) -> str:
+        """`i = 1, …, n` for each loop, as a formula."""
+        pieces: list[str] = []
+        for loop in nest:
+            pieces += [mo(","), "<mspace width='.4em'/>"] if pieces else []
+            ends = [mo("="), self.expression(loop.first)]
+            if loop.first is not loop.last:
+                ends += [mo(","), mo("…"), mo(","), self.expression(loop.last)]
+            pieces += [counter(loop.index), *ends]
+        return row(*pieces) if pieces else ""
+
+    def summed(self, nest: Sequence[Loop], body: str) -> str:
+        """The sum of a body over loops."""
+        for loop in reversed(nest):
+            low = row(counter(loop.index), mo("="), self.expression(loop.first))
+            body = row(f"<munderover>{mo('∑')}{low}{row(self.expression(loop.last))}</munderover>", body)
+        return body
+
+    def _node(self, node: Node, args: list[tuple[str, int]]) -> tuple[str, int]:
+        texts = [text for text, _ in args]
+        match node.op:
+            case "const":
+                return number(node.data), ATOM if node.data >= 0 else SUM
+            case "param":
+                return name(node.data.lstrip("#"), texts), ATOM
+            case "index":
+                return counter(node.data), ATOM
+            case "time":
+                return mi("t"), ATOM
+            case "var":
+                family, kind, order = node.data
+                return self.unknown(family, kind, order, texts), ATOM
+            case "sum":
+                return _sum(node, args), SUM
+            case "mul":
+                return _product(node, args), PRODUCT
+            case "pow":
+                return f"<msup>{_held(args[0], ATOM)}{row(texts[1])}</msup>", POWER
+            case _:
+                return _function(node, args)
+
+    def unknown(self, family: str, kind: str, order: int, index: Sequence[str] = ()) -> str:
+        """An unknown: x, its rates dotted, momenta p, multipliers κ and μ; of branches and nodes their own e f q p."""
+        if kind[0] in "nb" and len(kind) == 2:
+            return _of(kind[1], family, index, order)
+        if family.startswith("#"):
+            family = family.lstrip("#")
+        match kind:
+            case "q" | "f" if family in self._coordinates:
+                order += kind == "f"
+                return _of("p", family, index, order) if self._complementary else coordinate(family, index, order)
+            case "p":
+                return _of("q" if self._complementary else "p", family, index, order)
+            case "kappa" | "mu":
+                return _of("κ" if kind == "kappa" else "μ", family, index, order)
+            case "audit":
+                return mi(f"audit.{family}")
+            case _:
+                return name(family, index, order)
+
+
+def _of(letter: str, family: str, index: Sequence[str], order: int = 0) -> str:
+    """A quantity of an object, which stands below it."""
+    below = row(*_separated([*map(mi, family.split("#")), *index]))
+    return f"<msub>{_dotted(mi(letter), order)}{below}</msub>"
+
+
+def counter(index: str) -> str:
+    """A loop variable: of the canonical ones i, j, k, ..."""
+    text = index.lstrip("#").removeprefix("rm#").removeprefix("r")
+    if index.startswith("#") and text.isdigit():
+        k = int(text)
+        return mi(_COUNTERS[-1 - (k - 1) % 3] if index.startswith("#r") else _COUNTERS[k % 3])
+    return mi(text or index)
+
+
+def _dotted(base: str, order: int) -> str:
+    return base if not order else f"<mover accent='true'>{base}{mo('˙' if order == 1 else '¨')}</mover>"
+
+
+def _held(piece: tuple[str, int], strength: int) -> str:
+    """A piece in parentheses where it would fall apart."""
+    text, own = piece
+    return text if own >= strength else row(mo("("), text, mo(")"))
+
+
+def _sum(node: Node, args: list[tuple[str, int]]) -> str:
+    constant, coefficients = node.data
+    pieces: list[str] = []
+    parts = [(c, _held(a, PRODUCT)) for c, a in zip(coefficients, args, strict=True)]
+    parts.sort(key=lambda part: part[0] < 0)  # a sum that can begin without a sign does
+    for c, text in parts:
+        if pieces or c < 0:
+            pieces.append(mo("−" if c < 0 else "+"))
+        if abs(c) != 1.0:
+            pieces.append(_coefficient(abs(c)))
+        pieces.append(text)
+    if constant:
+        pieces += [mo("−" if constant < 0 else "+"), number(abs(constant))]
+    return row(*pieces)
+
+
+def _coefficient(value: float) -> str:
+    """Halves, thirds and quarters as fractions."""
+    for below in (2, 3, 4, 6, 12):
+        above = value * below
+        if value < 10 and above == int(above) and value != int(value):
+            return f"<mfrac><mn>{int(above)}</mn><mn>{below}</mn></mfrac>"
+    return number(value)
+
+
+def _product(node: Node, args: list[tuple[str, int]]) -> str:
+    above: list[str] = []
+    below: list[str] = []
+    for e, piece in zip(node.data, args, strict=True):
+        text, size = piece[0], abs(e)
+        alone = sum((x < 0) == (e < 0) for x in node.data) == 1 and any(x < 0 for x in node.data)
+        if size == 0.5:
+            text = f"<msqrt>{text}</msqrt>"
+        elif size != 1.0:
+            text = f"<msup>{_held(piece, ATOM)}{row(_coefficient(size))}</msup>"
+        elif not alone:
+            text = _held(piece, PRODUCT)
+        (above if e > 0 else below).append(text)
+    top = _beside(above) if above else "<mn>1</mn>"
+    return top if not below else f"<mfrac>{row(top)}{row(_beside(below))}</mfrac>"
+
+
+def _beside(pieces: list[str]) -> str:
+    found = [pieces[0]]
+    for piece in pieces[1:]:
+        found += ["<mspace width='.14em'/>", piece]
+    return row(*found)
+
+
+def _function(node: Node, args: list[tuple[str, int]]) -> tuple[str, int]:
+    texts = [text for text, _ in args]
+    match node.op:
+        case "cond":
+            words = [f"<mtext>{w}</mtext>" for w in ("if ", " then ", " else ")]
+            return row(*(x for pair in zip(words, texts, strict=True) for x in pair)), SUM
+        case "cmp":
+            return row(texts[0], mo(_SIGNS[node.data]), texts[1]), SUM
+        case "and" | "or":
+            pieces = [_held(args[0], PRODUCT)]
+            for piece in args[1:]:
+                pieces += [mo("∧" if node.op == "and" else "∨"), _held(piece, PRODUCT)]
+            return row(*pieces), SUM
+        case "not":
+            return row(mo("¬"), _held(args[0], ATOM)), PRODUCT
+        case "reduce":
+            return _reduced(node, args), PRODUCT
+        case "table":
+            label, orders = node.data
+            primes = "′" * orders if isinstance(orders, int) else f"({', '.join(map(str, orders))})"
+            return row(mi(label + primes), mo("("), *_separated(texts), mo(")")), ATOM
+    if node.data == "abs":
+        return row(mo("|"), texts[0], mo("|")), ATOM
+    if node.data == "exp" and "<mfrac>" not in texts[0]:
+        return f"<msup><mi mathvariant='normal'>e</mi>{row(texts[0])}</msup>", POWER
+    return row(mi(node.data), mo("&#x2061;"), mo("("), *_separated(texts), mo(")")), ATOM
+
+
+def _reduced(node: Node, args: list[tuple[str, int]]) -> str:
+    operator, index = node.data
+    first, last, body = (text for text, _ in args)
+    low = row(counter(index), mo("="), first)
+    sign = {"sum": "∑", "prod": "∏"}.get(operator)
+    if sign is not None:
+        return row(f"<munderover>{mo(sign)}{low}{row(last)}</munderover>", _held(args[2], PRODUCT))
+    return row(f"<munder>{mi(operator)}{row(low, mo('…'), last)}</munder>", mo("("), body, mo(")"))
