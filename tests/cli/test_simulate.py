@@ -271,10 +271,9 @@ def test_what_the_start_moved_is_said(tmp_path, capsys):
     assert "y: -2.1 -> -2.11556, asked for by phi rod" in capsys.readouterr().err
 
 
-def test_not_yet_is_said_with_a_code(tmp_path, capsys):
+def test_what_cannot_be_is_said_with_a_code(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     assert run(["simulate", path, "--level", "a=b"]) == 1
     assert "E802" in capsys.readouterr().err
-    for option in (("--method", "dopri"), ("--index", "0")):
-        assert run(["simulate", path, *option]) == 2
-        assert "not available" in capsys.readouterr().err
+    assert run(["simulate", path, "--method", "dopri", "--index", "2"]) == 1
+    assert "E607" in capsys.readouterr().err
