@@ -136,7 +136,7 @@ def _read(network: Network) -> Iterable[str]:
 
 def _with_positions(network: Network) -> Network:
     """Quadratures q' = f for displacements that traces, expectations and dynamics read and no potential store holds."""
-    roots = [n.expression for n in (*network.observations, *network.dynamics)]
+    roots = [o.expression for o in network.observations] + [d.expression for d in network.dynamics]
     roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
     held = {b.name for b in network.branches if b.kind == "potential"}
     wanted: dict[tuple[str, str], None] = {}
