@@ -20,6 +20,7 @@ from sysdyn.compiler.energies import EnergyModel
 from sysdyn.compiler.integers import Slot
 from sysdyn.compiler.interpret import Value, evaluate, over
 from sysdyn.compiler.parameters import LARGEST, Extents, Override, Parameters, extents, positions, whole_number
+from sysdyn.compiler.primal.slopes import check_slopes
 from sysdyn.compiler.program import Program
 from sysdyn.compiler.ranges import Ranges
 from sysdyn.compiler.tables import numbers
@@ -79,6 +80,7 @@ def bind(
 ) -> Binding:
     """All numbers for one set of parameter values."""
     parameters = Parameters(network, overrides or {})
+    check_slopes(network, parameters)
     owners = _owners(form, parameters)
     _refuse_outside(model, owners, parameters, network.place)
     bind_covers(form.covers, owners, parameters)

@@ -22,6 +22,7 @@ from sysdyn.compiler.descriptor import DescriptorForm
 from sysdyn.compiler.emit_c import emit_c
 from sysdyn.compiler.emit_numpy import emit_numpy
 from sysdyn.compiler.energies import EnergyModel
+from sysdyn.compiler.floating import anchored
 from sysdyn.compiler.hamiltonian import hamiltonian
 from sysdyn.compiler.integration import integrate
 from sysdyn.compiler.kane import kane
@@ -97,7 +98,7 @@ def compile_network(
     with _timed("primal", timings):
         network, inverted, steps = primal(reflect(network) if reflected else network)
     with _timed("energies", timings):
-        model = energies.energies(network)
+        model = anchored(energies.energies(network))
         energies.verify_energies(model)
         model, notes = integrate(model) if integrating else (model, ())
         found = check_energies(model, network)

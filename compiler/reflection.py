@@ -32,6 +32,7 @@ from sysdyn.dsl.network import (
     Loop,
     Network,
     Shape,
+    Slope,
     State,
     Terminal,
 )
@@ -75,6 +76,7 @@ def reflect(network: Network) -> Network:
         nodes=tuple(replace(n, domain=_domain(n.domain)) for n in network.nodes),
         branches=tuple(_branch(b) for b in network.branches),
         couplings=tuple(_coupling(c) for c in network.couplings),
+        slopes=tuple(_moduli(network.couplings)),
         read=read,
     )
 
@@ -121,6 +123,13 @@ def _coupling(c: Coupling) -> Coupling:
         return replace(c, side=_SIDES[c.side], ratio=ratio)
     # e1 = r f2 reads f1 = r e2 in the reflection: e2 = f1/r and with e1 f1 + e2 f2 = 0 e1 = -f2/r
     return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), ratio)))
+
+
+def _moduli(couplings: Iterable[Coupling]) -> Iterator[Slope]:
+    """The moduli that are divided by."""
+    for c in couplings:
+        if c.kind == "gyrator" and not ex.is_const(c.ratio) and not ex.variables(c.ratio):
+            yield Slope(c.first.rpartition(".")[0] or c.first, c.ratio, c.loops, False, c.place)
 
 
 def _read(network: Network) -> Iterable[str]:

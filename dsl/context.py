@@ -35,12 +35,16 @@ class Use:
 
 @dataclass(slots=True)
 class Quadrature:
-    """The integral of a power since the start (J): a dynamic variable that only reading it brings into being."""
+    """The integral of a power since the start (J): a dynamic variable that only reading it brings into being.
+
+    first: the expression whose initial value it starts from; None: zero.
+    """
 
     power: Node
     shape: tuple[tuple[Node, Node], ...]
     dimension: Dimension
     place: Place
+    first: Node | None = None
 
 
 class Failed(Exception):  # noqa: N818
@@ -71,6 +75,7 @@ class Context:
         self._unknown = ("E101", "unknown name '{}'")
         self.lenient = False  # what the chosen level lacks is a note (language, decision 5)
         self.virtual = False  # outputs and inputs are signals, held by virtual displacements
+        self.complete = False  # all elements are known
         self.statics = False  # static quantities are in sight (expect static)
 
     @contextmanager

@@ -74,6 +74,7 @@ class Elaborator(Instances):
 
     def statements(self) -> None:
         """Resolve what the model and its instances say: constraints first, which others may read."""
+        self.resolver.complete = True
         for space, body in self.bodies:
             with self.entering(space):
                 self.each([s for s in body if isinstance(s[0], syntax.Constraint)], self.constraint)
@@ -93,7 +94,8 @@ class Elaborator(Instances):
             self.parts.states.append(State(name, found.shape, si(found.dimension), found.place))
             self.parts.dynamics.append(Dynamic(state, found.power, loops, found.place))
             self.parts.given.add(name)
-            self.parts.initials.append(Initial(state, ex.const(0.0), True, loops, found.place))
+            target = state if found.first is None else ex.sub(state, found.first)
+            self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
 
     def _definitions(self) -> None:
         """Resolve every let and output once, so that unused ones are checked too."""

@@ -16,7 +16,7 @@ from sysdyn.dsl import syntax
 from sysdyn.dsl.context import Failed, Quadrature, Use, Value
 from sysdyn.dsl.expression import Node
 from sysdyn.dsl.names import Names
-from sysdyn.dsl.network import Branch, Constraint
+from sysdyn.dsl.network import Branch, Constraint, Domain
 from sysdyn.dsl.symbols import (
     BranchSymbol,
     BundleNode,
@@ -166,9 +166,21 @@ class Members(Names):
         return self._quantity_of(base, e)
 
     def _audit(self, e: syntax.Member) -> Value:
-        if e.name not in AUDIT:
-            raise self.no_member("audit", e, AUDIT)
-        return Typed(ex.var(e.name, "audit"), AUDIT[e.name])
+        if e.name in AUDIT:
+            return Typed(ex.var(e.name, "audit"), AUDIT[e.name])
+        domains = {b.domain.name: b.domain for b in self.branches if b.domain.pseudo}
+        if e.name not in domains:
+            raise self.no_member("audit", e, (*AUDIT, *domains))
+        return self._ledger(domains[e.name], e)
+
+    def _ledger(self, domain: Domain, e: syntax.Member) -> Value:
+        """What the stores of a pseudo domain have gained since the start less what the other branches gave: zero."""
+        if not self.complete:
+            raise self.fail("E102", f"audit.{e.name} is a result: no law can read it", e.span)
+        held, supplied = ledger(domain, self.branches)
+        unit = domain.displacement if domain.common == "effort" else domain.momentum
+        given = self.balance(f"audit.{domain.name}", supplied, held, unit.dimension, e)
+        return Typed(ex.sub(held, given), unit.dimension)
 
     def _shown(self, e: syntax.Expr) -> str:
         return " ".join(self.source.text[e.span.start : e.span.end].split())[:60]
@@ -282,6 +294,11 @@ class Members(Names):
         found = Quadrature(power, shape, multiply(dimension, dim.TIME), self.place(e.span))
         self.quadratures.setdefault(name, found)
         return ex.var(name, "s", *at)
+
+    def balance(self, name: str, rate: Node, first: Node, dimension: Dimension, e: syntax.Expr) -> Node:
+        """The integral of a rate that starts at the initial value of `first`."""
+        self.quadratures.setdefault(name, Quadrature(rate, (), dimension, self.place(e.span), first))
+        return ex.var(name, "s")
 
     def _stored(
         self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member
@@ -423,6 +440,29 @@ def branch_dimension(domain: DomainSymbol, letter: str) -> Dimension:
     """Dimension of e, f, q or p in a domain."""
     unit = {"e": domain.effort, "f": domain.flow, "q": domain.displacement, "p": domain.momentum}[letter]
     return unit.dimension
+
+
+def ledger(domain: Domain, branches: Iterable[Branch]) -> tuple[Node, Node]:
+    """Content of the stores that a domain's ground holds, and what all other branches bring in from there.
+
+    At every node the flows (efforts, where nodes have a common flow) add up to zero, so those at ground do: the rate of
+    the first is the second.
+    """
+    content, through, kind = ("bq", "bf", "potential") if domain.common == "effort" else ("bp", "be", "kinetic")
+    held: list[Node] = []
+    supplied: list[Node] = []
+    for b in branches:
+        if b.domain.name != domain.name or b.plus is None or b.minus is None:
+            continue
+        sign = (b.minus.node is None) - (b.plus.node is None)  # +1: from a node to ground
+        if not sign:
+            continue
+        stores = b.kind == kind
+        node = ex.scale(float(sign if stores else -sign), ex.var(b.name, content if stores else through, *b.at))
+        for loop in reversed(b.loops):
+            node = ex.reduction("sum", loop.index, loop.first, loop.last, node)
+        (held if stores else supplied).append(node)
+    return ex.add(*held), ex.add(*supplied)
 
 
 _RATES = {"q": "f", "nq": "nf", "bq": "bf"}

@@ -99,6 +99,17 @@ class Coupling:
 
 
 @dataclass(frozen=True, slots=True)
+class Slope:
+    """The slope of a branch's linear law that was divided by or, where flat, was zero with the values of the text."""
+
+    name: str
+    expression: Node
+    loops: tuple[Loop, ...]
+    flat: bool
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
 class Parameter:
     """A run-time constant; value holds one node, one per element of a literal array, or one over `loops`.
 
@@ -307,4 +318,5 @@ class Network:
     nodes: tuple[NodeFamily, ...] = ()
     branches: tuple[Branch, ...] = ()
     couplings: tuple[Coupling, ...] = ()
+    slopes: tuple[Slope, ...] = ()  # of laws that the compiler has inverted
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)

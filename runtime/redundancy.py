@@ -27,6 +27,8 @@ NOISE = 1e-11
 POINTS = 3
 AMPLITUDES = (3e-2, 1e-3, 1e-5)
 """Of the displacements, to come to a nearby point."""
+NEAR = 10.0
+"""Amplitudes: what the way back onto phi leads farther than this may be another singular point."""
 _EPS = 1e-13
 
 
@@ -127,7 +129,7 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
             rows = starter.groups("phi")
             if rows.any() and q.any():
                 solution = solve(_problem(starter, state.t, shaken, rows, q), shaken)
-                if not solution.residual < EXACT:
+                if not solution.residual < EXACT or np.any(np.abs(solution.x - x) > NEAR * amplitude * size):
                     continue
                 shaken = solution.x
             found.append(starter.expand(shaken)[0])

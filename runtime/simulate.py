@@ -474,7 +474,7 @@ def simulate(
         raise ValueError(f"redundancy {options.redundancy}: error, drop or minimum_norm")
     if facts.left_out and options.redundancy != "error":
         written = written.without(facts.left_out)
-        start = consistent_start(written, options.t_start)
+        start = replace(consistent_start(written, options.t_start, start), moved=start.moved)
         facts = replace(facts, index=index_of(written, start)[0], undetermined=())
     form, index, warnings = choose_index(options.index, facts, options.method)
     system = written if form == "3" else written.another(form)

@@ -406,13 +406,15 @@ def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tu
     return missing, names
 
 
-def consistent_start(system: System, t0: float) -> ConsistentState:
+def consistent_start(system: System, t0: float, near: ConsistentState | None = None) -> ConsistentState:
     """A state at t0 that satisfies all rows and their hidden derivatives.
 
-    system: any index form of the model.  Raises InconsistentStart.
+    system: any index form of the model; near: a state to stay close to, else the guesses.  Raises InconsistentStart.
     """
     starter = Starter(system if system.form.name == "3" else system.another("3"))
     guess = np.concatenate([starter.given.guess, np.zeros(starter.rates.size)])
+    if near is not None:  # but for its multipliers, which redundant rows make as large as they like
+        guess[: starter.n] = np.where(np.isin(starter.kinds, (*STATE, "e")), near.y, guess[: starter.n])
     free = np.concatenate([~starter.given.fixed, np.ones(starter.rates.size, dtype=bool)])
     guess = _guess(starter, t0, guess, free)
     best, holds = _attempt(starter, t0, guess, free)

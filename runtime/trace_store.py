@@ -1,9 +1,8 @@
 """One HDF5 file of a trace: its layout, rows appended in raw float64 blocks.
 
-/time (a dimension scale), one data set a traced quantity, /derivatives/<name>, /audit/energy, /audit/constraints (and
-links to other members of the audit that are traced),
-/parameters/<name>, root attributes with `final`.  A disk that fills up raises: the handle is turned to memory before
-HDF5 closes the file, which otherwise ends in SIGSEGV at exit.
+/time (a dimension scale), one data set a traced quantity, /derivatives/<name>, /audit/energy, /audit/constraints, links
+/audit/<member> to what else of the audit is traced, /parameters/<name>, root attributes with `final`.  A disk that
+fills up raises: the handle is turned to memory before HDF5 closes the file, which otherwise ends in SIGSEGV at exit.
 """
 
 from __future__ import annotations

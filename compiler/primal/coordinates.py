@@ -50,6 +50,7 @@ def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...], tuple[Ste
         nodes=(),
         branches=(),
         couplings=(),
+        slopes=(*network.slopes, *said.slopes),
         read=frozenset(),
         **_statements(network, said, nodes.constraints, reader),
     )

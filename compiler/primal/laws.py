@@ -1,8 +1,8 @@
 """Laws of branches as energies, works, constraints and implicit unknowns: the primal column of the language's table.
 
     kinetic p(f)      T* += int p df          kinetic f(p)      inverted, or the momentum is a state
-    potential e(q)    V += int e dq           potential q(e)    inverted, or implicit effort
-    dissipator e(f)   D += int e df           dissipator f(e)   inverted, or implicit effort
+    potential e(q)    V += int e dq           potential q(e)    inverted, or implicit effort; psi f without slope
+    dissipator e(f)   D += int e df           dissipator f(e)   inverted, or implicit effort; psi f - f(0) without slope
     effort source     work -e on q            flow source       psi f - f_s, or implicit effort where it is controlled
     transformer       psi f1 - n f2           gyrator           works -r f2 on q1, r f1 on q2
 
@@ -19,10 +19,12 @@ from dataclasses import dataclass, field
 from sysdyn.compiler.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
 from sysdyn.compiler.primal.incidence import Element
 from sysdyn.compiler.primal.integrals import antiderivative, line
+from sysdyn.compiler.primal.slopes import Slopes
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError
 from sysdyn.dsl.expression import (
     Node,
     add,
+    const,
     derivative,
     index,
     mul,
@@ -40,6 +42,7 @@ from sysdyn.dsl.network import (
     Dynamic,
     Energy,
     Network,
+    Slope,
     State,
     Unknown,
     Work,
@@ -76,6 +79,7 @@ class Laws:
     efforts: dict[int, Node] = field(default_factory=dict)
     momenta: dict[int, Node] = field(default_factory=dict)
     notes: list[Diagnostic] = field(default_factory=list)
+    slopes: tuple[Slope, ...] = ()
 
 
 def own(branch: Branch, kind: str) -> Node:
@@ -87,7 +91,9 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes) -> Laws:
     """All laws."""
     wanted = _read_efforts(network)
     found = Laws()
-    chosen = [(e, _law(e.branch, e.name in wanted)) for e in elements]
+    slopes = Slopes(network)
+    chosen = [(e, _law(e.branch, slopes, e.name in wanted)) for e in elements]
+    found.slopes = tuple(slopes.decided)
     names: dict[tuple[int, str], Part] = {}
     for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
         kept = [e for e, law in chosen if law.how in hows]
@@ -109,7 +115,7 @@ def _read_efforts(network: Network) -> set[str]:
     return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] == "be"}
 
 
-def _law(branch: Branch, effort_read: bool) -> Law:
+def _law(branch: Branch, slopes: Slopes, effort_read: bool) -> Law:
     if branch.kind in ("field", "port"):
         return Law(branch.kind)
     if branch.law is None or branch.side is None:
@@ -120,10 +126,10 @@ def _law(branch: Branch, effort_read: bool) -> Law:
     if branch.kind == "flow":
         outer = [n for n in variables(law) if n.op == "var" and n.data[1] != "s"]
         return Law("implicit" if outer else "row", sub(own(branch, "bf"), law))
-    return _store_or_dissipator(branch, law, effort_read)
+    return _store_or_dissipator(branch, law, slopes, effort_read)
 
 
-def _store_or_dissipator(branch: Branch, law: Node, effort_read: bool) -> Law:
+def _store_or_dissipator(branch: Branch, law: Node, slopes: Slopes, effort_read: bool) -> Law:
     kind, explicit = OWN[branch.kind]
     v, effort = own(branch, kind), own(branch, "bp" if branch.kind == "kinetic" else "be")
     pseudo, kinetic = branch.domain.pseudo, branch.kind == "kinetic"
@@ -131,6 +137,8 @@ def _store_or_dissipator(branch: Branch, law: Node, effort_read: bool) -> Law:
     if branch.side != explicit:
         given = _own_of(branch, law)
         straight = None if variables(law) - {given} else line(law, given)
+        if slopes.flat(branch, straight.slope) if straight else not kinetic and not variables(law):
+            return _held(branch, law if straight is None else straight.constant)
         if straight is None:
             equation = sub(v, law)
             text = f"{branch.side}({'p' if kinetic else 'e'}) of {branch.name} stays implicit"
@@ -148,6 +156,13 @@ def _store_or_dissipator(branch: Branch, law: Node, effort_read: bool) -> Law:
     if branch.kind == "potential" and not pseudo:
         note = ("N604", f"the energy of {branch.name} is counted as the integral of its power")
     return Law("work", law, note)
+
+
+def _held(branch: Branch, value: Node) -> Law:
+    """A law without slope: v = value, a constant content has no flow."""
+    text = f"{branch.side} of {branch.name} is held: its law has no slope"
+    rate = const(0.0) if branch.kind == "potential" else value
+    return Law("row", sub(own(branch, "bf"), rate), ("N604", text))
 
 
 def _own_of(branch: Branch, law: Node) -> Node:
