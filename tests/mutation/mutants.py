@@ -4,6 +4,8 @@ sign      neg(x) -> x;  sub(a, b) -> add(a, b);  a - b -> a + b and back;  -x ->
           where both are numbers of opposite sign
 index     0 <-> 1 as a subscript;  + 1, - 1 left out;  rate <-> coordinate, conjugate -> rate of the mirror;
           "q" <-> "f", "p" -> "f" (bq, bf, bp, nq, nf likewise)
+
+Left alone because no result depends on them: texts (f-strings, what is raised) and units of display (`units["q"]`).
 """
 
 from __future__ import annotations
@@ -27,14 +29,26 @@ class Mutant:
 
 def mutants(text: str) -> list[Mutant]:
     """All mutants of a module, in the order of its text."""
-    sites = [(node, what) for node in ast.walk(ast.parse(text)) for what, _ in _changes(node)]
+    whole = ast.parse(text)
+    still = set(_said(whole))
+    sites = [(node, what, node in still) for node in ast.walk(whole) for what, _ in _changes(node)]
     found = []
-    for number, (node, what) in enumerate(sites):
+    for number, (node, what, idle) in enumerate(sites):
+        if idle:
+            continue
         tree = ast.parse(text)
         changed = _Change(number).visit(tree)
         found.append(Mutant(node.lineno, what, ast.unparse(ast.fix_missing_locations(changed))))
     unique = {m.text: m for m in found}
     return sorted(unique.values(), key=lambda m: m.line)
+
+
+def _said(tree: ast.AST) -> Iterator[ast.AST]:
+    """Nodes below texts, raised errors and units of display."""
+    for node in ast.walk(tree):
+        units = isinstance(node, ast.Subscript) and isinstance(node.value, ast.Attribute) and node.value.attr == "units"
+        if units or isinstance(node, ast.JoinedStr | ast.Raise):
+            yield from ast.walk(node)
 
 
 class _Change(ast.NodeTransformer):
@@ -64,11 +78,11 @@ def _replaced(tree: ast.AST, old: ast.AST, new: ast.AST) -> ast.AST:
 def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     """What can be made of a node."""
     match node:
-        case ast.Call(func=ast.Name(id="neg"), args=[value]):
+        case ast.Call(func=ast.Name(id="neg") | ast.Attribute(attr="neg"), args=[value]):
             yield "neg left out", value
-        case ast.Call(func=ast.Name(id="sub"), args=[a, b]):
+        case ast.Call(func=ast.Name(id="sub") | ast.Attribute(value=ast.Name(id="ex"), attr="sub"), args=[a, b]):
             yield "sub -> add", ast.Call(ast.Attribute(ast.Name("ex_", ast.Load()), "add", ast.Load()), [a, b], [])
-        case ast.BinOp(op=ast.Add(), right=ast.Constant(value=1)) | ast.BinOp(op=ast.Sub(), right=ast.Constant(value=1)):
+        case ast.BinOp(op=ast.Add() | ast.Sub(), right=ast.Constant(value=1)):
             yield "1 left out", node.left
         case ast.BinOp(op=ast.Sub()) if not _sets(node):
             yield "- -> +", ast.BinOp(node.left, ast.Add(), node.right)
