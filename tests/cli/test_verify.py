@@ -108,7 +108,7 @@ def both(*formulations):
         ("gallery/friction_book", (), FOUR[:2]),  # gamma
         ("gallery/chain_1000", ("--until", "0.05"), FOUR[:2]),  # arrays, reduced by ci.toml
         ("seed/dc_motor", (), FOUR),
-        ("seed/two_tank", (), FOUR),
+        ("seed/two_tank", (), (*FOUR, "kane")),
         ("seed/nonlinear_spring", (), FOUR),
     ],
 )
