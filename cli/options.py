@@ -41,3 +41,25 @@ def chosen(function: Callable[..., Any]) -> Callable[..., Any]:
     ):
         function = option(function)
     return function
+
+
+def solved(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options that say how a scene is solved, and for how long."""
+    for option in reversed(
+        [
+            click.option("--method", type=click.Choice(["auto", "bdf", "radau", "dopri", "euler"])),
+            click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"])),
+            click.option(
+                "--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4."
+            ),
+            click.option(
+                "--rtol", type=float, metavar="R", help="The solver's own relative tolerance (no accuracy control)."
+            ),
+            click.option("--atol", type=float, metavar="A", help="The solver's own absolute tolerance."),
+            click.option("--max-steps", type=click.IntRange(min=1), metavar="N"),
+            click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s."),
+            click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto"),
+        ]
+    ):
+        function = option(function)
+    return function

@@ -8,7 +8,7 @@ from typing import Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
-from sysdyn.cli.options import chosen
+from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.running import Request
 
@@ -16,17 +16,10 @@ from sysdyn.cli.running import Request
 @with_console("report")
 @click.argument("file")
 @chosen
-@click.option("--method", type=click.Choice(["auto", "bdf", "radau", "dopri", "euler"]))
-@click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"]))
-@click.option("--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4.")
-@click.option("--rtol", type=float, metavar="R", help="The solver's own relative tolerance (no accuracy control).")
-@click.option("--atol", type=float, metavar="A", help="The solver's own absolute tolerance.")
+@solved
 @click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
 @click.option("--at", metavar="T1,T2,...", help="Instants that the traces hold too.")
 @click.option("-o", "output", metavar="FILE.html", help="Default: <stem>-<scene>.html here.")
-@click.option("--max-steps", type=click.IntRange(min=1), metavar="N")
-@click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s.")
-@click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto")
 def command(console: Console, progress: str, output: str | None, **options: Any) -> int:
     """Write one page about a scene of FILE: text, network, laws, equations, run, energy balance.
 

@@ -12,7 +12,7 @@ import click
 import numpy as np
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
-from sysdyn.cli.options import chosen
+from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.running import Ran, Request, run
 from sysdyn.cli.starting import described, shortened
@@ -21,17 +21,10 @@ from sysdyn.cli.starting import described, shortened
 @with_console("simulate")
 @click.argument("file")
 @chosen
-@click.option("--method", type=click.Choice(["auto", "bdf", "radau", "dopri", "euler"]))
-@click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"]))
-@click.option("--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4.")
-@click.option("--rtol", type=float, metavar="R", help="The solver's own relative tolerance (no accuracy control).")
-@click.option("--atol", type=float, metavar="A", help="The solver's own absolute tolerance.")
+@solved
 @click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
 @click.option("--at", metavar="T1,T2,...", help="Instants that the trace holds too.")
 @click.option("-o", "output", metavar="TRACE.h5", help="Default: <stem>-<scene>.h5 here.")
-@click.option("--max-steps", type=click.IntRange(min=1), metavar="N")
-@click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s.")
-@click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto")
 @click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
 def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
     """Simulate a scene of FILE and write its trace."""
