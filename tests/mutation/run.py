@@ -39,7 +39,7 @@ from mutants import Mutant, mutants
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-ROOMS = ("dsl", "compiler", "runtime", "cli", "models")
+ROOMS = ("dsl", "compiler", "runtime", "cli", "api", "models")
 LOWERING = (
     "lowering.py", "kane.py", "momenta.py", "integration.py", "audit.py", "mirror.py", "reflection.py",
     "primal/balances.py", "primal/laws.py", "primal/series.py", "primal/potentials.py", "primal/reading.py",
@@ -121,11 +121,14 @@ def _around(tree: ast.Module, line: int) -> tuple[str, frozenset[int]]:
 
 
 def tree(folder: Path) -> Path:
-    """A copy of the package in a folder of its own."""
+    """A copy of the installed package, its C core included, in a folder of its own."""
     package = folder / "sysdyn"
     for room in ROOMS:
-        shutil.copytree(ROOT / room, package / room, ignore=shutil.ignore_patterns("__pycache__"))
-    (package / "cli" / "api").rename(package / "api")
+        spec = importlib.util.find_spec(f"sysdyn.{room}")
+        (place,) = spec.submodule_search_locations if spec and spec.submodule_search_locations else [None]
+        if place is None:
+            raise ModuleNotFoundError(f"sysdyn.{room} is not installed")
+        shutil.copytree(place, package / room, ignore=shutil.ignore_patterns("__pycache__"))
     return package
 
 
