@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
+from sysdyn.runtime.scales import ROUND_OFF
 from sysdyn.runtime.trace import Quantity, Trace
 
-ROUNDING = 1e-12
-"""Of the largest nominal magnitude of a unit: differences smaller than that are what is left of a zero."""
 Places = NDArray[np.intp]
 Bounds = Mapping[str, float]
 """Difference allowed of each compared quantity, relative to its nominal magnitude."""
@@ -77,7 +76,7 @@ def _compared(one: Trace, other: Trace, bounds: Bounds) -> tuple[Floats, dict[st
     largest = [_largest(one), _largest(other)]
     for name, bound in bounds.items():
         nominals = [n for n in (_nominal(one[name]), _nominal(other[name])) if n > 0.0]
-        least = ROUNDING * min(trace.get(one[name].units, 0.0) for trace in largest)
+        least = ROUND_OFF * min(trace.get(one[name].units, 0.0) for trace in largest)
         size = max(bound * min(nominals, default=0.0), least)
         apart = np.abs(one[name].values[here] - other[name].values[there])
         ratio = apart / size if size > 0.0 else np.where(apart == 0.0, 0.0, np.inf)

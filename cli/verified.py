@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from sysdyn.cli.agreement import ROUNDING, Bounds, Gap, gaps
+from sysdyn.cli.agreement import Bounds, Gap, gaps
 from sysdyn.cli.twins import Twins
+from sysdyn.runtime.scales import ROUND_OFF
 from sysdyn.runtime.simulate import Outcome
 from sysdyn.runtime.trace import Trace
 
@@ -53,7 +54,7 @@ class Run:
     @property
     def books(self) -> float:
         """Energy balance in units of what is allowed: BOOKS x accuracy of the turnover."""
-        allowed = max(BOOKS * self.accuracy, ROUNDING) * self.turnover
+        allowed = max(BOOKS * self.accuracy, ROUND_OFF) * self.turnover
         if not self.stores:
             return 0.0
         return self.energy / allowed if allowed > 0.0 else (np.inf if self.energy > 0.0 else 0.0)

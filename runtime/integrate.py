@@ -22,7 +22,7 @@ from sysdyn.runtime.metric import kinematic_scale
 from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.request import LONGEST, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.restart import Restart
-from sysdyn.runtime.scales import magnitudes
+from sysdyn.runtime.scales import ROUND_OFF, magnitudes
 from sysdyn.runtime.segments import Segment, segments
 from sysdyn.runtime.settled import Settler
 from sysdyn.runtime.start import ConsistentState
@@ -104,7 +104,8 @@ class Integration:
     def _stepper(self) -> None:
         request = self.request
         self.method = Method(request.method, self.system, self.linear, self._order, self.underlying)
-        self._atol = None if request.atol is None else np.full(self.system.unknowns, request.atol)
+        # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
+        self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._smooth = self.roles.differential.astype(np.int32)
         method = self.method.contents
         method.rtol, method.t_end = request.rtol, self.segments[0].end

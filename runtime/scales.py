@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.system import System
 
+ROUND_OFF = 1e-12
+"""Of the largest quantity of the same unit: smaller ones are what is left of a zero."""
 GROUP = 1e-3
 SPAN = 1e-2
 NOISE = 1e-6

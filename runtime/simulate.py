@@ -24,6 +24,7 @@ from sysdyn.runtime.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.integrate import Integration
 from sysdyn.runtime.rates import determined
 from sysdyn.runtime.request import COMPARED, STEP, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.scales import ROUND_OFF
 from sysdyn.runtime.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure import Structure, index_of, structure
 from sysdyn.runtime.system import System
@@ -36,8 +37,6 @@ LONG = 1000
 """Steps of the bdf after which method auto tries radau, and of a stiff dopri."""
 STIFF = 1e5
 """Steps that a stiff dopri which was asked for still takes."""
-ROUND_OFF = 1e-12
-"""Of the largest quantity of the same unit."""
 FINEST_RADAU = 1e-17
 """Smallest tolerance of Radau: its error test works with a tenth of the power 2/3 of it (core/radau.h)."""
 COMPARISONS = 200

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from model_runs import trace_of
 from sysdyn.cli.running import Request, run
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.runtime import start
@@ -36,3 +37,22 @@ def test_last_digits_do_not_decide(tmp_path, monkeypatch, model, formulation, se
         output=str(tmp_path / "trace.h5"),
     )
     assert run(request, report) is not None, [d.message for d in report]
+
+
+@pytest.mark.parametrize(("method", "index"), [("bdf", "auto"), ("radau", "auto"), ("dopri", "0")])
+def test_a_tolerance_without_absolute_part_at_rest(tmp_path, method, index):
+    """Forced oscillators from y = y' = 0: y'' = sin t - y, all relative tolerance; y = (sin t - t cos t)/2."""
+    text = """model forced {
+      coord y: translation
+      energy T* = 1/2*1 kg*y'^2
+      energy V = 1/2*1 N/m*y^2
+      work 1 N*sin(1 rad/s*t) on y
+    }
+    scene s of forced {
+      time 0 s to 6 s
+      trace y every 0.1 s
+    }
+    """
+    trace = trace_of(tmp_path, text, method=method, index=index, rtol=1e-7, atol=0.0)
+    t, y = trace.time, trace["y"].values
+    np.testing.assert_allclose(y, 0.5 * (np.sin(t) - t * np.cos(t)), rtol=0.0, atol=1e-6)
