@@ -26,7 +26,8 @@ from sysdyn.dsl.diagnostics import Place, Report
 from sysdyn.dsl.network import Network, Scene
 from sysdyn.dsl.units import si_text
 from sysdyn.runtime.failures import NoSuchForm, SolverFailure
-from sysdyn.runtime.simulate import Options, Outcome, Progress, simulate
+from sysdyn.runtime.options import Options, Progress
+from sysdyn.runtime.simulate import Outcome, simulate
 from sysdyn.runtime.trace import Parameter
 
 ACCURACY = 1e-4

@@ -27,7 +27,7 @@ from sysdyn.cli.twins import Twins, free_multipliers, twins
 from sysdyn.cli.verified import Refusal, Run, Verified, disagreements, worst
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Report
-from sysdyn.runtime.simulate import Options
+from sysdyn.runtime.options import Options
 from sysdyn.runtime.trace import Trace
 
 METHODS = ("bdf", "radau")

@@ -13,7 +13,7 @@ from sysdyn.cli.agreement import Gap
 from sysdyn.cli.columns import aligned
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER
-from sysdyn.cli.options import chosen
+from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.running import Request
 from sysdyn.cli.sizes import sizes
@@ -25,25 +25,18 @@ from sysdyn.cli.verified import Run, Verified
 @with_console("verify")
 @click.argument("file")
 @chosen
-@click.option("--method", type=click.Choice(["auto", "bdf", "radau", "dopri", "euler"]), help="Of the reference.")
-@click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"]))
-@click.option("--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4.")
-@click.option("--rtol", type=float, metavar="R", help="The solver's own relative tolerance (no accuracy control).")
-@click.option("--atol", type=float, metavar="A", help="The solver's own absolute tolerance.")
+@solved
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("--at", metavar="T1,T2,...", help="Instants that are compared too.")
 @click.option("-o", "output", metavar="DIR", help="Keep the traces there, as FORMULATION-METHOD.h5.")
-@click.option("--max-steps", type=click.IntRange(min=1), metavar="N", help="Of each run.")
-@click.option("--max-wall", metavar="T", help="Limit of each run's wall time; a bare number in s.")
 @click.option("--full", is_flag=True, help="Do not take reduced sizes from the ci.toml above FILE's folder.")
-@click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto")
 @click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
 def command(console: Console, progress: str, no_timings: bool, full: bool, output: str | None, **options: Any) -> int:
     """Run a scene of FILE in every formulation that can express it, by bdf and by radau, and compare the traces.
 
     Two runs agree where every traced quantity differs by less than 10 x accuracy x its nominal magnitude, up to the
     horizon: the instant at which the reference differs by that much from its own run at a tenth of the accuracy.
-    --formulation and --method choose the reference.  Exit 1 where runs disagree.
+    --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree.
     """
     line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)

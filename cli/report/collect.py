@@ -21,7 +21,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.dsl.network import Network
 from sysdyn.runtime.failures import TraceError
-from sysdyn.runtime.simulate import Options, Progress
+from sysdyn.runtime.options import Options, Progress
 from sysdyn.runtime.trace import Trace
 
 LONG = 20.0

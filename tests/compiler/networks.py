@@ -354,7 +354,8 @@ def null_vector(a, e, s):
 def solve(network, end, path, formulation="lagrangian", accuracy=1e-6, **more):
     """The trace of a network from 0 to `end`, and the outcome."""
     from sysdyn.runtime.carrier import load
-    from sysdyn.runtime.simulate import Options, simulate
+    from sysdyn.runtime.options import Options
+    from sysdyn.runtime.simulate import simulate
     from sysdyn.runtime.trace import Trace
 
     with x.fresh():

@@ -9,8 +9,9 @@ from sysdyn.runtime.carrier import load
 from sysdyn.runtime.core_library import ROW_HEAD
 from sysdyn.runtime.failures import SolverFailure
 from sysdyn.runtime.integrate import Integration
+from sysdyn.runtime.options import Options
 from sysdyn.runtime.request import Request
-from sysdyn.runtime.simulate import Options, simulate
+from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.start import consistent_start
 from sysdyn.runtime.system import System
 from sysdyn.runtime.trace import Trace

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.carrier import load
-from sysdyn.runtime.simulate import Options, simulate
+from sysdyn.runtime.options import Options
+from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.start import consistent_start
 from sysdyn.runtime.structure import structure
 from sysdyn.runtime.system import System

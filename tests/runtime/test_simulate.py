@@ -5,7 +5,8 @@ import pytest
 import small_models as models
 from sysdyn.runtime.carrier import load
 from sysdyn.runtime.failures import SolverFailure
-from sysdyn.runtime.simulate import Options, choose_index, simulate
+from sysdyn.runtime.options import Options, choose_index
+from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.trace import Parameter, Trace
 
 # /work/shared/seed/references.json: values at the last instant of each system

@@ -10,8 +10,9 @@ from sysdyn.dsl import load
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.dsl.source import SourceText
 from sysdyn.runtime.failures import SolverFailure
+from sysdyn.runtime.options import Options
 from sysdyn.runtime.segments import segments
-from sysdyn.runtime.simulate import Options, simulate
+from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.trace import Trace
 
 LEAD = """

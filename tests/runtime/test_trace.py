@@ -13,7 +13,8 @@ import pytest
 import small_models as models
 from sysdyn.runtime.carrier import load
 from sysdyn.runtime.failures import TraceError
-from sysdyn.runtime.simulate import Options, simulate
+from sysdyn.runtime.options import Options
+from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.trace import Column, Parameter, Trace, TraceWriter
 
 HERE = Path(__file__).parent
@@ -122,7 +123,8 @@ sys.path.insert(0, {here!r})
 import small_models as models
 from sysdyn.runtime import trace
 from sysdyn.runtime.carrier import load
-from sysdyn.runtime.simulate import Options, simulate
+from sysdyn.runtime.options import Options
+from sysdyn.runtime.simulate import simulate
 trace.FLUSH_SECONDS = {flush}
 manifest, binding, module = models.mass_spring()
 print("begin", flush=True)
