@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.initially import initially
 from sysdyn.compiler.linkages import with_linkages
+from sysdyn.compiler.primal.reading import KINDS
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Place
 from sysdyn.dsl.expression import Node
@@ -368,15 +369,16 @@ def unreflectable(network: Network) -> Diagnostic | None:
         (f"energy {e.function}", (e.expression,), e.place) for e in network.energies
     ]
     statements += [("work", (w.effort, w.on), w.place) for w in network.works]
-    statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in network.constraints]
+    gammas = [(f"gamma {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind == "gamma"]
+    statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind != "gamma"]
     laws = [(f"law of {b.name}", (b.law,), b.place) for b in network.branches if b.law is not None]
     moduli = [(f"ratio of {c.first.partition('#')[0]}", (c.ratio,), c.place) for c in network.couplings]
     for what, roots, place in statements:
         for node in ex.topological(roots):
-            if node.op == "var" and node.data[1] in ("nq", "nf", "np", "bq", "bf", "bp", "ne", "be"):
+            if node.op == "var" and node.data[1] in KINDS:
                 message = f"{what} is written in {node}: it has no counterpart in the complementary family"
                 return Diagnostic("E602", message, place, help_)
-    for what, roots, place in (*laws, *moduli):
+    for what, roots, place in (*laws, *moduli, *gammas):
         own = what.removeprefix("law of ")
         for node in ex.topological(roots):
             if node.op == "var" and node.data[1] in ("nq", "bq") and node.data[0] != own:

@@ -18,11 +18,11 @@ from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import RowLabel, SolverFailure
 from sysdyn.runtime.least_norm import LeastNorm
 from sysdyn.runtime.methods import Method
-from sysdyn.runtime.metric import kinematic_scale
+from sysdyn.runtime.metric import kinematic_scale, light
 from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.request import LONGEST, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.restart import Restart
-from sysdyn.runtime.scales import ROUND_OFF, magnitudes
+from sysdyn.runtime.scales import ROUND_OFF, confirmed, magnitudes
 from sysdyn.runtime.segments import Segment, segments
 from sysdyn.runtime.settled import Settler
 from sysdyn.runtime.start import ConsistentState
@@ -58,6 +58,7 @@ class Integration:
         self.magnitude = self._magnitudes()
         if system.form.name == "2":
             jy, jyd = self._weighted(jy, jyd)
+        self._light = light(system, jy, jyd)
         self._linear(jy, jyd)
         self.settler = self._settler("settled", self.roles.state[: system.form.written])
         stops = None if request.fixed_step else request.stops
@@ -99,22 +100,23 @@ class Integration:
     def _settler(self, name: str, state: NDArray[np.bool_]) -> Settler:
         form = self.system.form
         n = form.written
-        return Settler(self.system.another(name), (form.k_q, form.k_f), self.magnitude[:n], self._time, state)
+        kinematics = (form.k_q, form.k_f)
+        return Settler(self.system.another(name), kinematics, self.magnitude[:n], self._time, state, self._light[:n])
 
     def _stepper(self) -> None:
         request = self.request
         self.method = Method(request.method, self.system, self.linear, self._order, self.underlying)
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
+        self._met = np.zeros(self.system.unknowns)
         self._smooth = self.roles.differential.astype(np.int32)
         method = self.method.contents
         method.rtol, method.t_end = request.rtol, self.segments[0].end
         method.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
         method.fixed_h = request.fixed_step or 0.0
         method.atol = lib.pointer(self._atol)
-        method.magnitude = lib.pointer(self.magnitude)
+        method.magnitude, method.met = lib.pointer(self.magnitude), lib.pointer(self._met)
         method.test, method.power = lib.pointer(self.roles.test), lib.pointer(self.roles.power)
-        method.track = 1
         if request.method == "radau":
             method.smooth = lib.pointer(self._smooth)
         elif request.method == "bdf":
@@ -282,7 +284,7 @@ class Integration:
         return Finished(
             method.t,
             self.statistics(),
-            self.magnitude[: self.system.form.written].copy(),
+            confirmed(self.system, self._met, self.magnitude)[: self.system.form.written],
             self.largest(),
             self.cpu,
             self.settler.core.contents.failures,

@@ -8,6 +8,7 @@ in the metric of the inertia), or, where some unit has none, one over the larges
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.scales import group_maximum
 from sysdyn.runtime.system import System
@@ -31,6 +32,14 @@ def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
                 place[first : first + row.size] = system.form.at[flow] + np.arange(row.size)
         mine = place[system.pattern.row] == columns
         np.maximum.at(found, columns[mine], np.abs(values[mine]))
+    return found
+
+
+def light(system: System, jy: Floats, jyd: Floats) -> NDArray[np.bool_]:
+    """Displacements without inertia where others have some [unknowns]."""
+    found, form = np.zeros(system.unknowns, dtype=bool), system.form
+    inertia = own_inertia(system, jy, jyd)[form.k_f]
+    found[form.k_q] = (inertia == 0.0) & bool((inertia > 0.0).any())
     return found
 
 

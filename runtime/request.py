@@ -67,7 +67,7 @@ class Statistics:
 class Finished:
     """An integration that reached its end.
 
-    magnitude [unknowns as written]: largest |y| met; largest [observed]: of the values and of the terms of their
+    magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of their
     expressions; cpu [s].
     """
 

@@ -5,7 +5,7 @@ the time scale of the start (never the span alone: a long run would call everyth
 among unknowns of the same kind and unit.
 Unknowns that are zero with all of that take the magnitude that balances the rows they stand in: the other terms
 of the row, and how far the row itself moves with t over the span (sources that start at zero).
-While a run tracks magnitudes they grow with max |y|; a second run starts with the maxima of the first.
+During a run magnitudes grow with max |y|; a second run starts with the maxima of the first.
 """
 
 from __future__ import annotations
@@ -71,13 +71,15 @@ def propagate(
     alike: NDArray[np.int64],
     *,
     largest: bool = False,
+    capped: bool = False,
 ) -> Floats:
     """Fills zeros of `magnitude` [unknowns] so that their terms balance the others of their rows.
 
     rows, columns, size [entries]: |coefficient| of each place; excited [rows]: magnitude of the rows' free terms;
     alike [unknowns]: number of the kind and unit.  A coefficient that is small beside those of its like proposes much:
     it is asked only where no other is left.
-    Of several rows' proposals the least counts, or the largest.
+    Of several rows' proposals the least counts, or the largest; capped: none above the largest of its like that is
+    known, for along a chain each overestimates the next, and a run mends what is too small alone.
     """
     found = magnitude.copy()
     places = size > 0.0
@@ -99,6 +101,9 @@ def propagate(
         pick = np.maximum if largest else np.minimum
         with np.errstate(over="ignore"):  # a proposal without bound is none
             pick.at(best, columns[wanted], row[rows[wanted]] / size[wanted])
+        if capped:
+            known = _group_maximum(alike, found)
+            best = np.where(known > 0.0, np.minimum(best, known), best)
         found = np.where(missing & np.isfinite(best), best, found)
     return found
 
@@ -135,7 +140,10 @@ def alike(system: System) -> NDArray[np.int64]:
 
 def group_maximum(system: System, values: Floats) -> Floats:
     """Largest value among the unknowns of the same kind and unit."""
-    group = alike(system)
+    return _group_maximum(alike(system), values)
+
+
+def _group_maximum(group: NDArray[np.int64], values: Floats) -> Floats:
     largest = np.zeros(int(group.max(initial=0)) + 1)
     np.maximum.at(largest, group, values)
     return largest[group]
@@ -184,14 +192,24 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     # momenta and dynamic variables are balanced against flows, what follows from the state against all of it: so
     # round-off of a start does not pass for a magnitude
     kept = np.where(np.isin(system.kinds, ("q", "f")) & carries, found, 0.0)
-    balanced = propagate(kept, rows, columns, size, excited, kinds, largest=True)
+    balanced = propagate(kept, rows, columns, size, excited, kinds, largest=True, capped=True)
     found = np.where(~np.isin(system.kinds, ("p", "s")) | (found > NOISE * balanced), found, balanced)
     kept = np.where(carries, found, 0.0)
     row = excited.copy()
     np.maximum.at(row, rows, size * kept[columns])
-    balanced = propagate(kept, rows, columns, size, np.maximum(excited, _efforts(system, found, row)), kinds)
+    balanced = propagate(kept, rows, columns, size, np.maximum(excited, _efforts(system, found, row)), kinds, capped=True)
     found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, group_maximum(system, found), found)
     found[form.k_q] = np.where(found[form.k_q] == 0.0, tau * found[form.k_f], found[form.k_q])
     tiny = np.finfo(np.float64).tiny * 1e30
     return np.where(found > tiny, found, 1.0), tau
+
+
+def confirmed(system: System, met: Floats, magnitude: Floats) -> Floats:
+    """Magnitudes after a run [unknowns]: the largest |y| it met and a thousandth of that among unknowns of the same
+    kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
+    round-off altogether.
+    """
+    found = np.maximum(met, GROUP * group_maximum(system, met))
+    free = np.isin(system.kinds, ("q", "f", "p", "s")) & (system.nominal == 0.0)
+    return np.where(free, np.clip(found, NOISE * magnitude, magnitude), magnitude)

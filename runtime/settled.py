@@ -15,6 +15,8 @@ from sysdyn.runtime.ordering import column_order
 from sysdyn.runtime.patterns import Pattern, Places, compress
 from sysdyn.runtime.system import System
 
+LIGHT = 1e-3
+"""Weight (of squares) of displacements without inertia: they follow those that have some."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
 
@@ -33,7 +35,8 @@ class Settler:
     """Moves points onto the settled rows.
 
     settled: the System in form "settled"; magnitude [unknowns] of y; rate_magnitude [rates];
-    state [unknowns] bool: unknowns that carry the state and should move least.
+    state [unknowns] bool: unknowns that carry the state and should move least; light [unknowns] bool: displacements
+    without inertia among others that have some, which move more easily.
     """
 
     def __init__(
@@ -43,6 +46,7 @@ class Settler:
         magnitude: Floats,
         time_scale: float,
         state: NDArray[np.bool_],
+        light: NDArray[np.bool_] | None = None,
     ) -> None:
         self.system = settled
         self.rates = rates_of(settled)
@@ -51,9 +55,11 @@ class Settler:
         self.pattern: Pattern
         self.pattern, self._slots = self._saddle()
         self._weight = np.ones(self._moves)
+        if light is not None:
+            self._weight[:n][light] = LIGHT
         self._weight[:n][~state] = FREE**2
         self._weight[n:] = FREE**2
-        self._constraint = self._constraint_rows()
+        self._sort = self._sorts()
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
         self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
         self._allocate()
@@ -84,13 +90,13 @@ class Settler:
             slots[k] = full
         return found, slots
 
-    def _constraint_rows(self) -> Ints:
-        """1 for the rows of phi, phi_rate and psi."""
-        mask = np.zeros(max(self.system.rows, 1), dtype=np.int32)
+    def _sorts(self) -> Ints:
+        """Of the rows, as core/settle.h names them: constraints, rates of other rows, others."""
+        found = np.zeros(max(self.system.rows, 1), dtype=np.int32)
         for group, family, first in self.system.form.groups:
-            if group in ("phi", "phi_rate", "psi"):
-                mask[first : first + self.system.description.rows[family].size] = 1
-        return mask
+            sort = 1 if group in ("phi", "phi_rate", "psi") else 2 if group in ("momentum_rate", "gamma_rate") else 0
+            found[first : first + self.system.description.rows[family].size] = sort
+        return found
 
     def _typical(self) -> Floats:
         """Values for the choice of an elimination order: ones in G, weights on the diagonal."""
@@ -117,7 +123,7 @@ class Settler:
         for name, slot in zip(names, self._slots, strict=True):
             setattr(core, name, lib.pointer(slot))
         core.weight = lib.pointer(self._weight)
-        core.constraint = lib.pointer(self._constraint)
+        core.sort = lib.pointer(self._sort)
         core.k_q, core.k_f = (lib.pointer(item) for item in self._k)
         core.kinematics = self._k[0].size
         lib.reader(core.scale, self._moves)[:] = self.scale

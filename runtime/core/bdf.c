@@ -78,8 +78,7 @@ static void set_weights(sd_bdf *bdf)
     const double *y = bdf->phi[0];
     for (int32_t i = 0; i < bdf->n; i++) {
         double size = fabs(y[i]);
-        if (bdf->track && size > bdf->magnitude[i])
-            bdf->magnitude[i] = size;
+        sd_met(size, &bdf->met[i], &bdf->magnitude[i]);
         double atol = bdf->atol && bdf->test[i] >= 0 ? bdf->atol[i] : bdf->rtol * bdf->magnitude[i];
         bdf->weight[i] = 1.0 / (atol + bdf->rtol * size);
     }

@@ -26,9 +26,9 @@ typedef struct sd_bdf {
     int32_t n, max_order, tested;
     double rtol, t_end, h_max, fixed_h;
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| where `track` */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
     const int32_t *test, *power;
-    int32_t track;
     /* state of the integration */
     double t, h, h_used, cj, cj_factored, contraction;
     int32_t order, order_used, ns, rising, fresh_jacobian, jacobian_age, ready;

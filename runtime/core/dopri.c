@@ -78,8 +78,7 @@ static void set_weights(sd_dopri *dopri)
 {
     for (int32_t i = 0; i < dopri->n; i++) {
         double size = fabs(dopri->phi[i]);
-        if (dopri->track && size > dopri->magnitude[i])
-            dopri->magnitude[i] = size;
+        sd_met(size, &dopri->met[i], &dopri->magnitude[i]);
         double atol = dopri->atol && dopri->test[i] >= 0 ? dopri->atol[i] : dopri->rtol * dopri->magnitude[i];
         dopri->weight[i] = 1.0 / (atol + dopri->rtol * size);
     }

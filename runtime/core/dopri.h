@@ -26,9 +26,9 @@ typedef struct sd_dopri {
     int32_t n, tested;
     double rtol, t_end, h_max, fixed_h;
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| where `track` */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
     const int32_t *test, *power; /* [n] as in bdf.h */
-    int32_t track;
     double patience;          /* steps still to be taken above which a stiff run is given up */
     /* state of the integration */
     double t, h, h_used, error_accepted;

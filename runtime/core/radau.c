@@ -108,8 +108,7 @@ static void set_weights(sd_radau *radau)
 {
     for (int32_t i = 0; i < radau->n; i++) {
         double size = fabs(radau->phi[i]);
-        if (radau->track && size > radau->magnitude[i])
-            radau->magnitude[i] = size;
+        sd_met(size, &radau->met[i], &radau->magnitude[i]);
         double atol = radau->tolerance * radau->magnitude[i];
         if (radau->atol && radau->test[i] >= 0)
             atol = radau->atol[i] * radau->tolerance / radau->rtol;

@@ -30,9 +30,9 @@ typedef struct sd_radau {
     int32_t n, tested;
     double rtol, t_end, h_max, fixed_h;
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| where `track` */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
     const int32_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative */
-    int32_t track;
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta;

@@ -11,6 +11,8 @@
 #define EXACT 4e-15     /* scaled residual that counts as round-off */
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
+#define HELD 1e8        /* weight of the state in a second attempt */
+#define DRAWN 1e-7      /* weight from which an unknown is drawn to where it came from */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
@@ -29,6 +31,7 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     settle->unknowns = system->unknowns;
     settle->rates = rates;
     settle->rows = system->rows;
+    settle->hold = 1.0;
     settle->jy = settle->memory;
     settle->jyd = settle->jy + nnz;
     settle->row_scale = settle->jyd + nnz;
@@ -52,15 +55,18 @@ void sd_settle_free(sd_settle *settle)
 /* largest scaled residual at (t, x) */
 static double measure(sd_settle *settle, double t, const double *y, const double *yd)
 {
-    double worst = 0.0, sum = 0.0;
+    double worst = 0.0, own = 0.0, sum = 0.0;
     sd_residual(settle->system, t, y, yd, settle->r);
     for (int32_t i = 0; i < settle->rows; i++) {
         double v = fabs(settle->r[i] * settle->row_scale[i]);
         if (!(v <= worst))
             worst = v;
-        if (settle->constraint[i])
+        if (settle->sort[i] == SD_CONSTRAINT)
             sum += v * v;
+        if (settle->sort[i] != SD_RATE && !(v <= own))
+            own = v;
     }
+    settle->own = own;
     settle->residual = worst;
     settle->constraints = sqrt(sum);
     return worst;
@@ -105,7 +111,7 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
         }
     }
     for (int32_t j = 0; j < n + rates; j++)
-        settle->matrix[settle->slot_x[j]] += settle->weight[j];
+        settle->matrix[settle->slot_x[j]] += settle->weight[j] * (settle->weight[j] < DRAWN ? 1.0 : settle->hold);
     for (int32_t i = 0; i < settle->rows; i++)
         settle->matrix[settle->slot_r[i]] -= EPSILON;
     if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
@@ -123,10 +129,10 @@ static double move(sd_settle *settle, double *y, double *yd)
     double largest = 0.0;
     for (int32_t j = 0; j < moves; j++) {
         double now = j < n ? y[j] : yd[settle->rate[j - n]];
-        if (settle->weight[j] < 1.0)
+        if (settle->weight[j] < DRAWN)
             settle->step[j] = 0.0;
         else
-            settle->step[j] = -settle->weight[j] * (now - settle->x0[j]) / settle->scale[j];
+            settle->step[j] = -settle->hold * settle->weight[j] * (now - settle->x0[j]) / settle->scale[j];
     }
     for (int32_t i = 0; i < settle->rows; i++)
         settle->step[moves + i] = -settle->r[i] * settle->row_scale[i];
@@ -140,21 +146,19 @@ static double move(sd_settle *settle, double *y, double *yd)
     return largest;
 }
 
-int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
+/* The iteration from (y, yd) = x0; the best point met, its residual in `best`, is left in x. */
+static void iterate(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
     int32_t n = settle->unknowns;
-    settle->calls++;
-    memcpy(settle->x0, y, (size_t)n * sizeof *y);
-    for (int32_t k = 0; k < settle->rates; k++)
-        settle->x0[n + k] = yd[settle->rate[k]];
     int failed = !settle->ready && factorise(settle, t, y, yd);
-    double moved = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd), best = before;
+    double moved = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
+    *best = before;
     memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
     for (int m = 0; m < ITERATIONS && !failed && !(before <= EXACT && moved < SMALL) && !*settle->system->stop; m++) {
         moved = move(settle, y, yd);
         double now = measure(settle, t, y, yd);
-        if (now < best || now <= EXACT) {
-            best = now;
+        if (now < *best || now <= EXACT) {
+            *best = now;
             memcpy(settle->x, y, (size_t)n * sizeof *y);
             for (int32_t k = 0; k < settle->rates; k++)
                 settle->x[n + k] = yd[settle->rate[k]];
@@ -165,16 +169,39 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
             failed = factorise(settle, t, y, yd);
         before = now;
     }
-    /* the best point met, or the given one */
-    int done = best <= CLOSE;
-    if (!done) {
-        memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
-        settle->failures++;
+}
+
+/* (y, chosen yd) := x */
+static void put(const sd_settle *settle, const double *x, double *y, double *yd)
+{
+    memcpy(y, x, (size_t)settle->unknowns * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] = x[settle->unknowns + k];
+}
+
+int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
+{
+    int32_t n = settle->unknowns;
+    double best;
+    settle->calls++;
+    memcpy(settle->x0, y, (size_t)n * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        settle->x0[n + k] = yd[settle->rate[k]];
+    iterate(settle, t, y, yd, &best);
+    if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
+        put(settle, settle->x0, y, yd);
+        settle->hold = HELD;
+        settle->ready = 0;
+        iterate(settle, t, y, yd, &best);
+        settle->hold = 1.0;
         settle->ready = 0;
     }
-    memcpy(y, settle->x, (size_t)n * sizeof *y);
-    for (int32_t k = 0; k < settle->rates; k++)
-        yd[settle->rate[k]] = settle->x[n + k];
+    /* the best point met, or the given one; a rate may have no bound */
+    put(settle, settle->x, y, yd);
+    int done = best <= CLOSE || (measure(settle, t, y, yd), settle->own <= CLOSE);
+    if (!done)
+        put(settle, settle->x0, y, yd);
+    settle->failures += !done;
     for (int32_t i = 0; done && i < settle->system->held; i++)
         y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
     for (int32_t i = 0; i < settle->kinematics; i++)

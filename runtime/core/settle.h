@@ -14,6 +14,8 @@
 #include "assembly.h"
 #include "linear.h"
 
+enum { SD_OTHER, SD_CONSTRAINT, SD_RATE };
+
 typedef struct sd_settle {
     sd_system *system;
     sd_linear *linear;               /* of the saddle-point matrix [unknowns + rates + rows] */
@@ -22,14 +24,17 @@ typedef struct sd_settle {
     const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
     const int32_t *slot_yd, *slot_yd_t;   /* [entries] the same of dF/dyd */
     const int32_t *slot_x, *slot_r;       /* [unknowns + rates], [rows] diagonal */
-    const double *weight;            /* [unknowns + rates] */
+    const double *weight;            /* [unknowns + rates]: 1 for the state, less for what has no inertia, almost
+                                        nothing for what follows from it */
     double *scale;                   /* [unknowns + rates] magnitudes */
-    const int32_t *constraint;       /* [rows] 1: counts in the norm of constraints */
+    const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE */
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;
     double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;
+    double hold;                     /* weight of the state; 1 but in a second attempt */
     int32_t ready;
-    double residual, constraints;    /* after the last call: largest scaled row; norm of the constraint rows */
+    double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
+                                        rate of another; norm of the constraint rows */
     int64_t calls, failures;
 } sd_settle;
 

@@ -42,4 +42,13 @@ typedef struct sd_stepper {
     double *const *node_y, *const *node_yd;
 } sd_stepper;
 
+/* The largest |y| met so far, and the magnitude that grows with it. */
+static inline void sd_met(double size, double *met, double *magnitude)
+{
+    if (size > *met)
+        *met = size;
+    if (size > *magnitude)
+        *magnitude = size;
+}
+
 #endif
