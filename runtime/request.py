@@ -67,8 +67,8 @@ class Statistics:
 class Finished:
     """An integration that reached its end.
 
-    magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of their
-    expressions; cpu [s].
+    magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
+    their expressions; cpu [s].
     """
 
     reached: float

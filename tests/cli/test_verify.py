@@ -1,9 +1,5 @@
-"""`sysdyn verify`: formulations and methods agree on the models, and a wrong one is found and named.
+"""`sysdyn verify`: formulations and methods agree on all scenes of all models, and a wrong one is found and named."""
 
-All scenes of all models (some minutes): SYSDYN_LONG=1 pytest tests/cli/test_verify.py
-"""
-
-import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +16,6 @@ from sysdyn.runtime.trace import Quantity, Trace
 from texts import FAILING, PENDULUM, ROOT, STUCK, TWO_SCENES, run_json, write
 
 MODELS = ROOT / "models"
-LONG = os.environ.get("SYSDYN_LONG") == "1"
 FOUR = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"]
 VERIFY = {
     "runs": list,
@@ -129,7 +124,6 @@ def scenes():
             yield path.relative_to(MODELS).as_posix(), scene
 
 
-@pytest.mark.skipif(not LONG, reason="some minutes: SYSDYN_LONG=1")
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
 def test_every_scene_agrees(file, scene, capsys):
     code, found = run_json(capsys, "verify", str(MODELS / file), "--scene", scene, "--max-wall", "60")
