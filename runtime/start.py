@@ -71,16 +71,15 @@ def _given(system: System) -> _Given:
     label: dict[int, RowLabel] = {}
     for item in sorted(system.description.initial, key=lambda item: item.fixed):
         places = system.form.at[item.family] + item.positions
-        for place, value in zip(places[fixed[places]], item.values[fixed[places]], strict=True):
-            if item.fixed and abs(guess[place] - value) > 1e-12 * max(abs(value), abs(guess[place])):
-                raise InconsistentStart(
-                    "fixed",
-                    abs(guess[place] - value),
-                    (),
-                    (label[int(place)], item.label),
-                    (system.name(int(place)),),
-                )
+        known = np.where(fixed[places], guess[places], item.values)
         guess[places] = item.values
+        for held in (known, guess[places]) if item.fixed else ():  # said before, and twice by the statement itself
+            apart = np.abs(held - item.values)
+            wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(held), np.abs(item.values)))
+            if wrong.size:
+                place = int(places[wrong[0]])
+                labels = (label.get(place, item.label), item.label)
+                raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (system.name(place),))
         fixed[places] |= item.fixed
         written[places] = True
         label.update(dict.fromkeys(places.tolist(), item.label))
@@ -99,7 +98,7 @@ class Starter:
         self._alike = np.concatenate([kinds[: system.form.written], kinds.max(initial=0) + 1 + kinds[self.rates]])
         self.n = system.form.written
         self.guessed = self._guessed()
-        self.every = ~self.guessed  # rows that must hold
+        self.every = ~self.guessed & ~self._unsettled()  # rows that must hold
         self.kinds = system.kinds[: self.n]
         pattern = self.settled.pattern
         columns = pattern.columns_of()
@@ -141,6 +140,18 @@ class Starter:
             rows = self.settled.description.rows[family]
             if group == "initial" and not rows.fixed:
                 mask[first : first + rows.size] = True
+        return mask
+
+    def _unsettled(self) -> Mask:
+        """Rates of balances with inertia: the start does not know them."""
+        inertial = np.zeros(self.settled.rows, dtype=bool)
+        inertial[self.settled.pattern.row[self.settled.structural()[1]]] = True
+        balances = {family: first for group, family, first in self.settled.form.groups if group == "dynamics"}
+        mask = np.zeros(self.settled.rows, dtype=bool)
+        for group, family, first in self.settled.form.groups:
+            if group == "dynamics_rate":
+                size, own = self.settled.description.rows[family].size, balances[family]
+                mask[first : first + size] = inertial[own : own + size]
         return mask
 
     def following(self, t: float, x: Floats) -> Mask:

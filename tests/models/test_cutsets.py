@@ -61,3 +61,33 @@ def test_an_inerter_between_free_springs(tmp_path, formulation):
     found = 3 * trace["k1.q"].values + 5 * trace["k2.q"].values
     assert found == pytest.approx(np.cos(trace.time), abs=1e-6)
     assert trace["k1.q"].values[0] == pytest.approx(0.7, abs=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_inductors_alone_at_nodes_of_a_family(tmp_path, formulation):
+    """Two sections in series: only v[2] of v[0..2] has inertia in the complementary family."""
+    text = """
+    model line {
+      param n = 2
+      node w[1..n], v[0..n]: electrical
+      V: effort(e = 1 V*cos(2 rad/s*t)) v[0] -> ground
+      for i in 1..n {
+        R[i]: dissipator(e = 0.4 ohm*i*f) v[i - 1] -> w[i]
+        L[i]: kinetic(p = 0.5 H*i*f) w[i] -> v[i]
+      }
+      C: potential(q = 0.4 F*e) v[n] -> ground
+      init C.e = 0.5 V
+      init L[1].f = 0.2 A
+    }
+    scene go of line {
+      time 0 s to 1 s
+      accuracy 1e-6
+      trace L[1].f, L[2].f, v[1].e, w[2].e every 0.1 s
+    }
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    # 1.5 i' = 0.5 - 1.2 * 0.2
+    rate = (0.5 - 1.2 * 0.2) / 1.5
+    assert trace["v[1].e"].values[0] == pytest.approx(1.0 - 0.4 * 0.2 - 0.5 * rate, abs=1e-6)
+    assert trace["w[2].e"].values[0] == pytest.approx(1.0 - 1.2 * 0.2 - 0.5 * rate, abs=1e-6)
+    assert trace["L[1].f"].values == pytest.approx(trace["L[2].f"].values, abs=1e-6)
