@@ -17,6 +17,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from sysdyn.compiler.initially import initially
+from sysdyn.compiler.islands import grounded
 from sysdyn.compiler.linkages import with_linkages
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Place
@@ -52,7 +53,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    network = with_linkages(_with_contents(_from_stores(as_elements(network))))
+    network = with_linkages(_with_contents(_from_stores(grounded(as_elements(network)))))
     bare = network
     network = _with_positions(network)
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
@@ -229,11 +230,12 @@ def as_elements(network: Network) -> Network:
     nodes = {n.name: n.domain for n in network.nodes}
     kept, made = [], []
     for number, energy in enumerate(network.energies):
-        pieces = _pieces(energy.expression)
-        found = [_element(energy, piece, f"{energy.function} {number}.{k}", nodes) for k, piece in enumerate(pieces)]
-        branches = [b for b in found if b is not None]
-        if len(branches) == len(pieces):
-            made += branches
+        for pieces in (_pieces(energy.expression), [energy.expression]):
+            found = [_element(energy, piece, f"{energy.function} {number}.{k}", nodes) for k, piece in enumerate(pieces)]
+            branches = [b for b in found if b is not None]
+            if len(branches) == len(pieces):
+                made += branches
+                break
         else:
             kept.append(energy)
     return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
@@ -263,7 +265,7 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
         return None
     a, b = used[0], used[-1] if len(used) == 2 else None
     slope = ex.derivative(piece, a)
-    if b is not None and not ex.is_const(ex.add(slope, ex.derivative(piece, b)), 0.0):
+    if b is not None and not ex.is_const(ex.add(*_pieces(ex.add(slope, ex.derivative(piece, b)))), 0.0):
         return None
     at = tuple(ex.index(loop.index) for loop in energy.loops)
     own = ex.var(name, own_kind, *at)
