@@ -27,6 +27,8 @@ RANK = 1e-11
 _ITERATIONS = 60
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
+_BESIDE = 1e-8
+"""Scaled rows so small that the nearest solution is as far as round-off lets it."""
 _PROXIMAL = 6
 
 
@@ -77,9 +79,11 @@ class _Linear:
         self.shape = int(problem.use.sum()), int(problem.free.sum())
 
     def nearest(self, u: Floats, r: Floats) -> Floats:
-        """The u of least norm with A u = A u_now - r."""
+        """The u of least norm with A u = A u_now - r; beside it, the step of least norm: its round-off is its own."""
         i, j, v = self.entries
         aim = -r
+        if np.max(np.abs(r), initial=0.0) < _BESIDE:
+            return u + least_norm(self.shape, (i, j, v), aim)
         np.add.at(aim, i, v * u[j])
         return least_norm(self.shape, (i, j, v), aim)
 

@@ -236,7 +236,7 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         for shaken in (x, *_shaken(x, may, problem.scale)):
             found = solve(problem, shaken)
             if found.residual < EXACT:
-                x = found.x
+                x = starter.without_noise(found.x, problem.scale)
                 break
     return x
 
