@@ -3,14 +3,14 @@
 Unknowns: y as written and the derivatives that the settled rows read; equations: all settled rows (as written,
 phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.  Fixed values never move.
 Guesses move least: each step is the minimum-norm solution of the linearised rows around the *guess* (Gauss-Newton,
-in unknowns scaled by magnitude, rank-deficient rows tolerated).  Stages: positions onto phi, then flows and momenta
-onto the first derivatives, then everything.  Where the rows are singular at the guess (a valve C f|f| at rest),
-seeded perturbations of the free unknowns are tried.
+in unknowns scaled by magnitude, rank-deficient rows tolerated).  Stages: positions onto phi and what else holds between
+them, then flows and momenta onto the first derivatives, then everything.  Where the rows are singular at the guess (a
+valve C f|f| at rest), seeded perturbations of the free unknowns are tried.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,6 +107,8 @@ class Starter:
         self._rated = rate_at[columns] >= 0
         self.rows = np.concatenate([pattern.row, pattern.row[self._rated]]).astype(np.int64)
         self.columns = np.concatenate([columns, rate_at[columns[self._rated]]])
+        in_y, in_rate = self.settled.structural()
+        self._structural = np.concatenate([in_y, in_rate[self._rated]])
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
@@ -131,6 +133,13 @@ class Starter:
         for group, family, first in self.settled.form.groups:
             if group in names:
                 mask[first : first + self.settled.description.rows[family].size] = True
+        return mask
+
+    def between(self, kinds: Sequence[str]) -> Mask:
+        """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
+        outside = np.append(~np.isin(self.kinds, kinds), np.ones(self.rates.size, dtype=bool))
+        mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
+        mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
 
     def _guessed(self) -> Mask:
@@ -227,15 +236,16 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         (("phi",), ("q",)),
         (("phi_rate", "psi"), ("f",)),
         (("momentum",), ("p",)),
-        (("phi", "phi_rate", "psi", "momentum"), ("q", "f", "p")),
+        (("phi", "phi_rate", "psi", "momentum"), STATE),
     ):
         rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
-        if not rows.any() or not may.any():
-            continue
-        problem = _problem(starter, t, x, guess, rows=rows, free=may)
-        for shaken in (x, *_shaken(x, may, problem.scale)):
-            found = solve(problem, shaken)
-            if found.residual < EXACT:
+        for use in (rows | starter.between(moving), rows):
+            if not use.any() or not may.any():
+                continue
+            problem = _problem(starter, t, x, guess, rows=use, free=may)
+            points = (x, *_shaken(x, may, problem.scale))
+            found = next((s for z in points if (s := solve(problem, z)).residual < EXACT), None)
+            if found is not None:
                 x = starter.without_noise(found.x, problem.scale)
                 break
     return x
