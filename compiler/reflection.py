@@ -17,6 +17,7 @@ from dataclasses import replace
 from sysdyn.compiler.islands import grounded
 from sysdyn.compiler.linkages import with_linkages
 from sysdyn.compiler.positions import from_stores, with_contents, with_quadratures
+from sysdyn.compiler.terms import summands, vanishes
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Place
 from sysdyn.dsl.expression import Node
@@ -146,7 +147,7 @@ def as_elements(network: Network) -> Network:
     nodes = {n.name: n.domain for n in network.nodes}
     kept, made = [], []
     for number, energy in enumerate(network.energies):
-        for pieces in (_pieces(energy.expression), [energy.expression]):
+        for pieces in (summands(energy.expression), [energy.expression]):
             names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]
             found = [_element(energy, piece, name, nodes) for piece, name in zip(pieces, names, strict=True)]
             branches = [b for b in found if b is not None]
@@ -156,19 +157,6 @@ def as_elements(network: Network) -> Network:
         else:
             kept.append(energy)
     return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
-
-
-def _pieces(root: Node) -> list[Node]:
-    """The summands of an expression; a factor before a sum is carried to its terms."""
-    if root.op == "mul":
-        sums = [(e, a) for e, a in zip(root.data, root.args, strict=True) if e == 1.0 and a.op == "sum"]
-        if len(sums) == 1:
-            rest = ex.product(1.0, ((e, a) for e, a in zip(root.data, root.args, strict=True) if a is not sums[0][1]))
-            return [ex.mul(rest, piece) for piece in _pieces(sums[0][1])]
-    if root.op != "sum":
-        return [root]
-    found = [ex.scale(c, p) for c, a in zip(root.data[1], root.args, strict=True) for p in _pieces(a)]
-    return [*found, ex.const(root.data[0])] if root.data[0] else found
 
 
 def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
@@ -182,7 +170,7 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
         return None
     a, b = used[0], used[-1] if len(used) == 2 else None
     slope = ex.derivative(piece, a)
-    if b is not None and not ex.is_const(ex.add(*_pieces(ex.add(slope, ex.derivative(piece, b)))), 0.0):
+    if b is not None and not vanishes(slope, ex.derivative(piece, b)):
         return None
     at = tuple(ex.index(loop.index) for loop in energy.loops)
     own = ex.var(name, own_kind, *at)
