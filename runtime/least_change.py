@@ -134,17 +134,17 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
     return found[:unknowns]
 
 
-def solve(problem: Problem, x: Floats) -> Solution:
-    """From x towards the solution nearest to problem.guess; the best point met."""
+def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
+    """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
-        return _solve(problem, x)
+        return _solve(problem, x, most)
 
 
-def _solve(problem: Problem, x: Floats) -> Solution:
+def _solve(problem: Problem, x: Floats, most: int) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
     stale = 0
-    for _ in range(_ITERATIONS):
+    for _ in range(most):
         linear = _Linear(problem, x)
 
         def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:

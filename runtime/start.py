@@ -11,11 +11,11 @@ valve C f|f| at rest), seeded perturbations of the free unknowns are tried.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.description import Floats
+from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve
 from sysdyn.runtime.scales import alike, group_maximum, propagate
@@ -27,6 +27,8 @@ STATE = ("q", "f", "p", "s")
 _WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
+_FEW = 3
+"""Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 EXACT = 1e-9
 OWN = 1e-6
 NOISE = 1e-13
@@ -86,6 +88,16 @@ def _given(system: System) -> _Given:
     return _Given(guess, fixed, written, label)
 
 
+def _pairs(system: System) -> tuple[Ints, Ints]:
+    """Places of momenta, and of the flows of the same coordinates."""
+    families, at = system.description.families, system.form.at
+    flows = {f.owner: k for k, f in enumerate(families) if f.kind == "f"}
+    found = [(at[k] + np.arange(f.size), at[flows[f.owner]]) for k, f in enumerate(families) if f.kind == "p"]
+    nothing = np.zeros(0, dtype=np.int64)
+    momenta = np.concatenate([nothing, *(places for places, _ in found)])
+    return momenta, np.concatenate([nothing, *(places - places[:1] + first for places, first in found)])
+
+
 class Starter:
     """The equations of the start of one model (t0 apart)."""
 
@@ -107,6 +119,7 @@ class Starter:
         self._rated = rate_at[columns] >= 0
         self.rows = np.concatenate([pattern.row, pattern.row[self._rated]]).astype(np.int64)
         self.columns = np.concatenate([columns, rate_at[columns[self._rated]]])
+        self._momentum, self._flow = _pairs(system)
         in_y, in_rate = self.settled.structural()
         self._structural = np.concatenate([in_y, in_rate[self._rated]])
 
@@ -164,9 +177,13 @@ class Starter:
         return mask
 
     def following(self, t: float, x: Floats) -> Mask:
-        """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia."""
+        """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
+
+        The flow of a momentum counts as state: where neither is written, both begin at zero.
+        """
         jyd = self.system.jacobian(t, *self.expand(x))[1]
         carries = self.system.differential(jyd)[: self.n] & np.isin(self.kinds, STATE)
+        carries[self._flow[carries[self._momentum]]] = True
         carries |= self.given.written & np.isin(self.kinds, STATE)
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
 
@@ -230,7 +247,10 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
 
 
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held."""
+    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held.
+
+    What follows from the state moves alone where that is enough.
+    """
     kinds = np.concatenate([starter.kinds, np.full(starter.rates.size, "rate")])
     for groups, moving in (
         (("phi",), ("q",)),
@@ -243,8 +263,9 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
             if not use.any() or not may.any():
                 continue
             problem = _problem(starter, t, x, guess, rows=use, free=may)
-            points = (x, *_shaken(x, may, problem.scale))
-            found = next((s for z in points if (s := solve(problem, z)).residual < EXACT), None)
+            gentle = replace(problem, free=may & starter.following(t, x))
+            trials = ((gentle, x, _FEW), *((problem, z) for z in (x, *_shaken(x, may, problem.scale))))
+            found = next((s for trial in trials if (s := solve(*trial)).residual < EXACT), None)
             if found is not None:
                 x = starter.without_noise(found.x, problem.scale)
                 break
