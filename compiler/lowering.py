@@ -95,7 +95,7 @@ def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     moved |= {
         node.data[0]
         for work in model.works
-        if any(n.op == "var" and (n.data[2] or n.data[1] == "audit") for n in variables(work.effort))
+        if any(n.op == "var" and n.data[2] for n in variables(work.effort))
         for node in local_variables(work.on, m.coordinate)
     }
     return frozenset(shapes) - moved
@@ -165,7 +165,7 @@ class _Lowering:
 
     def _has_rate(self, row: Row) -> bool:
         """Whether the total time derivative of every row is known: multipliers have none."""
-        return not any(local_variables(t.expression, ("kappa", "mu", "audit"), None) for t in row.terms)
+        return not any(local_variables(t.expression, ("kappa", "mu"), None) for t in row.terms)
 
     def kinetic(self) -> None:
         """Momenta: M f' + ... of coordinates without, p' and the momentum row of those with one."""

@@ -73,12 +73,14 @@ def reflect(network: Network) -> Network:
 
 
 def _node(root: Node) -> Node:
-    """The expression with the quantities of nodes and branches reflected."""
+    """The expression with the quantities of nodes and branches, and the audit's of their stores, reflected."""
     change = {}
     for node in ex.topological([root]):
         if node.op == "var" and node.data[1] in _KINDS:
             family, kind, order = node.data
             change[node] = ex.var(family, _KINDS[kind], *node.args, order=order)
+        elif node.op == "var" and node.data[1] == "audit" and node.data[0] in _ELEMENTS:
+            change[node] = ex.var(_ELEMENTS[node.data[0]], "audit")
     return ex.substitute(root, change) if change else root
 
 
