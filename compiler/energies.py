@@ -169,8 +169,8 @@ def _works(network: Network) -> Iterator[Virtual]:
             for inner in without_nested(split(on, nest, work.place), "the displacement of a work"):
                 own = inner.loops[len(nest) :]
                 added, moved = _moved(own, len(nest), len(outer.loops))
-                on, loops = substitute(inner.expression, moved), (*outer.loops, *added)
-                yield Virtual(outer.expression, on, loops, work.place, work.kept)
+                moving, loops = substitute(inner.expression, moved), (*outer.loops, *added)
+                yield Virtual(outer.expression, moving, loops, work.place, work.kept)
 
 
 def _moved(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:
