@@ -15,8 +15,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from sysdyn.compiler.energies import EnergyModel, Family, Row, tangible
-from sysdyn.compiler.terms import Term, has_reduction, local_variables, vanishes
-from sysdyn.dsl.expression import Node, add, const, derivative, is_const, sub, substitute, topological, var, variables
+from sysdyn.compiler.terms import Nest, Term, has_reduction, local_variables, vanishes
+from sysdyn.dsl.expression import (
+    Node,
+    add,
+    const,
+    derivative,
+    index,
+    is_const,
+    sub,
+    substitute,
+    topological,
+    var,
+    variables,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,30 +124,56 @@ def _inside(family: Family, anchor: Family, places: tuple[tuple[int | None, Node
 
 
 def _floats(model: EnergyModel, group: _Anchors) -> bool:
-    """Whether neither inertia nor anything else that reads flows reads those of the group but in differences."""
+    """Whether neither inertia nor anything else that reads flows reads those of the group but in differences.
+
+    Elements of the anchor that inertia does not reach do not count.
+    """
     m = model.mirror
-    roots = [t.expression for name in (m.coenergy, m.content) for t in model.function(name)]
-    roots += [t.expression for row in model.rows if row.kind != "lambda" for t in row.terms]
-    if any(_along(root, group, m.rate) for root in roots):
+    inertia = model.function(m.coenergy)
+    reached = [
+        _reach(group[n.data[0]].at(n.args), term.loops)
+        for term in inertia
+        for n in local_variables(term.expression, m.rate)
+        if n.data[0] in group
+    ]
+
+    def along(root: Node, loops: Nest, kind: str) -> bool:
+        """Whether the expression changes where all that have one anchor move alike."""
+        slopes: dict[tuple[Node, ...], list[Node]] = {}
+        for n in local_variables(root, kind):
+            if n.data[0] in group:
+                slopes.setdefault(group[n.data[0]].at(n.args), []).append(derivative(root, n))
+        if slopes and has_reduction(root):
+            return True
+        return any(
+            not vanishes(*found) and any(_meet(_reach(at, loops), box) for box in reached)
+            for at, found in slopes.items()
+        )
+
+    rows = [row for row in model.rows if row.kind != "lambda"]
+    terms = [*inertia, *model.function(m.content), *(t for row in rows for t in row.terms)]
+    if any(along(t.expression, t.loops, m.rate) for t in terms):
         return False
-    if any(_along(t.expression, group, m.coordinate) for row in model.rows if row.kind == "phi" for t in row.terms):
+    if any(along(t.expression, t.loops, m.coordinate) for row in model.of_kind("phi") for t in row.terms):
         return False
     for work in model.works:
         read = {n.data[1:] for n in variables(work.effort) if n.op == "var"}
-        if _along(work.on, group, m.coordinate) and not read <= {(m.coordinate, 0), ("s", 0)}:
+        if not read <= {(m.coordinate, 0), ("s", 0)} and along(work.on, work.loops, m.coordinate):
             return False
     return all(n.data[1] in (m.coordinate, m.rate) for n in _unknowns(model) if n.data[0] in group)
 
 
-def _along(root: Node, group: _Anchors, kind: str) -> bool:
-    """Whether the expression changes where all that have one anchor move alike."""
-    slopes: dict[tuple[Node, ...], list[Node]] = {}
-    for n in local_variables(root, kind):
-        if n.data[0] in group:
-            slopes.setdefault(group[n.data[0]].at(n.args), []).append(derivative(root, n))
-    if slopes and has_reduction(root):
-        return True
-    return any(not vanishes(*found) for found in slopes.values())
+def _reach(at: tuple[Node, ...], loops: Nest) -> tuple[tuple[Node, Node], ...]:
+    """The least and the greatest of each index."""
+    low = {index(loop.index): loop.first for loop in loops}
+    high = {index(loop.index): loop.last for loop in loops}
+    return tuple((substitute(node, low), substitute(node, high)) for node in at)
+
+
+def _meet(a: tuple[tuple[Node, Node], ...], b: tuple[tuple[Node, Node], ...]) -> bool:
+    """Whether the text lets both hold one element."""
+    apart = (sub(low, high) for x, y in zip(a, b, strict=True) for low, high in ((x[0], y[1]), (y[0], x[1])))
+    return not any(is_const(gap) and gap.data > 0.0 for gap in apart)
 
 
 def _unknowns(model: EnergyModel) -> Iterable[Node]:
