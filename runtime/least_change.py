@@ -28,7 +28,7 @@ _ITERATIONS = 60
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
 _BESIDE = 1e-8
-"""Scaled rows so small that the nearest solution is as far as round-off lets it."""
+"""Scaled rows below which round-off alone can keep them from shrinking."""
 _PROXIMAL = 6
 
 
@@ -78,11 +78,11 @@ class _Linear:
         self.entries = (number[0][rows], number[1][columns], values * unit[columns] * self.row_scale[rows])
         self.shape = int(problem.use.sum()), int(problem.free.sum())
 
-    def nearest(self, u: Floats, r: Floats) -> Floats:
+    def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
         """The u of least norm with A u = A u_now - r; beside it, the step of least norm: its round-off is its own."""
         i, j, v = self.entries
         aim = -r
-        if np.max(np.abs(r), initial=0.0) < _BESIDE:
+        if beside:
             return u + least_norm(self.shape, (i, j, v), aim)
         np.add.at(aim, i, v * u[j])
         return least_norm(self.shape, (i, j, v), aim)
@@ -160,7 +160,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
             break
         u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
-        target = linear.nearest(u, scaled[problem.use])
+        target = linear.nearest(u, scaled[problem.use], beside=size < _BESIDE and stale > 1)
         if not np.isfinite(target).all():
             break
         norm = float(np.linalg.norm(scaled))
