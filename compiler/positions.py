@@ -92,6 +92,20 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
     return network, frozenset(wanted)
 
 
+def massive(network: Network) -> frozenset[str]:
+    """Families of common-flow nodes on each of which a mass stands."""
+    sizes = Sizes(network)
+    found: dict[str, list[Ranges]] = {}
+    for b in network.branches:
+        alone = b.minus is None or b.minus.node is None
+        if b.kind == "kinetic" and alone and b.plus is not None and b.plus.node is not None:
+            within = ranges_of(b.loops, sizes, b.place)
+            places = [sizes.affine(a, within, b.place) for a in b.plus.at]
+            found.setdefault(b.plus.node, []).append({f"{k}": a.over(within) for k, a in enumerate(places)})
+    boxes = {n.name: {f"{k}": i for k, i in enumerate(sizes.box(n.shape, n.place))} for n in network.nodes}
+    return frozenset(name for name, holes in found.items() if not list(beside(boxes[name], holes)))
+
+
 def _stores(network: Network) -> frozenset[str]:
     return frozenset(b.name for b in network.branches if b.kind == "potential")
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.islands import grounded
 from sysdyn.compiler.linkages import with_linkages
-from sysdyn.compiler.positions import from_stores, with_contents, with_quadratures
+from sysdyn.compiler.positions import from_stores, massive, with_contents, with_quadratures
 from sysdyn.compiler.terms import summands, vanishes
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Place
@@ -47,8 +47,7 @@ def reflect(network: Network) -> Network:
     bare = with_linkages(from_stores(grounded(as_elements(network))))
     network = with_contents(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
-    massive = {b.plus.node for b in network.branches if b.kind == "kinetic" and b.plus is not None}
-    read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive)
+    read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
     return replace(
         network,
         coordinates=tuple(_coordinate(c) for c in network.coordinates),
