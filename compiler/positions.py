@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from sysdyn.compiler.initially import initially
 from sysdyn.compiler.overlaps import Ranges, beside, common, count, meeting, narrowed, ranges_of
 from sysdyn.compiler.primal.bounds import Sizes
+from sysdyn.compiler.primal.contents import charge
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Place
 from sysdyn.dsl.expression import Node
@@ -154,6 +155,9 @@ def _with_position(
         ),
     )
 
+UNWRITTEN = 1e-6
+"""Weight (of squares) of a guess that the text does not write, as the consistent start has it."""
+
 
 # -- contents ----------------------------------------------------------------------------------------------
 
@@ -196,8 +200,11 @@ class _Contents:
 
     def guesses(self) -> Iterator[Initial]:
         """Contents that nothing is written of, by the positions of their ends, of which something is."""
+        moved = self._moved()
         for b in self.branches:
             ends = [self._start(t) for t in (b.plus, b.minus)]
+            if not b.loops and b.plus is not None and b.minus is not None:
+                ends = [moved.get(self._point(t), end) for t, end in zip((b.plus, b.minus), ends, strict=True)]
             if ends == [None, None]:
                 continue
             value = ex.sub(ends[0] or ex.const(0.0), ends[1] or ex.const(0.0))
@@ -205,6 +212,39 @@ class _Contents:
             holes = [m[0] for i in self.said.get((b.name, "bq"), ()) if (m := meeting(i, b.at, within, self.sizes))]
             for rest in beside(within, holes) if within else () if holes else (within,):
                 yield Initial(self._content(b), value, False, narrowed(b.loops, rest), b.place)
+
+    def _moved(self) -> dict[_Point, Node]:
+        """Positions of points that fixed contents join to others: guesses moved least, written ones less."""
+        forest, guess = _Forest(), dict[_Point, tuple[Node, float]]()
+        for b in (b for b in self.branches if not b.loops and b.kind == "potential"):
+            assert b.plus is not None
+            assert b.minus is not None
+            for t in (b.plus, b.minus):
+                if t.node is not None and self._point(t) not in guess:
+                    found = initially(self.said.get((t.node, "nq"), ()), t.at)
+                    guess[self._point(t)] = (ex.const(0.0), UNWRITTEN) if found is None else (found[0], 1.0)
+                    for known in itertools.islice(self._fixed(t, {}), 1):
+                        forest.join(self._point(t), None, known.value)
+            for initial in self.said.get((b.name, "bq"), ()):
+                content = self._said_content(b, initial)
+                if content is not None:
+                    forest.join(self._point(b.plus), self._point(b.minus), content)
+        moved: dict[_Point, Node] = {}
+        for points in (points for points in forest.trees.values() if len(points) > 1):
+            over = {p: forest.over[p][1] for p in points}
+            if None in over:
+                shift = ex.neg(over[None])
+            else:
+                total = sum(guess[p][1] for p in points)
+                shift = ex.add(*(ex.scale(guess[p][1] / total, ex.sub(guess[p][0], over[p])) for p in points))
+            moved |= {p: ex.add(over[p], shift) for p in points if p is not None}
+        return moved
+
+    def _said_content(self, b: Branch, initial: Initial) -> Node | None:
+        """The fixed content that a statement gives a single store; None where it gives none."""
+        if not initial.fixed or ex.variables(initial.value) or meeting(initial, b.at, {}, self.sizes) is None:
+            return None
+        return initial.value if initial.target.data[1] == "bq" else charge(b, initial.value)
 
     def _start(self, terminal: Terminal | None) -> Node | None:
         """The initial position of a terminal over the branch's loops, as far as it is written."""
@@ -237,12 +277,16 @@ class _Contents:
         if terminal is None or terminal.node is None:
             yield _Known(within, ex.const(0.0))
             return
-        for initial in self.said.get((terminal.node, "nq"), ()):
+        yield from self._fixed(terminal, within)
+        if (terminal.node, "nq") in self.wanted:
+            yield _Known(within, _quadrature(terminal.node, terminal.at))
+
+    def _fixed(self, terminal: Terminal, within: Ranges) -> Iterator[_Known]:
+        """What fixed statements say of the position of a terminal at a node."""
+        for initial in self.said.get((str(terminal.node), "nq"), ()):
             found = meeting(initial, terminal.at, within, self.sizes) if initial.fixed else None
             if found is not None:
                 yield _Known(*found)
-        if (terminal.node, "nq") in self.wanted:
-            yield _Known(within, _quadrature(terminal.node, terminal.at))
 
     def loops(self) -> Iterator[Initial]:
         """Equations around the loops that fixed positions, quadratures and single stores close."""

@@ -88,6 +88,14 @@ def _given(system: System) -> _Given:
     return _Given(guess, fixed, written, label)
 
 
+def _of_groups(system: System, names: Sequence[str]) -> Mask:
+    mask = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        if group in names:
+            mask[first : first + system.description.rows[family].size] = True
+    return mask
+
+
 def _pairs(system: System) -> tuple[Ints, Ints]:
     """Places of momenta, and of the flows of the same coordinates."""
     families, at = system.description.families, system.form.at
@@ -120,6 +128,7 @@ class Starter:
         self.rows = np.concatenate([pattern.row, pattern.row[self._rated]]).astype(np.int64)
         self.columns = np.concatenate([columns, rate_at[columns[self._rated]]])
         self._momentum, self._flow = _pairs(system)
+        self._momenta = _of_groups(system, ("momentum",))
         in_y, in_rate = self.settled.structural()
         self._structural = np.concatenate([in_y, in_rate[self._rated]])
 
@@ -142,11 +151,7 @@ class Starter:
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups."""
-        mask = np.zeros(self.settled.rows, dtype=bool)
-        for group, family, first in self.settled.form.groups:
-            if group in names:
-                mask[first : first + self.settled.description.rows[family].size] = True
-        return mask
+        return _of_groups(self.settled, names)
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
@@ -181,9 +186,11 @@ class Starter:
 
         The flow of a momentum counts as state: where neither is written, both begin at zero.
         """
-        jyd = self.system.jacobian(t, *self.expand(x))[1]
+        jy, jyd = self.system.jacobian(t, *self.expand(x))
         carries = self.system.differential(jyd)[: self.n] & np.isin(self.kinds, STATE)
-        carries[self._flow[carries[self._momentum]]] = True
+        pattern = self.system.pattern
+        inert = pattern.columns_of()[(jy != 0.0) & self._momenta[pattern.row]]
+        carries[np.intersect1d(self._flow[carries[self._momentum]], inert)] = True
         carries |= self.given.written & np.isin(self.kinds, STATE)
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
 
