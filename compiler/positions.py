@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from sysdyn.compiler.initially import initially
-from sysdyn.compiler.overlaps import Ranges, beside, common, count, meeting, narrowed, ranges_of
 from sysdyn.compiler.primal.bounds import Sizes
 from sysdyn.compiler.primal.contents import charge
+from sysdyn.compiler.primal.overlaps import Ranges, beside, common, count, meeting, narrowed, ranges_of
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Place
 from sysdyn.dsl.expression import Node
@@ -210,7 +210,7 @@ class _Contents:
             value = ex.sub(ends[0] or ex.const(0.0), ends[1] or ex.const(0.0))
             within = ranges_of(b.loops, self.sizes, b.place)
             holes = [m[0] for i in self.said.get((b.name, "bq"), ()) if (m := meeting(i, b.at, within, self.sizes))]
-            for rest in beside(within, holes) if within else () if holes else (within,):
+            for rest in beside(within, holes):
                 yield Initial(self._content(b), value, False, narrowed(b.loops, rest), b.place)
 
     def _moved(self) -> dict[_Point, Node]:
