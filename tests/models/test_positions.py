@@ -60,6 +60,17 @@ CASES = {
         ", z",
         {"K.q": 0.12, "L.q": 0.18, "z.q": 0.08, "x.f": 0.0, "D.q": 0.3, "w": 0.0},
     ),
+    "what a content joins moves alike": (
+        """C: kinetic(p = 3 kg*f) z
+        K: potential(q = 0.4 m/N*e) x -> ground
+        L: potential(e = 5 N/m*q) y -> x
+        M: potential(e = 5 N/m*q) z -> y
+        init z.q ~ 0.1 m
+        init L.q = 0.32 m
+        init x.f = -0.12 m/s""",
+        ", z",
+        {"x.q": -0.16, "y.q": 0.16, "z.q": 0.1, "K.q": -0.16, "M.q": -0.06},
+    ),
 }
 
 
@@ -171,3 +182,54 @@ def test_an_energy_over_a_difference_is_a_spring(tmp_path, energy, formulation):
     w = np.sqrt(4.5)
     assert trace["x.f"].values == pytest.approx(-0.001 * 2 / 3 * w * np.sin(w * trace.time), abs=1e-8)
     assert trace["y.f"].values == pytest.approx(-0.5 * trace["x.f"].values, abs=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_node_without_mass_in_a_family_with_masses(tmp_path, formulation):
+    """Its position is read by a law: it keeps its row."""
+    text = """
+    model three {
+      node x[1..3]: translation
+      M: kinetic(p = 1 kg*f) x[1]
+      N: kinetic(p = 2 kg*f) x[3]
+      K: potential(e = 4 N/m*q) x[1] -> x[2]
+      L: potential(e = 2 N/m*q) x[2] -> x[3]
+      G: potential(e = 1 N/m*q) x[3] -> ground
+      init x[1].q = -0.3 m
+      init x[3].q = 0.5 m
+      state s: m = 0 m
+      dynamic s' = (x[2].q - s)/(0.5 s)
+    }
+    scene go of three {
+      time 0 s to 1 s
+      accuracy 1e-6
+      trace x[2].q, K.q, L.q, s every 0.1 s
+    }
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    reference = trace_of(tmp_path, text, formulation="lagrangian")
+    assert trace["x[2].q"].values[0] == pytest.approx(-0.3 + 0.8 / 3, abs=1e-8)
+    for name in reference.names:
+        assert trace[name].values == pytest.approx(reference[name].values, abs=2e-5), name
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_capacitor_of_which_nothing_is_said_is_empty(tmp_path, formulation):
+    """What is said of its neighbour moves the node that they do not share."""
+    text = """
+    model two {
+      node x, y: electrical
+      C: potential(q = 0.5 F*e) x -> ground
+      D: potential(q = 0.5 F*e) y -> x
+      R: dissipator(e = 2 ohm*f) x -> ground
+      S: dissipator(f = 0.3 S*e) y -> ground
+      init D.e = -0.11 V
+    }
+    scene go of two {
+      time 0 s to 1 s
+      trace C.e, y.e every 0.1 s
+    }
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    assert trace["C.e"].values[0] == pytest.approx(0.0, abs=1e-6)
+    assert trace["y.e"].values[0] == pytest.approx(-0.11, abs=1e-6)
