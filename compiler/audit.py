@@ -3,7 +3,8 @@
     T = f.dT*/df - T* (or T where given)       V       dissipated = f.dD/df
     supplied = sum E du/dq f + kappa.Phi_t + mu.b + V_t - T*_t + T_t        (b = Psi at f = 0; _t at fixed q, f)
 
-so that d(T + V)/dt + dissipated - supplied = 0 on every solution: from (3.34), multiplied by f.
+so that d(T + V)/dt + dissipated - supplied = 0 on every solution: from (3.34), multiplied by f.  A store whose law
+stands beside the state functions adds its energy; its work is no supply.
 """
 
 from __future__ import annotations
@@ -45,9 +46,12 @@ def add_audit(assembly: Assembly, model: EnergyModel) -> None:
         for term in model.function(name):
             into(stored, term.loops, term.expression)
             into("supplied", term.loops, explicit(term.expression))
+    for stored in ("kinetic", "potential"):
+        for term in model.function(f"kept {stored}"):
+            into(stored, term.loops, term.expression)
     for term in model.function(m.content):
         into("dissipated", term.loops, _along(term.expression, m.rate))
-    for work in model.works:
+    for work in (w for w in model.works if not w.kept):
         power = [mul(derivative(work.on, q), _rate(q)) for q in local_variables(work.on, m.coordinate)]
         into("supplied", work.loops, mul(work.effort, add(*power)))
     for row in model.rows:

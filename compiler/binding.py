@@ -145,7 +145,8 @@ def _starts(form: DescriptorForm, owners: dict[str, Extents], parameters: Parame
     for pin in form.pins:
         family = form.families[pin.family]
         *at, values = over(pin.nest, (*pin.at, pin.value), parameters.checked(pin.place))
-        where = _positions(family.owner, owners[family.owner], at, pin.place)
+        box = owners[family.owner]
+        where = _positions(family.owner, box, at, pin.place) if box else np.zeros(len(values), dtype=np.int64)
         parameters.finite(values, pin.place, f"the initial value of {family.name}")
         line = pin.place.start[0]
         found.append(Start(pin.family, where, values, pin.fixed, family.name, pin.place.file, line, pin.place))
@@ -154,8 +155,6 @@ def _starts(form: DescriptorForm, owners: dict[str, Extents], parameters: Parame
 
 def _positions(name: str, box: Extents, at: list[NDArray[np.float64]], place: Place) -> NDArray[np.int64]:
     """Positions in a family; an index outside its shape is E805."""
-    if not box:
-        return np.zeros(len(at[0]) if at else 1, dtype=np.int64)
     for values, (first, last) in zip(at, box, strict=True):
         outside = (values < first) | (values > last)
         if np.any(outside):
@@ -188,12 +187,11 @@ def _offsets(
 
     for offset in form.offsets:
         box = owners[offset.label]
-        total = np.zeros(int(np.prod(extents(box))) if box else 1)
+        total = found.setdefault(offset.name, np.zeros(int(np.prod(extents(box)))))
         for term in offset.terms:
             *at, values = over(term.loops, (*offset.at, term.expression), lookup)
             where = positions(box, [np.rint(a).astype(np.int64) for a in at]) if box else np.zeros(len(values), int)
             np.add.at(total, where, values)
-        found[offset.name] = total
     return found
 
 

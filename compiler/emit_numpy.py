@@ -49,6 +49,13 @@ def _grid(bounds):
     return columns
 
 
+def _span(first, last):
+    """Every number that one of the ranges holds."""
+    first, last = np.broadcast_arrays(first, last)
+    some = first <= last
+    return np.arange(first[some].min(initial=2**31), last[some].max(initial=-1) + 1)
+
+
 def _table(x, n, u, order):
     k = np.searchsorted(x[:n], u, side="right")
     c = x[n : 5*n + 4].reshape(n + 1, 4)[k]
@@ -188,18 +195,19 @@ class _Writer:
 
     def fold(self, s: Fold, indent: str) -> list[str]:
         """A reduction over an axis of its own, in front of the others."""
-        for b in (s.first, s.last):
-            if b.loop >= 0:
-                raise NotImplementedError("bounds of an inner sum follow an outer index")
         axes = ", 1" * ((1 if self.depth else 0) + self.open)
         first, last = bound(s.first, _loop), bound(s.last, _loop)
+        follows = s.first.loop >= 0 or s.last.loop >= 0
         name = _loop(s.loop)
         shape = f".reshape(-1{axes})" if axes else ""
-        lines = [f"{indent}{name} = np.arange({first}, {last} + 1){shape}"]
+        span = f"_span({first}, {last})" if follows else f"np.arange({first}, {last} + 1)"
+        lines = [f"{indent}{name} = {span}{shape}"]
         self.open += 1
         lines += self.body(s.body, indent)
         self.open -= 1
         value = f"{_operand(s.value)} + 0.0*{name}"
+        if follows:
+            value = f"np.where(({first} <= {name}) & ({name} <= {last}), {value}, {_START[s.operator]})"
         extra = f", initial={_START[s.operator]}"
         lines.append(f"{indent}a{s.target} = {_FOLDS[s.operator]}({value}, axis=0{extra})")
         return lines

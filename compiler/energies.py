@@ -23,12 +23,13 @@ from sysdyn.dsl.network import Loop, Network, Shape
 
 @dataclass(frozen=True, slots=True)
 class Virtual:
-    """Virtual work: the product effort * delta(on), one term each."""
+    """Virtual work: the product effort * delta(on), one term each.  kept: of a store that the audit counts."""
 
     effort: Node
     on: Node
     loops: Nest
     place: Place
+    kept: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +169,8 @@ def _works(network: Network) -> Iterator[Virtual]:
             for inner in without_nested(split(on, nest, work.place), "the displacement of a work"):
                 own = inner.loops[len(nest) :]
                 added, moved = _moved(own, len(nest), len(outer.loops))
-                yield Virtual(outer.expression, substitute(inner.expression, moved), (*outer.loops, *added), work.place)
+                moving, loops = substitute(inner.expression, moved), (*outer.loops, *added)
+                yield Virtual(outer.expression, moving, loops, work.place, work.kept)
 
 
 def _moved(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sysdyn.compiler.energies import EnergyModel, Offset, Row, Virtual
+from sysdyn.compiler.energies import EnergyModel, Offset, Row
 from sysdyn.compiler.mirror import Mirror
 from sysdyn.compiler.terms import Nest, Term, local_variables
 from sysdyn.dsl.diagnostics import Diagnostic
@@ -121,7 +121,7 @@ def _renamed(model: EnergyModel, labels: set[str]) -> EnergyModel:
 
     return replace(
         model,
-        works=tuple(Virtual(new(w.effort), w.on, w.loops, w.place) for w in model.works),
+        works=tuple(replace(w, effort=new(w.effort)) for w in model.works),
         rows=tuple(replace(row, terms=terms(row.terms)) for row in model.rows),
         initials=tuple(replace(i, target=new(i.target), value=new(i.value)) for i in model.initials),
         quantities=tuple(replace(q, expression=new(q.expression)) for q in model.quantities),

@@ -176,7 +176,7 @@ class _Projected:
         self.rated = self._rated()
 
     def _rated(self) -> frozenset[str]:
-        """Coordinates all of whose mixed balances are algebraic, with their rates."""
+        """Coordinates whose mixed balances are algebraic (see `lowering`), with their rates."""
         block = self.lagrange.block("dynamics_rate")
         rows = {s.row for kernel in block.kernels for s in kernel.rows} if block else set()
         massless = {self.lagrange.rows[k].owner for k in rows}
@@ -229,7 +229,7 @@ class _Projected:
             if owner in column:
                 mixed = mul(_here(column[owner], at), value)
                 self.assembly.add(block, name, at, nest, mixed)
-                if name in self.rated:
+                if name in self.rated and not any(n.op == "var" and n.data[2] for n in variables(mixed)):
                     self.assembly.add("dynamics_rate", name, at, nest, total_rate(mixed))
         for label in self.read:
             if owner in self.found.rows[label]:

@@ -78,16 +78,27 @@ def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
 
 
 def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
-    """Coordinates whose balances of efforts are algebraic in all elements and have a rate."""
+    """Coordinates whose balances of efforts are algebraic and have a rate, but for elements that a store moves with.
+
+    Of a family only part of which a store moves with, the start leaves the rows with inertia out.
+    """
     m = model.mirror
-    moved = {n.data[0] for t in model.function(m.coenergy) for n in local_variables(t.expression, m.rate)}
+    shapes = {c.name: c.shape for c in model.coordinates}
+    moved = {name for name in carriers if not shapes[name]}
+    for function, kind in ((m.coenergy, m.rate), (m.energy, m.conjugate)):
+        for term in model.function(function):
+            bounds = tuple((loop.first, loop.last) for loop in term.loops)
+            at = tuple(counter(k) for k in range(len(bounds)))
+            for n in local_variables(term.expression, kind):
+                if not n.args or (n.args == at and bounds == shapes[n.data[0]]):
+                    moved.add(n.data[0])
     moved |= {
         node.data[0]
         for work in model.works
-        if any(n.op == "var" and (n.data[2] or n.data[1] == "audit") for n in variables(work.effort))
+        if any(n.op == "var" and n.data[2] for n in variables(work.effort))
         for node in local_variables(work.on, m.coordinate)
     }
-    return frozenset(c.name for c in model.coordinates) - moved - carriers
+    return frozenset(shapes) - moved
 
 
 def total_rate(root: Node) -> Node:
@@ -154,7 +165,7 @@ class _Lowering:
 
     def _has_rate(self, row: Row) -> bool:
         """Whether the total time derivative of every row is known: multipliers have none."""
-        return not any(local_variables(t.expression, ("kappa", "mu", "audit"), None) for t in row.terms)
+        return not any(local_variables(t.expression, ("kappa", "mu"), None) for t in row.terms)
 
     def kinetic(self) -> None:
         """Momenta: M f' + ... of coordinates without, p' and the momentum row of those with one."""

@@ -5,20 +5,20 @@ V*, T and V, D and G change places (book, chapter 5).  What the primal arrows th
 and Lagrange's equations of the reflection are the co-Lagrangian equations of the network: one lowering serves both.
 
 Signs carry over: a branch a -> b has e = e(a) - e(b) at common-effort and f = f(a) - f(b) at common-flow nodes.  An
-energy or content written over one node, or over the difference of two, is the element between them.  A displacement
-that no potential store holds has no place in the complementary family; where it is traced, its quadrature is added, and
-initial positions become initial contents of the stores between them.
+energy or content written over one node, or over the difference of two, is the element between them.  Displacements
+that no potential store holds, and initial positions: see `positions`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from sysdyn.compiler.initially import initially
+from sysdyn.compiler.islands import grounded
 from sysdyn.compiler.linkages import with_linkages
+from sysdyn.compiler.positions import from_stores, massive, with_contents, with_quadratures
 from sysdyn.compiler.primal.reading import KINDS
+from sysdyn.compiler.terms import summands, vanishes
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Place
 from sysdyn.dsl.expression import Node
@@ -27,23 +27,15 @@ from sysdyn.dsl.network import (
     Coordinate,
     Coupling,
     Domain,
-    Dynamic,
     Energy,
-    Initial,
-    Loop,
     Network,
-    Shape,
     Slope,
-    State,
     Terminal,
 )
 
 _KINDS = {"be": "bf", "bf": "be", "bq": "bp", "bp": "bq", "ne": "nf", "nf": "ne"}
 _FUNCTIONS = {"T*": "V*", "V*": "T*", "T": "V", "V": "T", "D": "G", "G": "D"}
 _ELEMENTS = {"kinetic": "potential", "potential": "kinetic", "effort": "flow", "flow": "effort"}
-_At = tuple[str, tuple[Node, ...]]
-"""An element of a node family."""
-_Links = dict[_At | None, list[tuple[_At | None, Node]]]
 _SIDES = {"e": "f", "f": "e", "p": "q", "q": "p"}
 
 
@@ -53,12 +45,10 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    network = with_linkages(_with_contents(_from_stores(as_elements(network))))
-    bare = network
-    network = _with_positions(network)
+    bare = with_linkages(from_stores(grounded(as_elements(network))))
+    network = with_contents(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
-    massive = {b.plus.node for b in network.branches if b.kind == "kinetic" and b.plus is not None}
-    read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive)
+    read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
     return replace(
         network,
         coordinates=tuple(_coordinate(c) for c in network.coordinates),
@@ -83,12 +73,14 @@ def reflect(network: Network) -> Network:
 
 
 def _node(root: Node) -> Node:
-    """The expression with the quantities of nodes and branches reflected."""
+    """The expression with the quantities of nodes and branches, and the audit's of their stores, reflected."""
     change = {}
     for node in ex.topological([root]):
         if node.op == "var" and node.data[1] in _KINDS:
             family, kind, order = node.data
             change[node] = ex.var(family, _KINDS[kind], *node.args, order=order)
+        elif node.op == "var" and node.data[1] == "audit" and node.data[0] in _ELEMENTS:
+            change[node] = ex.var(_ELEMENTS[node.data[0]], "audit")
     return ex.substitute(root, change) if change else root
 
 
@@ -141,79 +133,6 @@ def _read(network: Network) -> Iterable[str]:
     return (n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] == "nf")
 
 
-# -- displacements -----------------------------------------------------------------------------------------
-
-
-def _with_positions(network: Network) -> Network:
-    """Quadratures q' = f for displacements that traces, expectations and dynamics read and no potential store holds."""
-    roots = [o.expression for o in network.observations] + [d.expression for d in network.dynamics]
-    roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
-    held = {b.name for b in network.branches if b.kind == "potential"}
-    wanted: dict[tuple[str, str], None] = {}
-    for node in ex.topological(roots):
-        if node.op == "var" and (node.data[1] == "nq" or (node.data[1] == "bq" and node.data[0] not in held)):
-            wanted.setdefault((node.data[0], node.data[1]))
-    nodes = {n.name: (n.shape, n.domain, n.place) for n in network.nodes}
-    for name, kind in wanted:
-        if kind == "nq":
-            shape, domain, place = nodes[name]
-            loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(shape))
-            network = _with_position(
-                network, (name, kind), (shape, loops, tuple(ex.index(x.index) for x in loops)), domain, place
-            )
-        else:
-            for b in network.branches:
-                if b.name == name:
-                    shape = tuple((loop.first, loop.last) for loop in b.loops)
-                    network = _with_position(network, (name, kind), (shape, b.loops, b.at), b.domain, b.place)
-    # positions have been read; as initial values they have become contents of stores
-    kept = tuple(i for i in network.initials if not _is_position(i.target, held))
-    return replace(network, initials=kept)
-
-
-def _is_position(node: Node, held: set[str]) -> bool:
-    return node.op == "var" and (node.data[1] == "nq" or (node.data[1] == "bq" and node.data[0] not in held))
-
-
-def _with_position(
-    network: Network,
-    what: tuple[str, str],
-    family: tuple[Shape, tuple[Loop, ...], tuple[Node, ...]],
-    domain: Domain,
-    place: Place,
-) -> Network:
-    """One dynamic variable NAME.q for a displacement var(name, kind)."""
-    name = f"{what[0]}.q"
-    shape, loops, at = family
-    state = ex.var(name, "s", *at)
-    starts = []
-    for initial in network.initials:
-        if initial.target.op == "var" and initial.target.data[:2] == what:
-            starts.append(replace(initial, target=ex.var(name, "s", *initial.target.args), fixed=True))
-    if not starts:
-        starts = [Initial(state, ex.const(0.0), True, loops, place)]
-
-    def read(root: Node) -> Node:
-        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] == what]
-        return ex.substitute(root, {n: ex.var(name, "s", *n.args, order=n.data[2]) for n in found}) if found else root
-
-    rate = ex.var(what[0], "nf" if what[1] == "nq" else "bf", *at)
-    return replace(
-        network,
-        states=(*network.states, State(name, shape, domain.displacement, place)),
-        dynamics=(
-            *(replace(d, expression=read(d.expression)) for d in network.dynamics),
-            Dynamic(state, rate, loops, place),
-        ),
-        initials=(*network.initials, *starts),
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        expectations=tuple(
-            replace(e, left=read(e.left), right=read(e.right), within=None if e.within is None else read(e.within))
-            for e in network.expectations
-        ),
-    )
-
-
 # -- written energies as elements --------------------------------------------------------------------------
 
 _STORES = {
@@ -230,27 +149,16 @@ def as_elements(network: Network) -> Network:
     nodes = {n.name: n.domain for n in network.nodes}
     kept, made = [], []
     for number, energy in enumerate(network.energies):
-        pieces = _pieces(energy.expression)
-        found = [_element(energy, piece, f"{energy.function} {number}.{k}", nodes) for k, piece in enumerate(pieces)]
-        branches = [b for b in found if b is not None]
-        if len(branches) == len(pieces):
-            made += branches
+        for pieces in (summands(energy.expression), [energy.expression]):
+            names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]
+            found = [_element(energy, piece, name, nodes) for piece, name in zip(pieces, names, strict=True)]
+            branches = [b for b in found if b is not None]
+            if len(branches) == len(pieces):
+                made += branches
+                break
         else:
             kept.append(energy)
     return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
-
-
-def _pieces(root: Node) -> list[Node]:
-    """The summands of an expression; a factor before a sum is carried to its terms."""
-    if root.op == "mul":
-        sums = [(e, a) for e, a in zip(root.data, root.args, strict=True) if e == 1.0 and a.op == "sum"]
-        if len(sums) == 1:
-            rest = ex.product(1.0, ((e, a) for e, a in zip(root.data, root.args, strict=True) if a is not sums[0][1]))
-            return [ex.mul(rest, piece) for piece in _pieces(sums[0][1])]
-    if root.op != "sum":
-        return [root]
-    found = [ex.scale(c, p) for c, a in zip(root.data[1], root.args, strict=True) for p in _pieces(a)]
-    return [*found, ex.const(root.data[0])] if root.data[0] else found
 
 
 def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
@@ -264,7 +172,7 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
         return None
     a, b = used[0], used[-1] if len(used) == 2 else None
     slope = ex.derivative(piece, a)
-    if b is not None and not ex.is_const(ex.add(slope, ex.derivative(piece, b)), 0.0):
+    if b is not None and not vanishes(slope, ex.derivative(piece, b)):
         return None
     at = tuple(ex.index(loop.index) for loop in energy.loops)
     own = ex.var(name, own_kind, *at)
@@ -272,93 +180,6 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
     minus = Terminal(None, ()) if b is None else Terminal(b.data[0], b.args)
     plus = Terminal(a.data[0], a.args)
     return Branch(name, at, energy.loops, nodes[a.data[0]], kind, side, law, plus, minus, None, energy.place)
-
-
-def _with_contents(network: Network) -> Network:
-    """Initial positions of common-flow nodes as initial displacements of the potential stores between them."""
-    positions: dict[str, list[Initial]] = {}
-    for initial in network.initials:
-        if initial.target.op == "var" and initial.target.data[1] == "nq":
-            positions.setdefault(initial.target.data[0], []).append(initial)
-    given = {(name, i.target.args): i for name, found in positions.items() for i in found}
-    written = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] in ("bq", "be")}
-    added = []
-    for b in network.branches:
-        if b.kind != "potential" or b.domain.common != "flow" or b.name in written or b.on is not None:
-            continue
-        ends = [_start(t, positions) for t in (b.plus, b.minus)]
-        value = ex.sub(ends[0][0], ends[1][0])
-        target = ex.var(b.name, "bq", *b.at)
-        added.append(Initial(target, value, ends[0][1] and ends[1][1], b.loops, b.place))
-    return replace(network, initials=(*network.initials, *added, *_chained(network, given)))
-
-
-def _start(terminal: Terminal | None, positions: Mapping[str, Sequence[Initial]]) -> tuple[Node, bool]:
-    """The initial position of a terminal over the branch's loops, and whether it is fixed; ~ 0 where none is."""
-    if terminal is None or terminal.node is None:
-        return ex.const(0.0), True
-    return initially(positions.get(terminal.node, ()), terminal.at) or (ex.const(0.0), False)
-
-
-def _chained(network: Network, given: Mapping[_At, Initial]) -> Iterator[Initial]:
-    """Fixed positions that stores in series make up: the sum of their displacements to the next fixed place."""
-    fixed = {key for key, initial in given.items() if initial.fixed}
-    links = _links(network, frozenset())
-    for start in fixed:
-        found = _path(links, start, fixed - {start})
-        if found is None or found[1].op == "var":  # one store: its displacement has been given
-            continue
-        end = ex.const(0.0) if found[0] is None else given[found[0]].value
-        yield replace(given[start], target=found[1], value=ex.sub(given[start].value, end))
-
-
-def _from_stores(network: Network) -> Network:
-    """Traced positions of points that stores hold to the ground, as displacements of these stores."""
-    written = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] in ("bq", "be")}
-    links = _links(network, frozenset(written))
-
-    def read(root: Node) -> Node:
-        change = {}
-        for node in ex.topological([root]):
-            if node.op == "var" and node.data[1:] == ("nq", 0):
-                found = _path(links, (node.data[0], node.args), set())
-                if found is not None:
-                    change[node] = found[1]
-        return ex.substitute(root, change) if change else root
-
-    return replace(
-        network,
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
-    )
-
-
-def _links(network: Network, without: AbstractSet[str]) -> _Links:
-    """Single potential stores of positions by the points they join, with the position of the first over the second."""
-    links: _Links = {}
-    for b in network.branches:
-        if b.kind == "potential" and b.domain.common == "flow" and not b.loops and b.plus is not None:
-            if b.name in without or b.minus is None:
-                continue
-            plus, minus = (None if t.node is None else (t.node, t.at) for t in (b.plus, b.minus))
-            own = ex.var(b.name, "bq", *b.at)
-            links.setdefault(plus, []).append((minus, own))
-            links.setdefault(minus, []).append((plus, ex.neg(own)))
-    return links
-
-
-def _path(links: _Links, start: _At, ends: AbstractSet[_At]) -> tuple[_At | None, Node] | None:
-    """The nearest end (one of `ends`, or the ground: None) along stores, and the position of `start` over it."""
-    paths: dict[_At | None, Node] = {start: ex.const(0.0)}
-    ahead: list[_At | None] = [start]
-    for here in ahead:
-        if here is None or here in ends:
-            return here, paths[here]
-        for there, own in links.get(here, ()):
-            if there not in paths:
-                paths[there] = ex.add(paths[here], own)
-                ahead.append(there)
-    return None
 
 
 def unreflectable(network: Network) -> Diagnostic | None:

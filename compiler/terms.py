@@ -19,11 +19,13 @@ from sysdyn.dsl.expression import (
     call,
     const,
     index,
+    is_const,
     linear,
     mul,
     product,
     rebuild,
     reduction,
+    scale,
     substitute,
     topological,
     variables,
@@ -171,6 +173,25 @@ def _elements(node: Node, args: tuple[Node, ...], place: Place, what: str) -> No
             if not parts:
                 raise ModelError([Diagnostic("N608", f"the {operator} over an empty range", place)])
             return call(operator, *parts) if len(parts) > 1 else parts[0]
+
+
+def summands(root: Node) -> list[Node]:
+    """The summands of an expression; a factor before a sum is carried to its terms."""
+    if root.op == "mul":
+        pairs = list(zip(root.data, root.args, strict=True))
+        sums = [a for e, a in pairs if e == 1.0 and a.op == "sum"]
+        if len(sums) == 1:
+            rest = product(1.0, ((e, a) for e, a in pairs if a is not sums[0]))
+            return [mul(rest, piece) for piece in summands(sums[0])]
+    if root.op != "sum":
+        return [root]
+    found = [scale(c, piece) for c, a in zip(root.data[1], root.args, strict=True) for piece in summands(a)]
+    return [*found, const(root.data[0])] if root.data[0] else found
+
+
+def vanishes(*roots: Node) -> bool:
+    """Whether a sum is zero, by its summands."""
+    return is_const(add(*(piece for root in roots for piece in summands(root))), 0.0)
 
 
 def local_variables(root: Node, kinds: str | Sequence[str], order: int | None = 0) -> list[Node]:

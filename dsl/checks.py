@@ -184,6 +184,22 @@ def accelerations(model: Elaborator, report: Report) -> None:
             report.error("E518", message, place, help="accelerations are results, not data")
 
 
+def results(model: Elaborator, report: Report) -> None:
+    """E102: what the audit finds feeds traces and expectations only."""
+    parts = model.parts
+    read = [(n, w.place) for w in parts.works for n in (w.effort, w.on)]
+    read += [(s.expression, s.place) for s in (*parts.constraints, *parts.dynamics)]
+    read += [(n, i.place) for i in parts.initials for n in (i.target, i.value)]
+    read += [(b.law, b.place) for b in parts.branches if b.law is not None]
+    read += [(c.ratio, c.place) for c in parts.couplings]
+    for node, place in read:
+        found = unknowns_of(node, "audit")
+        if found:
+            name = f"audit.{found[0].data[0]}"
+            help_ = "its expression, or a state that integrates the power"
+            report.error("E102", f"{name} is a result: no law can read it", place, help=help_)
+
+
 def smoothness(model: Elaborator, report: Report) -> None:
     """W301: a law with a corner or a jump where its flow vanishes; a content with a corner there is set-valued."""
     for work in model.parts.works:
@@ -313,6 +329,6 @@ def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
 
 def run(model: Elaborator, report: Report, *, required: bool) -> None:
     """All rules; those with values only where every value is there."""
-    for rule in (energies, families, constraints, states, accelerations, smoothness):
+    for rule in (energies, families, constraints, states, accelerations, results, smoothness):
         rule(model, report)
     parameters(model, report, required=required)

@@ -184,7 +184,10 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Energy:
-    """One summand of a state function: function is T* T V V* (J) or D G (W)."""
+    """One summand of a state function: function is T* T V V* (J) or D G (W).
+
+    `kept kinetic`, `kept potential` (J): what stores hold whose laws stand beside the state functions; for the audit.
+    """
 
     function: str
     expression: Node
@@ -194,12 +197,13 @@ class Energy:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Virtual work: effort * delta(on)."""
+    """Virtual work: effort * delta(on).  kept: it is that of a store, whose energy the audit counts."""
 
     effort: Node
     on: Node
     loops: tuple[Loop, ...]
     place: Place
+    kept: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,8 @@ RANK = 1e-11
 _ITERATIONS = 60
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
+_BESIDE = 1e-8
+"""Scaled rows below which round-off alone can keep them from shrinking."""
 _PROXIMAL = 6
 
 
@@ -76,10 +78,12 @@ class _Linear:
         self.entries = (number[0][rows], number[1][columns], values * unit[columns] * self.row_scale[rows])
         self.shape = int(problem.use.sum()), int(problem.free.sum())
 
-    def nearest(self, u: Floats, r: Floats) -> Floats:
-        """The u of least norm with A u = A u_now - r."""
+    def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
+        """The u of least norm with A u = A u_now - r; beside it, the step of least norm: its round-off is its own."""
         i, j, v = self.entries
         aim = -r
+        if beside:
+            return u + least_norm(self.shape, (i, j, v), aim)
         np.add.at(aim, i, v * u[j])
         return least_norm(self.shape, (i, j, v), aim)
 
@@ -130,17 +134,17 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
     return found[:unknowns]
 
 
-def solve(problem: Problem, x: Floats) -> Solution:
-    """From x towards the solution nearest to problem.guess; the best point met."""
+def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
+    """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
-        return _solve(problem, x)
+        return _solve(problem, x, most)
 
 
-def _solve(problem: Problem, x: Floats) -> Solution:
+def _solve(problem: Problem, x: Floats, most: int) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
     stale = 0
-    for _ in range(_ITERATIONS):
+    for _ in range(most):
         linear = _Linear(problem, x)
 
         def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:
@@ -156,7 +160,7 @@ def _solve(problem: Problem, x: Floats) -> Solution:
         if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
             break
         u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
-        target = linear.nearest(u, scaled[problem.use])
+        target = linear.nearest(u, scaled[problem.use], beside=size < _BESIDE and stale > 1)
         if not np.isfinite(target).all():
             break
         norm = float(np.linalg.norm(scaled))

@@ -3,19 +3,19 @@
 Unknowns: y as written and the derivatives that the settled rows read; equations: all settled rows (as written,
 phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.  Fixed values never move.
 Guesses move least: each step is the minimum-norm solution of the linearised rows around the *guess* (Gauss-Newton,
-in unknowns scaled by magnitude, rank-deficient rows tolerated).  Stages: positions onto phi, then flows and momenta
-onto the first derivatives, then everything.  Where the rows are singular at the guess (a valve C f|f| at rest),
-seeded perturbations of the free unknowns are tried.
+in unknowns scaled by magnitude, rank-deficient rows tolerated).  Stages: positions onto phi and what else holds between
+them, then flows and momenta onto the first derivatives, then everything.  Where the rows are singular at the guess (a
+valve C f|f| at rest), seeded perturbations of the free unknowns are tried.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.description import Floats
+from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve
 from sysdyn.runtime.scales import alike, group_maximum, propagate
@@ -27,6 +27,8 @@ STATE = ("q", "f", "p", "s")
 _WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
+_FEW = 3
+"""Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 EXACT = 1e-9
 OWN = 1e-6
 NOISE = 1e-13
@@ -71,20 +73,37 @@ def _given(system: System) -> _Given:
     label: dict[int, RowLabel] = {}
     for item in sorted(system.description.initial, key=lambda item: item.fixed):
         places = system.form.at[item.family] + item.positions
-        for place, value in zip(places[fixed[places]], item.values[fixed[places]], strict=True):
-            if item.fixed and abs(guess[place] - value) > 1e-12 * max(abs(value), abs(guess[place])):
-                raise InconsistentStart(
-                    "fixed",
-                    abs(guess[place] - value),
-                    (),
-                    (label[int(place)], item.label),
-                    (system.name(int(place)),),
-                )
+        known = np.where(fixed[places], guess[places], item.values)
         guess[places] = item.values
+        for held in (known, guess[places]) if item.fixed else ():  # said before, and twice by the statement itself
+            apart = np.abs(held - item.values)
+            wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(held), np.abs(item.values)))
+            if wrong.size:
+                place = int(places[wrong[0]])
+                labels = (label.get(place, item.label), item.label)
+                raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (system.name(place),))
         fixed[places] |= item.fixed
         written[places] = True
         label.update(dict.fromkeys(places.tolist(), item.label))
     return _Given(guess, fixed, written, label)
+
+
+def _of_groups(system: System, names: Sequence[str]) -> Mask:
+    mask = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        if group in names:
+            mask[first : first + system.description.rows[family].size] = True
+    return mask
+
+
+def _pairs(system: System) -> tuple[Ints, Ints]:
+    """Places of momenta, and of the flows of the same coordinates."""
+    families, at = system.description.families, system.form.at
+    flows = {f.owner: k for k, f in enumerate(families) if f.kind == "f"}
+    found = [(at[k] + np.arange(f.size), at[flows[f.owner]]) for k, f in enumerate(families) if f.kind == "p"]
+    nothing = np.zeros(0, dtype=np.int64)
+    momenta = np.concatenate([nothing, *(places for places, _ in found)])
+    return momenta, np.concatenate([nothing, *(places - places[:1] + first for places, first in found)])
 
 
 class Starter:
@@ -99,7 +118,7 @@ class Starter:
         self._alike = np.concatenate([kinds[: system.form.written], kinds.max(initial=0) + 1 + kinds[self.rates]])
         self.n = system.form.written
         self.guessed = self._guessed()
-        self.every = ~self.guessed  # rows that must hold
+        self.every = ~self.guessed & ~self._unsettled()  # rows that must hold
         self.kinds = system.kinds[: self.n]
         pattern = self.settled.pattern
         columns = pattern.columns_of()
@@ -108,6 +127,10 @@ class Starter:
         self._rated = rate_at[columns] >= 0
         self.rows = np.concatenate([pattern.row, pattern.row[self._rated]]).astype(np.int64)
         self.columns = np.concatenate([columns, rate_at[columns[self._rated]]])
+        self._momentum, self._flow = _pairs(system)
+        self._momenta = _of_groups(system, ("momentum",))
+        in_y, in_rate = self.settled.structural()
+        self._structural = np.concatenate([in_y, in_rate[self._rated]])
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
@@ -128,10 +151,13 @@ class Starter:
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups."""
-        mask = np.zeros(self.settled.rows, dtype=bool)
-        for group, family, first in self.settled.form.groups:
-            if group in names:
-                mask[first : first + self.settled.description.rows[family].size] = True
+        return _of_groups(self.settled, names)
+
+    def between(self, kinds: Sequence[str]) -> Mask:
+        """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
+        outside = np.append(~np.isin(self.kinds, kinds), np.ones(self.rates.size, dtype=bool))
+        mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
+        mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
 
     def _guessed(self) -> Mask:
@@ -143,10 +169,28 @@ class Starter:
                 mask[first : first + rows.size] = True
         return mask
 
+    def _unsettled(self) -> Mask:
+        """Rates of balances with inertia: the start does not know them."""
+        inertial = np.zeros(self.settled.rows, dtype=bool)
+        inertial[self.settled.pattern.row[self.settled.structural()[1]]] = True
+        balances = {family: first for group, family, first in self.settled.form.groups if group == "dynamics"}
+        mask = np.zeros(self.settled.rows, dtype=bool)
+        for group, family, first in self.settled.form.groups:
+            if group == "dynamics_rate":
+                size, own = self.settled.description.rows[family].size, balances[family]
+                mask[first : first + size] = inertial[own : own + size]
+        return mask
+
     def following(self, t: float, x: Floats) -> Mask:
-        """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia."""
-        jyd = self.system.jacobian(t, *self.expand(x))[1]
+        """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
+
+        The flow of a momentum counts as state: where neither is written, both begin at zero.
+        """
+        jy, jyd = self.system.jacobian(t, *self.expand(x))
         carries = self.system.differential(jyd)[: self.n] & np.isin(self.kinds, STATE)
+        pattern = self.system.pattern
+        inert = pattern.columns_of()[(jy != 0.0) & self._momenta[pattern.row]]
+        carries[np.intersect1d(self._flow[carries[self._momentum]], inert)] = True
         carries |= self.given.written & np.isin(self.kinds, STATE)
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
 
@@ -210,22 +254,27 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
 
 
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held."""
+    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held.
+
+    What follows from the state moves alone where that is enough.
+    """
     kinds = np.concatenate([starter.kinds, np.full(starter.rates.size, "rate")])
     for groups, moving in (
         (("phi",), ("q",)),
         (("phi_rate", "psi"), ("f",)),
         (("momentum",), ("p",)),
-        (("phi", "phi_rate", "psi", "momentum"), ("q", "f", "p")),
+        (("phi", "phi_rate", "psi", "momentum"), STATE),
     ):
         rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
-        if not rows.any() or not may.any():
-            continue
-        problem = _problem(starter, t, x, guess, rows=rows, free=may)
-        for shaken in (x, *_shaken(x, may, problem.scale)):
-            found = solve(problem, shaken)
-            if found.residual < EXACT:
-                x = found.x
+        for use in (rows | starter.between(moving), rows):
+            if not use.any() or not may.any():
+                continue
+            problem = _problem(starter, t, x, guess, rows=use, free=may)
+            gentle = replace(problem, free=may & starter.following(t, x))
+            trials = ((gentle, x, _FEW), *((problem, z) for z in (x, *_shaken(x, may, problem.scale))))
+            found = next((s for trial in trials if (s := solve(*trial)).residual < EXACT), None)
+            if found is not None:
+                x = starter.without_noise(found.x, problem.scale)
                 break
     return x
 

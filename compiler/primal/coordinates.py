@@ -15,7 +15,7 @@ from typing import Any
 from sysdyn.compiler.primal.account import Step, account
 from sysdyn.compiler.primal.balances import balances
 from sysdyn.compiler.primal.bounds import Sizes
-from sysdyn.compiler.primal.contents import Contents, at_stores
+from sysdyn.compiler.primal.contents import Contents, at_rest, at_stores
 from sysdyn.compiler.primal.incidence import Element, Incidence
 from sysdyn.compiler.primal.laws import Laws, laws
 from sysdyn.compiler.primal.potentials import Potentials
@@ -39,7 +39,8 @@ def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...], tuple[Ste
     said = laws(network, incidence.elements, sizes)
     potentials = Potentials(nodes.efforts)
     reader = Reader(sizes, Book(_pieces(incidence.elements, classes), said.efforts, said.momenta, potentials.read))
-    contents = Contents(reader, classes.members, tuple(at_stores(network, incidence, reader)))
+    initials = (*at_rest(network, sizes), *at_stores(network, incidence, reader))
+    contents = Contents(reader, classes.members, initials)
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),

@@ -58,12 +58,14 @@ class Law:
     """How a branch enters.
 
     how: energy (stated), work, implicit (stated = 0 closes its effort), state (stated = 0 closes its momentum), row
-    (psi stated = 0), port, field.  stated: the energy, the effort, or the equation.  line: whether the law is linear.
+    (psi stated = 0), port, field.  stated: the energy, the effort, or the equation.  kept: the energy (J) of a store
+    that is implicit or has a state, where that is closed.
     """
 
     how: str
     stated: Node | None = None
     note: tuple[str, str] | None = None
+    kept: Node | None = None
 
 
 @dataclass(slots=True)
@@ -142,11 +144,11 @@ def _store_or_dissipator(branch: Branch, law: Node, slopes: Slopes, effort_read:
         if straight is None:
             equation = sub(v, law)
             text = f"{branch.side}({'p' if kinetic else 'e'}) of {branch.name} stays implicit"
-            return Law("state" if kinetic else "implicit", equation, ("N604", text))
+            return Law("state" if kinetic else "implicit", equation, ("N604", text), _kept(branch, law, given))
         note = ("N601", f"the law of {branch.name} was inverted: it is linear")
         law = straight.inverse(v)
     if kinetic and (pseudo or effort_read or variables(law) - {v}):
-        return Law("state", sub(effort, law), note)
+        return Law("state", sub(effort, law), note, _kept(branch, law, v))
     energy = None if pseudo or variables(law) - {v} else antiderivative(law, v)
     if energy is not None:
         return Law("energy", energy, note)
@@ -156,6 +158,16 @@ def _store_or_dissipator(branch: Branch, law: Node, slopes: Slopes, effort_read:
     if branch.kind == "potential" and not pseudo:
         note = ("N604", f"the energy of {branch.name} is counted as the integral of its power")
     return Law("work", law, note)
+
+
+def _kept(branch: Branch, law: Node, given: Node) -> Node | None:
+    """The energy of a store whose law is one of `given` alone, int f dp or int e dq; None where that is not closed."""
+    if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
+        return None
+    area = antiderivative(law, given)
+    if area is None or given is own(branch, "bp"):  # of f(p): int f dp
+        return area
+    return sub(mul(given, law), area)
 
 
 def _held(branch: Branch, value: Node) -> Law:
@@ -210,7 +222,7 @@ class _Statement:
 
     def _work(self, effort: Node) -> None:
         b = self.branch
-        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, b.place))
+        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, b.place, self.law.kept is not None))
 
     def _row(self, kind: str, equation: Node | None, unit: Unit) -> None:
         b = self.branch
@@ -220,6 +232,8 @@ class _Statement:
     def _implicit(self) -> None:
         """An implicit effort closed by a gamma; with a momentum as state, p' = e."""
         b, number, found = self.branch, self.element.number, self.found
+        if self.law.kept is not None:
+            found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, b.place))
         part = self.names[number, "e"]
         found.unknowns.setdefault(part.name, Unknown(part.name, shape_of(part.box), b.domain.effort, b.place))
         effort = var(part.name, "e", *b.at)

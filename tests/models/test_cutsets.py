@@ -61,3 +61,108 @@ def test_an_inerter_between_free_springs(tmp_path, formulation):
     found = 3 * trace["k1.q"].values + 5 * trace["k2.q"].values
     assert found == pytest.approx(np.cos(trace.time), abs=1e-6)
     assert trace["k1.q"].values[0] == pytest.approx(0.7, abs=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_inductors_alone_at_nodes_of_a_family(tmp_path, formulation):
+    """Two sections in series: only v[2] of v[0..2] has inertia in the complementary family."""
+    text = """
+    model line {
+      param n = 2
+      node w[1..n], v[0..n]: electrical
+      V: effort(e = 1 V*cos(2 rad/s*t)) v[0] -> ground
+      for i in 1..n {
+        R[i]: dissipator(e = 0.4 ohm*i*f) v[i - 1] -> w[i]
+        L[i]: kinetic(p = 0.5 H*i*f) w[i] -> v[i]
+      }
+      C: potential(q = 0.4 F*e) v[n] -> ground
+      init C.e = 0.5 V
+      init L[1].f = 0.2 A
+    }
+    scene go of line {
+      time 0 s to 1 s
+      accuracy 1e-6
+      trace L[1].f, L[2].f, v[1].e, w[2].e every 0.1 s
+    }
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    # 1.5 i' = 0.5 - 1.2 * 0.2
+    rate = (0.5 - 1.2 * 0.2) / 1.5
+    assert trace["v[1].e"].values[0] == pytest.approx(1.0 - 0.4 * 0.2 - 0.5 * rate, abs=1e-6)
+    assert trace["w[2].e"].values[0] == pytest.approx(1.0 - 1.2 * 0.2 - 0.5 * rate, abs=1e-6)
+    assert trace["L[1].f"].values == pytest.approx(trace["L[2].f"].values, abs=1e-6)
+
+
+FLOATING = {
+    "to one": """
+      node a, b, c[1..n]: electrical
+      I: flow(f = 0.5 A + 0.2 A*sin(2 rad/s*t)) ground -> a
+      for i in 1..n {
+        C[i]: potential(q = 0.3 F*e) a -> c[i]
+        L[i]: kinetic(p = 0.4 H*i*f) c[i] -> b
+        init C[i].e = 0.1 V*i
+      }
+      R: dissipator(e = 1 ohm*f) b -> ground
+      init L[1].f = 0.1 A
+      init L[2].f = 0.2 A
+    """,
+    "side by side": """
+      node a[1..n], c[0..n]: electrical
+      for i in 1..n {
+        I[i]: flow(f = 0.5 A*i + 0.2 A*sin(2 rad/s*t)) ground -> a[i]
+        C[i]: potential(q = 0.3 F*e) a[i] -> c[i - 1]
+        R[i]: dissipator(e = 2 ohm*f) a[i] -> c[i - 1]
+        L[i]: kinetic(p = 0.4 H*i*f) c[i - 1] -> ground
+        init C[i].e = 0.1 V*i
+      }
+      S: dissipator(e = 2 ohm*f) c[n] -> ground
+      T: dissipator(e = 2 ohm*f) c[n] -> ground
+    """,
+}
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize("case", FLOATING)
+def test_families_behind_a_cut(tmp_path, case, formulation):
+    text = f"""
+    model cut {{
+      param n = 3
+      {FLOATING[case]}
+    }}
+    scene go of cut {{
+      time 0 s to 1 s
+      accuracy 1e-6
+      trace a{"" if case == "to one" else "[1]"}.e as a, c[1].e, C[2].q, L[3].f every 0.1 s
+    }}
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    reference = trace_of(tmp_path, text, formulation="lagrangian")
+    for name in reference.names:
+        assert trace[name].values == pytest.approx(reference[name].values, abs=5e-5), name
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_inerters_from_a_family_to_one(tmp_path, formulation):
+    """Springs alone hold what the inerters join: their efforts add up to zero at all times."""
+    text = """
+    model inerters {
+      param n = 3
+      node x[1..n], y: rotation
+      for i in 1..n {
+        M[i]: kinetic(p = 1 kg.m^2*i*f) x[i] -> y
+        K[i]: potential(e = 3 N.m*q) x[i] -> ground
+        init K[i].q = 0.1*i
+      }
+      B: potential(e = 5 N.m*q) y -> ground
+      D: dissipator(e = 0.5 N.m.s*f) x[1] -> y
+    }
+    scene go of inerters {
+      time 0 s to 1 s
+      accuracy 1e-6
+      trace sum(i in 1..n: K[i].e) as springs, B.e, B.q, x[3].f every 0.1 s
+    }
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    assert trace["springs"].values == pytest.approx(-trace["B.e"].values, abs=1e-6)
+    assert trace["B.q"].values[0] == pytest.approx(-0.36, abs=1e-8)
+    assert trace["x[3].f"].values[0] == pytest.approx(0.0, abs=1e-8)

@@ -1,0 +1,66 @@
+"""What the audit lists: the energies of all stores, whatever form their laws take."""
+
+import pytest
+from model_runs import FOUR, attempt, trace_of
+
+COIL = """
+model coil {{
+  node a, b, c: electrical
+  V: effort(e = 1 V*sin(2 rad/s*t)) a -> ground
+  L: kinetic({law}) a -> b
+  C: potential({store}) b -> ground
+  S: dissipator(e = 2 ohm*f) b -> ground
+  X: effort(e = {read}) b -> c
+  Y: dissipator(e = 2 ohm*f) c -> ground
+  init C.e = 0.1 V
+  init L.f = 0.1 A
+}}
+scene go of coil {{
+  time 0 s to 1 s
+  accuracy 1e-7
+  trace L.f, L.p, C.e, C.q, audit.kinetic, audit.potential every 0.1 s
+}}
+"""
+LINEAR, CHARGE = "p = 0.5 H*f", "q = 0.7 F*e"
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize("read", ["0.3*L.e", "0.1 V"])
+def test_a_store_whose_effort_a_law_reads(tmp_path, read, formulation):
+    trace = trace_of(tmp_path, COIL.format(law=LINEAR, store=CHARGE, read=read), formulation=formulation)
+    assert trace["audit.kinetic"].values == pytest.approx(0.25 * trace["L.f"].values ** 2, abs=1e-9)
+    assert trace["audit.potential"].values == pytest.approx(0.35 * trace["C.e"].values ** 2, abs=1e-9)
+    assert abs(trace["audit.energy"].values).max() < 1e-6
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_stores_that_stay_implicit(tmp_path, formulation):
+    law, store = "f = 2 A/Wb*p + 3 A/Wb^3*p^3", "q = 0.7 F*e + 0.2 C/V^3*e^3"
+    trace = trace_of(tmp_path, COIL.format(law=law, store=store, read="0.1 V"), formulation=formulation)
+    p, e = trace["L.p"].values, trace["C.e"].values
+    assert trace["audit.kinetic"].values == pytest.approx(p**2 + 0.75 * p**4, abs=1e-8)
+    assert trace["audit.potential"].values == pytest.approx(0.35 * e**2 + 0.15 * e**4, abs=1e-8)
+    assert abs(trace["audit.energy"].values).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["work 0.1/(1 m)*audit.kinetic on x", "state s: J = 0 J; dynamic s' = audit.energy/(1 s)"],
+)
+def test_no_law_reads_the_audit(tmp_path, statement):
+    text = f"""
+    model one {{
+      coord x: translation = 0.1 m
+      energy T* = 1/2*1 kg*x'^2
+      energy V = 1/2*3 N/m*x^2
+      {statement}
+      init x' = 0 m/s
+    }}
+    scene go of one {{
+      time 0 s to 1 s
+      trace x, audit.kinetic every 0.1 s
+    }}
+    """
+    ran, report = attempt(tmp_path, text)
+    assert ran is None
+    assert [d.code for d in report if d.severity == "error"] == ["E102"]
