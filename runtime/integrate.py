@@ -281,10 +281,11 @@ class Integration:
                 self._cross(segment)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began)
+        magnitude = confirmed(self.system, self.request.t_end - self.start.t, self._met, self.magnitude)
         return Finished(
             method.t,
             self.statistics(),
-            confirmed(self.system, self._met, self.magnitude)[: self.system.form.written],
+            magnitude[: self.system.form.written],
             self.largest(),
             self.cpu,
             self.settler.core.contents.failures,

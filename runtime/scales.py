@@ -55,7 +55,7 @@ def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: floa
 def _flows(system: System, found: Floats, span: float) -> Floats:
     """Flows at rest, and not accelerated but by round-off: a small part of what would move their q in the span."""
     form = system.form
-    least = 0.1 * found[form.k_q] / span
+    least = 0.1 * found[form.k_q] / (span or 1.0)
     result = found.copy()
     quiet = found[form.k_f] < NOISE * least
     result[form.k_f[quiet]] = GROUP * least[quiet]
@@ -206,11 +206,11 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     return np.where(found > tiny, found, 1.0), tau
 
 
-def confirmed(system: System, met: Floats, magnitude: Floats) -> Floats:
+def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Floats:
     """Magnitudes after a run [unknowns]: the largest |y| it met and a thousandth of that among unknowns of the same
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.
     """
-    found = np.maximum(met, GROUP * group_maximum(system, met))
+    found = _flows(system, np.maximum(met, GROUP * group_maximum(system, met)), span)
     free = np.isin(system.kinds, ("q", "f", "p", "s")) & (system.nominal == 0.0)
     return np.where(free, np.clip(found, NOISE * magnitude, magnitude), magnitude)
