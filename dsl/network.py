@@ -322,4 +322,5 @@ class Network:
     branches: tuple[Branch, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     slopes: tuple[Slope, ...] = ()  # of laws that the compiler has inverted
+    quasis: tuple[str, ...] = ()  # families of quasi-velocities
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
