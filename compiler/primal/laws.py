@@ -13,34 +13,28 @@ Everything is still said in the branches' own variables; `reading` replaces thes
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
 from sysdyn.compiler.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
+from sysdyn.compiler.primal.choices import OWN, Choice, Law, own
 from sysdyn.compiler.primal.incidence import Element
-from sysdyn.compiler.primal.integrals import Rests, antiderivative, line, polynomial
-from sysdyn.compiler.primal.inverses import Inverse, inverse
 from sysdyn.compiler.primal.slopes import Slopes
-from sysdyn.dsl.diagnostics import Diagnostic, ModelError
+from sysdyn.dsl.diagnostics import Diagnostic
 from sysdyn.dsl.expression import (
     Node,
     add,
-    const,
     derivative,
     index,
     mul,
     neg,
-    param,
     sub,
     substitute,
     time_derivative,
-    to_text,
     var,
     variables,
 )
 from sysdyn.dsl.network import (
-    Branch,
     Constraint,
     Coupling,
     Dynamic,
@@ -55,22 +49,6 @@ from sysdyn.dsl.network import (
 from sysdyn.dsl.units import Unit
 
 ENERGY = {"kinetic": "T*", "potential": "V", "dissipator": "D"}
-Notes = tuple[tuple[str, str], ...]
-OWN = {"kinetic": ("bf", "p"), "potential": ("bq", "e"), "dissipator": ("bf", "e")}
-
-
-@dataclass(frozen=True, slots=True)
-class Law:
-    """How a branch enters.
-
-    how: energy (stated), work, implicit (stated = 0 closes its effort), state (stated = 0 closes its momentum), row
-    (psi stated = 0), port, field.  stated: the energy, the effort, or the equation.  tables: those made for it.
-    """
-
-    how: str
-    stated: Node | None = None
-    notes: tuple[tuple[str, str], ...] = ()
-    tables: tuple[Table, ...] = ()
 
 
 @dataclass(slots=True)
@@ -90,18 +68,13 @@ class Laws:
     tables: dict[str, Table] = field(default_factory=dict)
 
 
-def own(branch: Branch, kind: str) -> Node:
-    """The branch's own variable at its own indices."""
-    return var(branch.name, kind, *branch.at)
-
-
 def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflected: bool = False) -> Laws:
     """All laws; reflected: the network is the reflection of the author's, whose letters notes are to say."""
     wanted = _read_efforts(network)
     found = Laws()
     slopes = Slopes(network)
     letters = dict(zip("efqp", "fepq" if reflected else "efqp", strict=True))
-    chosen = [(e, _Choice(e.branch, slopes, network.tables, e.name in wanted, letters).law()) for e in elements]
+    chosen = [(e, Choice(e.branch, slopes, network.tables, e.name in wanted, letters).law()) for e in elements]
     found.slopes = tuple(slopes.decided)
     names: dict[tuple[int, str], Part] = {}
     for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
@@ -122,113 +95,6 @@ def _read_efforts(network: Network) -> set[str]:
     roots += [w.effort for w in network.works] + [c.expression for c in network.constraints]
     roots += [d.expression for d in network.dynamics]
     return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] == "be"}
-
-
-class _Choice:
-    """How one branch enters."""
-
-    def __init__(
-        self, branch: Branch, slopes: Slopes, tables: Sequence[Table], effort_read: bool, letters: Mapping[str, str]
-    ) -> None:
-        self.branch, self.slopes, self.tables, self.effort_read = branch, slopes, tables, effort_read
-        self.letters = letters
-        self.kinetic = branch.kind == "kinetic"
-
-    def law(self) -> Law:
-        """The branch's law."""
-        branch = self.branch
-        if branch.kind in ("field", "port"):
-            return Law(branch.kind)
-        if branch.law is None or branch.side is None:
-            raise ModelError([Diagnostic("E409", f"branch {branch.name} has no law", branch.place)])
-        if branch.kind == "effort":
-            return Law("work", branch.law)
-        if branch.kind == "flow":
-            outer = [n for n in variables(branch.law) if n.op == "var" and n.data[1] != "s"]
-            return Law("implicit" if outer else "row", sub(own(branch, "bf"), branch.law))
-        if branch.side == OWN[branch.kind][1]:
-            return self._explicit(branch.law)
-        return self._turned(branch.law)
-
-    def _explicit(self, law: Node, notes: Notes = (), tables: tuple[Table, ...] = ()) -> Law:
-        """A law of the branch's own variable."""
-        branch, kinetic = self.branch, self.kinetic
-        v, pseudo = own(branch, OWN[branch.kind][0]), branch.domain.pseudo
-        stated = sub(_own_of(branch), law)
-        if kinetic and (pseudo or self.effort_read or variables(law) - {v}):
-            return Law("state", stated, notes, tables)
-        energy = None if pseudo or variables(law) - {v} else self._energy(law, v)
-        if energy is not None:
-            return Law("energy", energy, notes, tables)
-        if kinetic:
-            text = f"the {self._conjugate} of {branch.name} is kept as a state: its law has no closed integral"
-            return Law("state", stated, (*notes, ("N604", text)), tables)
-        if branch.kind == "potential" and not pseudo:
-            notes = (*notes, ("N604", f"the energy of {branch.name} is counted as the integral of its power"))
-        return Law("work", law, notes, tables)
-
-    def _energy(self, law: Node, v: Node) -> Node | None:
-        """The integral of a law; of dissipators that of polynomials only: works say theirs as well."""
-        if self.branch.kind == "dissipator" and polynomial(law, v) is None:
-            return None
-        rests: Rests = []
-        energy = antiderivative(law, v, rests)
-        return energy if energy is not None and self._rest_on(rests) else None
-
-    def _rest_on(self, rests: Sequence[tuple[Node, int]]) -> bool:
-        """Keep what a result rests on; False where that is not so."""
-        values = [(node, sign, self.slopes.values(self.branch, node)) for node, sign in rests]
-        if any(x is None or not ((sign * x if sign else np.abs(x)) > 0.0).all() for _, sign, x in values):
-            return False
-        for node, sign in rests:
-            self.slopes.rest_on(self.branch, node, sign)
-        return True
-
-    def _turned(self, law: Node) -> Law:
-        """A law of the conjugate variable: inverted, or implicit."""
-        branch, kinetic = self.branch, self.kinetic
-        v, given = own(branch, OWN[branch.kind][0]), _own_of(branch)
-        alone = not variables(law) - {given}
-        straight = line(law, given) if alone else None
-        if self.slopes.flat(branch, straight.slope) if straight else not kinetic and not variables(law):
-            return self._held(law if straight is None else straight.constant)
-        if straight is not None:
-            note = ("N601", f"the law of {branch.name} was inverted: it is linear")
-            return self._explicit(straight.inverse(v), (note,))
-        found = inverse(branch, law, given, v, self.slopes, self.tables) if alone else None
-        if found is not None:
-            tried = self._explicit(found.expression, (self._said(found, v),), found.tables)
-            if tried.how != "state" and self._rest_on(found.rests):  # an unknown less, or the law as it is
-                return tried
-        text = f"{self._side(branch.side)}({self._side(given.data[1][1])}) of {branch.name} stays implicit"
-        return Law("state" if kinetic else "implicit", sub(v, law), (("N604", text),))
-
-    def _said(self, found: Inverse, v: Node) -> tuple[str, str]:
-        """The note of an inverse."""
-        name = self.branch.name.partition("#")[0]
-        if not found.symbolic:
-            return "N603", f"the law of {name} was inverted: the columns of its table change places"
-        text = to_text(substitute(found.expression, {v: param(self._side(v.data[1][1]))}))
-        return "N602", f"the law of {name} was inverted: {self._side(_own_of(self.branch).data[1][1])} = {text}"
-
-    def _side(self, letter: str | None) -> str:
-        return self.letters[letter or ""]
-
-    @property
-    def _conjugate(self) -> str:
-        return {"p": "momentum", "q": "displacement"}[self._side("p")]
-
-    def _held(self, value: Node) -> Law:
-        """A law without slope: v = value, a constant content has no flow."""
-        branch = self.branch
-        text = f"{self._side(branch.side)} of {branch.name} is held: its law has no slope"
-        rate = const(0.0) if branch.kind == "potential" else value
-        return Law("row", sub(own(branch, "bf"), rate), (("N604", text),))
-
-
-def _own_of(branch: Branch) -> Node:
-    """The conjugate of the own variable: p of a kinetic store, else e."""
-    return own(branch, "bp" if branch.kind == "kinetic" else "be")
 
 
 class _Statement:
