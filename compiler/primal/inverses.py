@@ -44,6 +44,7 @@ from sysdyn.dsl.expression import (
     substitute,
     table,
     topological,
+    var,
     variables,
 )
 from sysdyn.dsl.network import Branch, Table
@@ -89,17 +90,19 @@ class _Found:
 
 def inverse(branch: Branch, law: Node, v: Node, w: Node, slopes: Slopes, tables: Sequence[Table]) -> Inverse | None:
     """The inverse of w = law(v); None where it is in doubt."""
-    filled = _blanks(law, v)
+    x, y = var("#own", "s"), var("#value", "s")  # without indices, which would be parts of the law
+    law = substitute(law, {v: x})
+    filled = _blanks(law, x)
     values = {blank: slopes.values(branch, node) for blank, node in filled.items()}
-    known = {blank: x for blank, x in values.items() if x is not None and x.size and np.isfinite(x).all()}
+    known = {blank: a for blank, a in values.items() if a is not None and a.size and np.isfinite(a).all()}
     if len(known) != len(filled):
         return None
     plain = substitute(law, {node: blank for blank, node in filled.items()})
     found = _Found()
-    signs = {blank: _sign(x) for blank, x in known.items()}
+    signs = {blank: _sign(a) for blank, a in known.items()}
     held = {t.name: t for t in tables}
-    solved = _solved(plain, v, w, signs, held, found)
-    if solved is None or not _holds(plain, solved, v, w, known, {**held, **found.tables}):
+    solved = _solved(plain, x, y, signs, held, found)
+    if solved is None or not _holds(plain, solved, x, y, known, {**held, **found.tables}):
         return None
     for node in (substitute(d, filled) for d in found.divisors):
         divided = slopes.values(branch, node)
@@ -107,7 +110,9 @@ def inverse(branch: Branch, law: Node, v: Node, w: Node, slopes: Slopes, tables:
             return None
     rests = [(substitute(d, filled), 0) for d in found.divisors]
     rests += [(filled[blank], signs[blank]) for blank in sorted(found.signed, key=lambda n: n.number)]
-    return Inverse(substitute(solved, filled), tuple(found.tables.values()), tuple(rests), found.symbolic)
+    return Inverse(
+        substitute(substitute(solved, filled), {y: w}), tuple(found.tables.values()), tuple(rests), found.symbolic
+    )
 
 
 def _blanks(law: Node, v: Node) -> dict[Node, Node]:
@@ -204,7 +209,7 @@ def _turned(given: Table) -> Table | None:
 
 def _core(law: Node, v: Node, w: Node, signs: Mapping[Node, int], found: _Found) -> Node | None:
     """The inverse of an algebraic law that holds v more than once."""
-    size, y = call("abs", v), param("#value")
+    size, y = call("abs", v), param("#core")
     inside = topological([law])
     used = {n: s for n, s in signs.items() if n in inside}
     if 0 in used.values() or not all(_algebraic(n) or n is size for n in inside) or not _few(inside):

@@ -272,3 +272,29 @@ def test_a_binding_keeps_the_signs_that_prove(values, said):
 def test_a_sign_that_proves_nothing_keeps_the_law_implicit():
     notes = _compiled(ORIFICE.replace("b = 3e6", "b = -3e6"), "co_lagrangian").notes
     assert [(d.code, d.message) for d in notes if d.code == "N604"] == [("N604", "e(f) of hole stays implicit")]
+
+
+ARRAY = _text(
+    ("n = 3", "Q0[1..3] = [1 mC, 2 mC, 3 mC]", "V0 = 0.4 V", "a = 4 ohm", "b = 20 ohm/A"),
+    "s, c[1..n]: electrical",
+    """
+  supply: effort(e = 3 V*sin(9 rad/s*t)) s -> ground
+  for i in 1..n {
+    hole[i]: dissipator(e = a*f + i*b*f*abs(f)) s -> c[i]
+    cap[i]: potential(q = Q0[i]*sinh(e/V0)) c[i] -> ground
+    init cap[i].e = 0 V
+  }
+""",
+    "cap[1].q as q1, cap[3].q as q3, hole[2].f as f2",
+)
+
+
+def test_an_array_is_inverted_as_one(tmp_path):
+    said = [d.message for d in _compiled(ARRAY, "lagrangian").notes if d.code == "N602"]
+    assert said == ["the law of cap was inverted: e = asinh(q/Q0[i])*V0"]
+    assert "N602" in [d.code for d in _compiled(ARRAY, "co_lagrangian").notes]
+    traces = [trace_of(tmp_path, ARRAY, formulation=f) for f in FOUR]
+    for name in ("q1", "q3", "f2"):
+        scale = np.abs(traces[0][name].values).max()
+        for trace in traces[1:]:
+            assert trace[name].values == pytest.approx(traces[0][name].values, abs=1e-7 * scale), name
