@@ -103,6 +103,7 @@ class EnergyModel:
     quantities: tuple[Quantity, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)  # unit of each constraint label
     mirror: Mirror = PRIMAL
+    quasis: tuple[str, ...] = ()
 
     def function(self, name: str) -> tuple[Term, ...]:
         """The terms of a state function."""
@@ -133,6 +134,7 @@ def energies(network: Network) -> EnergyModel:
         initials=tuple(_initials(network)),
         quantities=tuple(_quantities(network)),
         labels={c.name: c.unit.text for c in network.constraints},
+        quasis=network.quasis,
     )
     touched = tangible(model)
     coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)

@@ -65,8 +65,8 @@ def projection(model: EnergyModel) -> Projection:
         if row.name in rows:
             raise _impossible(row, f"psi {row.name} is declared in several pieces")
         rows[row.name] = _entries(row, families)
-    if not rows:
-        message = "formulation kane: the model has no flow constraint that it could leave out"
+    if not rows and not model.quasis:
+        message = "formulation kane: the model has no flow constraint that it could leave out, and no quasi-velocity"
         where = next((f.place for f in (*model.coordinates, *model.states, *model.unknowns)), None)
         raise ModelError((Diagnostic("E607", message, where, "formulation lagrangian"),))
     reduced = {name: dict(entries) for name, entries in rows.items()}

@@ -96,7 +96,7 @@ def compile_network(
     timings: list[Timing] = []
     reflected = formulation.startswith("co_")
     with _timed("primal", timings):
-        network, inverted, steps = primal(reflect(network) if reflected else network)
+        network, inverted, steps = primal(reflect(network) if reflected else network, reflected=reflected)
     with _timed("energies", timings):
         model = anchored(energies.energies(network))
         energies.verify_energies(model)

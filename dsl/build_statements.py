@@ -174,6 +174,12 @@ def output(v: Values, span: Span, notes: Notes) -> s.Output:
     return s.Output(v[0], v[1], span, notes.doc(span))
 
 
+def quasi(v: Values, span: Span, notes: Notes) -> s.Quasi:
+    """`quasi decl : unit = expr`."""
+    notes.declared(v[0])
+    return s.Quasi(v[0], v[1], v[2], span, notes.doc(span))
+
+
 def coord(v: Values, span: Span, notes: Notes) -> s.Coord:
     """`COORD decls : domain_name [TANGIBLE] [initial]`."""
     notes.declared(*v[1])

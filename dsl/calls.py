@@ -76,6 +76,8 @@ class Calls(Context):
             return self.through(e.args[0].value)
         if e.name in ("dot", "cross", "norm"):
             return self._vector_call(e)
+        if e.name == "quasi":
+            raise self.fail("E319", "quasi(w) is what a work acts on", e.span, help="work E on quasi(w)")
         if e.name not in dim.FUNCTIONS:
             near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
             help_ = f"nearest name in scope: '{near}'" if near else None

@@ -12,9 +12,9 @@ from difflib import get_close_matches
 # fmt: off
 MODEL_WORDS = frozenset(
     {
-        "param", "node", "port", "branch", "input", "output", "coord", "cocoord", "implicit", "state",
-        "discrete", "dynamic", "let", "law", "energy", "content", "work", "phi", "psi", "gamma", "init", "when",
-        "every", "for", "level", "require", "expect", "lossless",
+        "param", "node", "port", "branch", "input", "output", "quasi", "coord", "cocoord", "implicit",
+        "state", "discrete", "dynamic", "let", "law", "energy", "content", "work", "phi", "psi", "gamma", "init",
+        "when", "every", "for", "level", "require", "expect", "lossless",
     }
 )
 SCENE_WORDS = frozenset(

@@ -56,7 +56,7 @@ class Declarations(Parameters):
                 self._state(statement)
             case syntax.Node():
                 self._nodes(statement)
-            case syntax.Let() | syntax.Output():
+            case syntax.Let() | syntax.Output() | syntax.Quasi():
                 self._definition(statement)
             case syntax.Constraint():
                 decl = statement.decl
@@ -165,9 +165,10 @@ class Declarations(Parameters):
             init = syntax.Initial("fixed", statement.value, statement.value.span)
             self._own_initial(decl, "s", family, unit.dimension, init)
 
-    def _definition(self, statement: syntax.Let | syntax.Output) -> None:
+    def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:
         decl = statement.decl
-        kind = "let" if isinstance(statement, syntax.Let) else "output"
+        kind = {syntax.Let: "let", syntax.Output: "output", syntax.Quasi: "quasi"}[type(statement)]
+        dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.Quasi) else None
         at: tuple[str, ...] = ()
         implied = False
         if decl.indices and not any(isinstance(i, syntax.Range) for i in decl.indices):
@@ -184,7 +185,9 @@ class Declarations(Parameters):
         elif self.resolver.bound_loops():
             at, implied = tuple(self.resolver.bound_loops()), True
         place = self.place(decl.span)
-        self.enter(Definition(decl.name, kind, statement.value, at, None, self.current, place, decl.span, implied))
+        if kind == "quasi":
+            self.parts.quasis.append(self.current.family(decl.name).name)
+        self.enter(Definition(decl.name, kind, statement.value, at, dimension, self.current, place, decl.span, implied))
 
     def model_input(self, statement: syntax.Input) -> None:
         """An input of the model itself: a scene may set it."""

@@ -15,7 +15,7 @@ from sysdyn.dsl.instances import Instances
 from sysdyn.dsl.network import Dynamic, Initial, Loop, State
 from sysdyn.dsl.parts import flatten
 from sysdyn.dsl.statements import STATEMENTS
-from sysdyn.dsl.symbols import Definition, Scope, Space
+from sysdyn.dsl.symbols import Definition, Scope, Space, Typed
 from sysdyn.dsl.units import si
 
 
@@ -98,10 +98,13 @@ class Elaborator(Instances):
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
 
     def _definitions(self) -> None:
-        """Resolve every let and output once, so that unused ones are checked too."""
+        """Resolve every let, output and quasi-velocity once, so that unused ones are checked too."""
         for symbol in list(self.scope.symbols.values()):
             if isinstance(symbol, Definition):
                 try:
-                    self.resolver.definition(symbol)
+                    value = self.resolver.definition(symbol)
+                    if symbol.kind == "quasi" and isinstance(value, Typed):
+                        with self.resolver.space(symbol.space):
+                            self.virtual(value.node, f"quasi '{symbol.name}'", symbol.span)
                 except Failed:
                     continue

@@ -211,6 +211,7 @@ _PIECES: dict[type[Any], Callable[[Any], Pieces]] = {
     s.Branch: _branch,
     s.Input: lambda n: ["input ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
     s.Output: lambda n: ["output ", *_decl(n.decl), *_after(" = ", n.value)],
+    s.Quasi: lambda n: ["quasi ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
     s.Coord: _coord,
     s.Implicit: lambda n: ["implicit ", *_decls(n.decls), *_of_unit(n.unit), *_initial(n.init)],
     s.State: lambda n: ["state ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],

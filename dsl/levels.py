@@ -82,7 +82,8 @@ def _extended(
 def _label(statement: syntax.Statement) -> str | None:
     """The label under which a statement can be replaced."""
     if isinstance(
-        statement, (syntax.Instance, syntax.Param, syntax.Let, syntax.Output, syntax.Constraint, syntax.Input)
+        statement,
+        (syntax.Instance, syntax.Param, syntax.Let, syntax.Output, syntax.Quasi, syntax.Constraint, syntax.Input),
     ):
         return statement.decl.name
     return None

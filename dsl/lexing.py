@@ -41,7 +41,7 @@ _GLUED = re.compile(rf"{_FACTOR}(?:[./]{_FACTOR})*+")
 _FUNCTION = re.compile(r"(?:T\*|V\*|T|V|D|G)(?![\w*])")
 _BLANK = re.compile(r"[ \t]*+")
 _WORDS = (
-    "param|node|port|branch|input|output|coord|cocoord|implicit|state|discrete|dynamic|let|law|energy|content"
+    "param|node|port|branch|input|output|quasi|coord|cocoord|implicit|state|discrete|dynamic|let|law|energy|content"
     "|work|phi|psi|gamma|init|when|every|for|level|require|expect|time|set|trace|accuracy|formulation|solver"
     "|redundancy|limit|from|domain|bundle|unit|const|fn|table|component|model|scene"
 )

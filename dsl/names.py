@@ -209,7 +209,8 @@ class Names(Context):
         if symbol.dimension is None or not isinstance(value, Typed) or value.dimension in (None, symbol.dimension):
             return
         message = (
-            f"input '{symbol.name}' is declared {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
+            f"{symbol.kind} '{symbol.name}' is declared {dim.show(symbol.dimension)} "
+            f"but set to {dim.show(value.dimension)}"
         )
         raise self.fail("E207", message, symbol.expression.span)
 

@@ -100,13 +100,16 @@ class Coupling:
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """The slope of a branch's linear law that was divided by or, where flat, was zero with the values of the text."""
+    """What a branch's inverted law rests on: an expression of parameters that is not zero and has the sign
+    1 or -1, where one is given; where flat, it was zero with the values of the text.
+    """
 
     name: str
     expression: Node
     loops: tuple[Loop, ...]
     flat: bool
     place: Place
+    sign: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,4 +326,5 @@ class Network:
     branches: tuple[Branch, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     slopes: tuple[Slope, ...] = ()  # of laws that the compiler has inverted
+    quasis: tuple[str, ...] = ()  # families of quasi-velocities
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)

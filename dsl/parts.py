@@ -62,6 +62,7 @@ class Parts:
     initials: list[Initial] = field(default_factory=list)
     expectations: list[Expectation] = field(default_factory=list)
     goldens: list[Golden] = field(default_factory=list)
+    quasis: list[str] = field(default_factory=list)
     requirements: list[Requirement] = field(default_factory=list)
     nodes: list[NodeFamily] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)

@@ -13,6 +13,7 @@ from sysdyn.dsl.expression import Node
 from sysdyn.dsl.format import format_expression
 from sysdyn.dsl.network import Constraint, Dynamic, Energy, Expectation, Golden, Initial, Work
 from sysdyn.dsl.parts import Requirement
+from sysdyn.dsl.quasi import NotLinearError, virtual
 from sysdyn.dsl.symbols import BranchSymbol, InstanceSymbol, Typed, UnknownSymbol
 from sysdyn.dsl.units import NONE, Dimension, multiply, si
 
@@ -81,18 +82,42 @@ class Statements(Declarations):
         self.parts.energies.append(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
 
     def _work(self, s: syntax.Work) -> None:
-        effort, on = self.resolver.scalar(s.effort), self.resolver.scalar(s.on)
-        self._is_displacement(on.node, s.on)
+        effort = self.resolver.scalar(s.effort)
+        quasi = isinstance(s.on, syntax.Call) and s.on.name == "quasi"
+        if isinstance(s.on, syntax.Call) and quasi:
+            on = self._quasi(s.on)
+        else:
+            on = self.resolver.scalar(s.on)
+            self._is_displacement(on.node, s.on)
         if effort.dimension is not None and on.dimension is not None:
             found = multiply(effort.dimension, on.dimension)
             if found != dim.ENERGY:
                 factor = dim.show(dim.quotient(dim.ENERGY, found))
                 message = f"work: effort*displacement is {dim.show(found)}, not J (factor: {factor})"
                 raise self.resolver.fail("E208", message, s.effort.span, help=self.resolver.missing(found, dim.ENERGY))
-        self.parts.works.append(Work(effort.node, on.node, self.resolver.loops, self.place(s.span)))
+        along = self.virtual(on.node, "quasi(w): w", s.on.span) if quasi else ((ex.const(1.0), on.node),)
+        for coefficient, node in along:
+            work = Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span))
+            self.parts.works.append(work)
+
+    def _quasi(self, on: syntax.Call) -> Typed:
+        """The quasi-velocity w of quasi(w), in the dimension of the displacement along it."""
+        if len(on.args) != 1 or on.args[0].name is not None:
+            raise self.resolver.fail("E206", f"quasi takes one argument, {len(on.args)} given", on.span)
+        speed = self.resolver.scalar(on.args[0].value)
+        return Typed(speed.node, None if speed.dimension is None else multiply(speed.dimension, dim.TIME))
+
+    def virtual(self, speed: Node, what: str, span: syntax.Span) -> tuple[tuple[Node, Node], ...]:
+        """The virtual displacement along a quasi-velocity, term by term; E319."""
+        try:
+            return virtual(speed)
+        except NotLinearError as error:
+            help_ = "w = a*x' + b*y' with a, b of displacements"
+            raise self.resolver.fail("E319", f"{what} {error}", span, help=help_) from None
 
     def _is_displacement(self, node: Node, where: syntax.Expr) -> None:
         others = [n for n in ex.variables(node) if n.op == "var" and n.data[1] not in ("q", "nq", "bq", "s")]
+        others.sort(key=lambda n: n.number)
         if others:
             what = (
                 f"the flow {others[0]}"
@@ -100,7 +125,7 @@ class Statements(Declarations):
                 else f"{others[0]}, which is no displacement"
             )
             message = f"work on an expression that contains {what}"
-            raise self.resolver.fail("E319", message, where.span, help="work is done on displacements: work E on q")
+            raise self.resolver.fail("E319", message, where.span, help="work E on q, or work E on quasi(w)")
 
     def _dynamic(self, s: syntax.Dynamic) -> None:
         target = s.target.base if isinstance(s.target, syntax.Prime) else s.target

@@ -230,7 +230,7 @@ class InstanceSymbol:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Definition:
-    """A let, output, input or const: an expression that is inlined.
+    """A let, output, quasi, input or const: an expression that is inlined.
 
     at: loop variables of a family; implied: they are those of the loop around, not written where it is used.
     """
@@ -239,7 +239,7 @@ class Definition:
     kind: str
     expression: syntax.Expr
     at: tuple[str, ...]
-    dimension: Dimension | None  # declared (inputs)
+    dimension: Dimension | None  # declared (inputs, quasi-velocities)
     space: Space  # where the expression is read
     place: Place
     span: syntax.Span

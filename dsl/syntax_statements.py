@@ -144,6 +144,17 @@ class Output:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Quasi:
+    """`quasi w: rad/s = expr`, a quasi-velocity: linear in flows, its coefficients of displacements."""
+
+    decl: Decl
+    unit: Unit
+    value: Expr
+    span: Span
+    doc: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Coord:
     """`coord q: D [tangible|intangible] [= v]`; tangible is None where nothing is asserted."""
 
@@ -390,6 +401,7 @@ Statement = (
     | Branch
     | Input
     | Output
+    | Quasi
     | Coord
     | Implicit
     | State

@@ -11,7 +11,7 @@ from sysdyn.dsl.source import SourceText
 WORDS = (
     "accuracy|as|at|branch|cocoord|component|const|content|coord|discrete|domain|dynamic|energy|every|expect|extends|fn"
     "|for|formulation|from|gamma|if|then|else|implicit|import|in|init|input|law|let|level|limit|model|node|on|output"
-    "|param|phi|port|psi|redundancy|require|scene|set|solver|state|table|time|to|trace|unit|when|while|within|work"
+    "|param|phi|port|psi|quasi|redundancy|require|scene|set|solver|state|table|time|to|trace|unit|when|while|within|work"
     "|and|or|not|true|false|always|finally|golden"
 )
 _TOKEN = re.compile(rf"(#.*)|(\"[^\"]*\"?)|(\b[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)|\b((?:{WORDS})\b)|[^\W\d]\w*")

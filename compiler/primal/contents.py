@@ -10,9 +10,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.primal.bounds import Box, Interval, Sizes, shape_of, union
+from sysdyn.compiler.primal.choices import own
 from sysdyn.compiler.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.primal.integrals import line
-from sysdyn.compiler.primal.laws import own
 from sysdyn.compiler.primal.overlaps import beside, meeting, narrowed, ranges_of
 from sysdyn.compiler.primal.reading import Piece, Ranges, Reader, touches_network
 from sysdyn.compiler.primal.series import Member

@@ -26,9 +26,9 @@ from sysdyn.dsl.expression import Node, variables
 from sysdyn.dsl.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
 
 
-def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...], tuple[Step, ...]]:
+def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple[Diagnostic, ...], tuple[Step, ...]]:
     """The same model in coordinates, notes about inverted laws, and what became of nodes and branches; ModelError where
-    that cannot be.
+    that cannot be.  reflected: the network is the reflection of the author's.
     """
     if not network.branches and not network.nodes:
         return network, (), ()
@@ -36,7 +36,7 @@ def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...], tuple[Ste
     incidence = Incidence(network, sizes)
     classes = series(incidence, network.read)
     nodes = balances(incidence, classes.merged)
-    said = laws(network, incidence.elements, sizes)
+    said = laws(network, incidence.elements, sizes, reflected=reflected)
     potentials = Potentials(nodes.efforts)
     reader = Reader(sizes, Book(_pieces(incidence.elements, classes), said.efforts, said.momenta, potentials.read))
     initials = (*at_rest(network, sizes), *at_stores(network, incidence, reader))
@@ -52,6 +52,7 @@ def primal(network: Network) -> tuple[Network, tuple[Diagnostic, ...], tuple[Ste
         branches=(),
         couplings=(),
         slopes=(*network.slopes, *said.slopes),
+        tables=(*network.tables, *said.tables.values()),
         read=frozenset(),
         **_statements(network, said, nodes.constraints, reader),
     )

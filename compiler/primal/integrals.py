@@ -1,15 +1,34 @@
 """Laws as polynomials of their own variable: antiderivatives and linear inverses, exact on expressions.
 
-A monomial is  c v^a |v|^b  with c free of v; odd powers of |v| occur in laws such as  e = c f |f|.
+A monomial is  c v^a |v|^b  with c free of v; odd powers of |v| occur in laws such as  e = c f |f|.  Antiderivatives are
+found also of functions of a line in v, and of  v/sqrt(a + b v^2).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from sysdyn.dsl.expression import Node, add, call, const, div, is_const, linear, mul, product, sub, topological
+from sysdyn.dsl.expression import (
+    Node,
+    add,
+    call,
+    const,
+    div,
+    is_const,
+    linear,
+    mul,
+    neg,
+    product,
+    scale,
+    sqrt,
+    sub,
+    topological,
+)
 from sysdyn.dsl.expression import variables as unknowns
 
+Rests = list[tuple[Node, int]]
+"""Expressions free of v that are not zero (0) or have a sign where the result holds."""
 Monomials = dict[tuple[int, int], Node]
 HIGHEST = 12  # degree up to which products of polynomials are multiplied out: laws have 3 or 5
 
@@ -89,11 +108,56 @@ def line(root: Node, v: Node) -> Line | None:
     return Line(found.get((0, 0), const(0.0)), found[1, 0])
 
 
-def antiderivative(root: Node, v: Node) -> Node | None:
-    """Integral by v from 0; None where the integrand is no polynomial in v and |v|."""
+_PRIMITIVES: Mapping[str, Callable[[Node], Node]] = {
+    "exp": lambda x: call("exp", x),
+    "sinh": lambda x: call("cosh", x),
+    "cosh": lambda x: call("sinh", x),
+    "sin": lambda x: neg(call("cos", x)),
+    "cos": lambda x: call("sin", x),
+    "asinh": lambda x: sub(mul(x, call("asinh", x)), sqrt(add(const(1.0), mul(x, x)))),
+    "atan": lambda x: sub(mul(x, call("atan", x)), scale(0.5, call("ln", add(const(1.0), mul(x, x))))),
+}
+
+
+def antiderivative(root: Node, v: Node, rests: Rests) -> Node | None:
+    """Integral by v from 0, None where it is not found; what it rests on is added to `rests`."""
     found = polynomial(root, v)
-    if found is None:
+    if found is not None:
+        return _of_polynomial(found, v)
+    if root.op == "sum":
+        parts = [antiderivative(a, v, rests) for a in root.args]
+        if None in parts:
+            return None
+        pieces = [(c, part) for c, part in zip(root.data[1], parts, strict=True) if part is not None]
+        return linear(0.0, [*pieces, (root.data[0], v)])
+    if root.op == "mul" and any(v not in unknowns(a) for a in root.args):
+        factors = list(zip(root.data, root.args, strict=True))
+        inner = antiderivative(product(1.0, ((e, a) for e, a in factors if v in unknowns(a))), v, rests)
+        outer = product(1.0, ((e, a) for e, a in factors if v not in unknowns(a)))
+        return None if inner is None else mul(outer, inner)
+    if root.op == "mul":
+        return _over_root(root, v, rests)
+    if root.op == "call" and root.data in _PRIMITIVES and (inside := line(root.args[0], v)) is not None:
+        primitive = _PRIMITIVES[root.data]
+        rests.append((inside.slope, 0))
+        return div(sub(primitive(root.args[0]), primitive(inside.constant)), inside.slope)
+    return None
+
+
+def _over_root(root: Node, v: Node, rests: Rests) -> Node | None:
+    """Of v/sqrt(a + b v^2): v^2/(sqrt(a + b v^2) + sqrt(a)), which subtracts no near numbers."""
+    powers = {a: e for e, a in zip(root.data, root.args, strict=True)}
+    under = next((a for a, e in powers.items() if e == -0.5), None)
+    if under is None or len(powers) != 2 or powers.get(v) != 1.0:
         return None
+    found = polynomial(under, v)
+    if found is None or not set(found) <= {(0, 0), (2, 0)} or (0, 0) not in found:
+        return None
+    rests.append((found[0, 0], 1))
+    return div(mul(v, v), add(sqrt(under), sqrt(found[0, 0])))
+
+
+def _of_polynomial(found: Monomials, v: Node) -> Node:
     size = call("abs", v)
     terms = []
     for (a, b), c in found.items():

@@ -17,14 +17,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from sysdyn.compiler.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
+from sysdyn.compiler.primal.choices import OWN, Choice, Law, own
 from sysdyn.compiler.primal.incidence import Element
-from sysdyn.compiler.primal.integrals import antiderivative, line
 from sysdyn.compiler.primal.slopes import Slopes
-from sysdyn.dsl.diagnostics import Diagnostic, ModelError
+from sysdyn.dsl.diagnostics import Diagnostic
 from sysdyn.dsl.expression import (
     Node,
     add,
-    const,
     derivative,
     index,
     mul,
@@ -36,7 +35,6 @@ from sysdyn.dsl.expression import (
     variables,
 )
 from sysdyn.dsl.network import (
-    Branch,
     Constraint,
     Coupling,
     Dynamic,
@@ -44,28 +42,13 @@ from sysdyn.dsl.network import (
     Network,
     Slope,
     State,
+    Table,
     Unknown,
     Work,
 )
 from sysdyn.dsl.units import Unit
 
 ENERGY = {"kinetic": "T*", "potential": "V", "dissipator": "D"}
-OWN = {"kinetic": ("bf", "p"), "potential": ("bq", "e"), "dissipator": ("bf", "e")}
-
-
-@dataclass(frozen=True, slots=True)
-class Law:
-    """How a branch enters.
-
-    how: energy (stated), work, implicit (stated = 0 closes its effort), state (stated = 0 closes its momentum), row
-    (psi stated = 0), port, field.  stated: the energy, the effort, or the equation.  kept: the energy (J) of a store
-    that is implicit or has a state, where that is closed.
-    """
-
-    how: str
-    stated: Node | None = None
-    note: tuple[str, str] | None = None
-    kept: Node | None = None
 
 
 @dataclass(slots=True)
@@ -82,19 +65,16 @@ class Laws:
     momenta: dict[int, Node] = field(default_factory=dict)
     notes: list[Diagnostic] = field(default_factory=list)
     slopes: tuple[Slope, ...] = ()
+    tables: dict[str, Table] = field(default_factory=dict)
 
 
-def own(branch: Branch, kind: str) -> Node:
-    """The branch's own variable at its own indices."""
-    return var(branch.name, kind, *branch.at)
-
-
-def laws(network: Network, elements: Sequence[Element], sizes: Sizes) -> Laws:
-    """All laws."""
+def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflected: bool = False) -> Laws:
+    """All laws; reflected: the network is the reflection of the author's, whose letters notes are to say."""
     wanted = _read_efforts(network)
     found = Laws()
     slopes = Slopes(network)
-    chosen = [(e, _law(e.branch, slopes, e.name in wanted)) for e in elements]
+    letters = dict(zip("efqp", "fepq" if reflected else "efqp", strict=True))
+    chosen = [(e, Choice(e.branch, slopes, network.tables, e.name in wanted, letters).law()) for e in elements]
     found.slopes = tuple(slopes.decided)
     names: dict[tuple[int, str], Part] = {}
     for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
@@ -117,71 +97,6 @@ def _read_efforts(network: Network) -> set[str]:
     return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] == "be"}
 
 
-def _law(branch: Branch, slopes: Slopes, effort_read: bool) -> Law:
-    if branch.kind in ("field", "port"):
-        return Law(branch.kind)
-    if branch.law is None or branch.side is None:
-        raise ModelError([Diagnostic("E409", f"branch {branch.name} has no law", branch.place)])
-    law = branch.law
-    if branch.kind == "effort":
-        return Law("work", law)
-    if branch.kind == "flow":
-        outer = [n for n in variables(law) if n.op == "var" and n.data[1] != "s"]
-        return Law("implicit" if outer else "row", sub(own(branch, "bf"), law))
-    return _store_or_dissipator(branch, law, slopes, effort_read)
-
-
-def _store_or_dissipator(branch: Branch, law: Node, slopes: Slopes, effort_read: bool) -> Law:
-    kind, explicit = OWN[branch.kind]
-    v, effort = own(branch, kind), own(branch, "bp" if branch.kind == "kinetic" else "be")
-    pseudo, kinetic = branch.domain.pseudo, branch.kind == "kinetic"
-    note = None
-    if branch.side != explicit:
-        given = _own_of(branch, law)
-        straight = None if variables(law) - {given} else line(law, given)
-        if slopes.flat(branch, straight.slope) if straight else not kinetic and not variables(law):
-            return _held(branch, law if straight is None else straight.constant)
-        if straight is None:
-            equation = sub(v, law)
-            text = f"{branch.side}({'p' if kinetic else 'e'}) of {branch.name} stays implicit"
-            return Law("state" if kinetic else "implicit", equation, ("N604", text), _kept(branch, law, given))
-        note = ("N601", f"the law of {branch.name} was inverted: it is linear")
-        law = straight.inverse(v)
-    if kinetic and (pseudo or effort_read or variables(law) - {v}):
-        return Law("state", sub(effort, law), note, _kept(branch, law, v))
-    energy = None if pseudo or variables(law) - {v} else antiderivative(law, v)
-    if energy is not None:
-        return Law("energy", energy, note)
-    if kinetic:
-        text = f"the momentum of {branch.name} is kept as a state: its law has no closed integral"
-        return Law("state", sub(effort, law), ("N604", text))
-    if branch.kind == "potential" and not pseudo:
-        note = ("N604", f"the energy of {branch.name} is counted as the integral of its power")
-    return Law("work", law, note)
-
-
-def _kept(branch: Branch, law: Node, given: Node) -> Node | None:
-    """The energy of a store whose law is one of `given` alone, int f dp or int e dq; None where that is not closed."""
-    if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
-        return None
-    area = antiderivative(law, given)
-    if area is None or given is own(branch, "bp"):  # of f(p): int f dp
-        return area
-    return sub(mul(given, law), area)
-
-
-def _held(branch: Branch, value: Node) -> Law:
-    """A law without slope: v = value, a constant content has no flow."""
-    text = f"{branch.side} of {branch.name} is held: its law has no slope"
-    rate = const(0.0) if branch.kind == "potential" else value
-    return Law("row", sub(own(branch, "bf"), rate), ("N604", text))
-
-
-def _own_of(branch: Branch, law: Node) -> Node:
-    """The variable that a law given on the other side holds: p of f(p), e of q(e) and f(e)."""
-    return own(branch, "bp" if branch.kind == "kinetic" else "be")
-
-
 class _Statement:
     """One element's contributions."""
 
@@ -191,8 +106,8 @@ class _Statement:
     def say(self) -> None:
         """Add everything to the laws found."""
         b, law, found = self.branch, self.law, self.found
-        if law.note is not None:
-            found.notes.append(Diagnostic(*law.note, b.place))
+        found.notes += [Diagnostic(*note, b.place) for note in law.notes]
+        found.tables.update((t.name, t) for t in law.tables)
         if law.how == "energy":
             assert law.stated is not None
             found.energies.append(Energy(ENERGY[b.kind], law.stated, b.loops, b.place))

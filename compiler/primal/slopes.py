@@ -1,9 +1,9 @@
-"""Slopes of linear laws that are to be inverted: with the parameters' values a slope may be zero.
+"""Expressions of parameters that inverses of laws rest on: slopes that are divided by, factors whose sign decides.
 
-A law v = c + s w with s = 0 has no inverse: it holds v at c, whatever w is.  Which of the two a law is, the values of
-the text decide once; a binding with others must agree.
+A law v = c + s w with s = 0 has no inverse: it holds v at c, whatever w is.  Which of the two a law is, and the signs
+that prove a nonlinear one monotone, the values of the text decide once; a binding with others must agree.
 
-Received: a line over the loops of its branch.  Returned: whether it is flat; `decided` is kept with the network.
+Received: expressions over the loops of a branch.  Returned: what they are; `decided` is kept with the network.
 """
 
 from __future__ import annotations
@@ -44,22 +44,44 @@ class Slopes:
         self.decided.append(replace(found, flat=flat))
         return flat
 
+    def values(self, branch: Branch, node: Node) -> NDArray[np.float64] | None:
+        """The values of an expression of parameters in all elements of a branch; None where they are not known."""
+        if self._parameters is None:
+            return None
+        try:
+            return _values(Slope(branch.name, node, branch.loops, False, branch.place), self._parameters)
+        except ModelError:
+            return None
+
+    def rest_on(self, branch: Branch, node: Node, sign: int) -> None:
+        """Keep that the expression is not zero (0) or has this sign."""
+        if not is_const(node):
+            self.decided.append(Slope(branch.name, node, branch.loops, False, branch.place, sign))
+
 
 def _values(slope: Slope, parameters: Parameters) -> NDArray[np.float64]:
     return over(slope.loops, (slope.expression,), parameters.checked(slope.place))[0]
 
 
 def check_slopes(network: Network, parameters: Parameters) -> None:
-    """ModelError E605 where a slope is zero that was divided by, or not zero that was left out."""
+    """ModelError E605 where an expression is zero or of a sign that an inverse excludes, or not zero where it was
+    left out.
+    """
     found = []
     for slope in network.slopes:
         values = _values(slope, parameters)
         wrong = values != 0.0 if slope.flat else values == 0.0
+        if slope.sign:
+            wrong = ~(slope.sign * values > 0.0)
         if wrong.any():
             name, text = slope.name.partition("#")[0], to_text(slope.expression)
             help_ = "a formulation in which the law is explicit"
             if slope.flat:
                 message = f"the law of {name} was compiled for {text} = 0, which is now {values[wrong.argmax()]:g}"
+                help_ = "compile the model with that value"
+            elif slope.sign:
+                told = f"{text} {'>' if slope.sign > 0 else '<'} 0"
+                message = f"the law of {name} was compiled for {told}, which is now {values[wrong.argmax()]:g}"
                 help_ = "compile the model with that value"
             else:
                 some = "" if wrong.all() else " in some of its elements"
