@@ -188,7 +188,7 @@ def results(model: Elaborator, report: Report) -> None:
     """E102: what the audit finds feeds traces and expectations only."""
     parts = model.parts
     read = [(n, w.place) for w in parts.works for n in (w.effort, w.on)]
-    read += [(s.expression, s.place) for s in (*parts.constraints, *parts.dynamics)]
+    read += [(c.expression, c.place) for c in parts.constraints] + [(d.expression, d.place) for d in parts.dynamics]
     read += [(n, i.place) for i in parts.initials for n in (i.target, i.value)]
     read += [(b.law, b.place) for b in parts.branches if b.law is not None]
     read += [(c.ratio, c.place) for c in parts.couplings]

@@ -271,12 +271,19 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
                 continue
             problem = _problem(starter, t, x, guess, rows=use, free=may)
             gentle = replace(problem, free=may & starter.following(t, x))
-            trials = ((gentle, x, _FEW), *((problem, z) for z in (x, *_shaken(x, may, problem.scale))))
-            found = next((s for trial in trials if (s := solve(*trial)).residual < EXACT), None)
+            found = next((s for s in _trials(gentle, problem, x) if s.residual < EXACT), None)
             if found is not None:
                 x = starter.without_noise(found.x, problem.scale)
                 break
     return x
+
+
+def _trials(gentle: Problem, problem: Problem, x: Floats) -> Iterator[Solution]:
+    """From x in the unknowns of the gentle problem, then in all, then from points around."""
+    yield solve(gentle, x, _FEW)
+    yield solve(problem, x)
+    for z in _shaken(x, problem.free, problem.scale):
+        yield solve(problem, z)
 
 
 def _shaken(x: Floats, free: Mask, scale: Floats) -> Iterator[Floats]:

@@ -23,6 +23,8 @@ from sysdyn.runtime.trace_store import Column, Layout, Parameter, Store, columns
 
 __all__ = ["Column", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
 
+UNCHANGED = 1e-9
+"""Part of the stored energy that is no energy turned over: its balance is round-off."""
 FLUSH_SECONDS = 0.8
 """Flushed at least every second of wall time: rows arrive about every 50 ms."""
 MANY = 1 << 20
@@ -84,10 +86,13 @@ class TraceWriter:
             self.flush()
 
     def _energy(self, rows: Floats) -> None:
-        """Largest of kinetic energy, change of potential energy, energy dissipated and supplied (J)."""
+        """Largest of kinetic energy, change of potential energy, energy dissipated and supplied (J).
+
+        At least what round-off is beside the stored energy.
+        """
         if self._energies is None:
             self._energies = np.array([0.0, rows[0, 1], 0.0, 0.0])
-        most = np.abs(rows - self._energies).max()
+        most = max(np.abs(rows - self._energies).max(), UNCHANGED * np.abs(rows[:, :2]).max())
         if np.isfinite(most):
             self._turned_over = max(self._turned_over, float(most))
 

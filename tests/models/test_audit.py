@@ -64,3 +64,21 @@ def test_no_law_reads_the_audit(tmp_path, statement):
     ran, report = attempt(tmp_path, text)
     assert ran is None
     assert [d.code for d in report if d.severity == "error"] == ["E102"]
+
+
+def test_round_off_beside_what_is_stored_is_no_turnover(tmp_path):
+    """Charged capacitors that do nothing: the balance is measured by what they hold."""
+    text = """
+    model still {
+      node b: electrical
+      V: effort(e = 1 V) b -> ground
+      for i in 1..3 {
+        C[i]: potential(e = 0.5 V/C*i*q) b -> ground
+      }
+    }
+    scene go of still {
+      time 0 s to 1 s
+      trace b.e every 0.1 s
+    }
+    """
+    assert 1e-12 < trace_of(tmp_path, text)["audit.energy"].nominal < 1e-6
