@@ -60,7 +60,7 @@ class _Components:
     def __init__(self, incidence: Incidence) -> None:
         self.names = list(incidence.boxes)
         self.number = {name: k for k, name in enumerate(self.names)}
-        branches = [e for e in incidence.elements if len(e.ends) == 2 and e.ends[0].node in self.number]
+        branches = [e for e in incidence.elements if len(e.ends) == 2 and all(c.node in self.number for c in e.ends)]
         cuts = [
             (self.number[cell.node], d, bound)
             for cell in incidence.all_cells()
@@ -160,7 +160,7 @@ def _reference(free: list[Held], held: list[Held], earth: Held | None, merged: s
         return earth
     if free:
         return max(free, key=lambda h: h[1].degree)
-    return earth if earth is not None else held[0]
+    return earth or next(iter(held))
 
 
 def _corner(cell: Cell, like: Likeness) -> Box:

@@ -138,8 +138,8 @@ class Choice:
         return Law("state" if kinetic else "implicit", sub(v, law), (("N604", text),), kept=kept)
 
     def _stored(self, law: Node, given: Node) -> Node | None:
-        """The energy of a store whose law is one of `given` alone, int f dp or int e dq; None where that is not closed."""
-        branch, rests = self.branch, list[tuple[Node, int]]()
+        """The energy of a store with a law of `given` alone, int f dp or int e dq; None where that is not closed."""
+        branch, rests = self.branch, Rests()
         if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
             return None
         area = antiderivative(law, given, rests)

@@ -235,12 +235,9 @@ class Contents:
             moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
             return "pin", *_pin(moved, content)
         new, value = (self.reader.resolve(node, ranges) for node in (target, initial.value))
-        if target.op == "var" and target.data[1:] in _PINS and not variables(value):
+        if not variables(value):
             return "pin", *_pin(new, value)
         return "pin", new, value
-
-
-_PINS = frozenset((kind, 0) for kind in ("bf", "bq", "bp", "nf", "nq", "np"))
 
 
 def _pin(target: Node, value: Node) -> tuple[Node, Node]:

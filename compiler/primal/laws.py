@@ -216,4 +216,4 @@ def _couple(coupling: Coupling, label: str, elements: Sequence[Element], sizes: 
 def _at_element(effort: Node, places: Sequence[Affine], element: Element) -> Node:
     """An effort over the coupling's loops as one over the branch's."""
     pairs = zip(places, element.branch.at, strict=True)
-    return substitute(effort, {index(a.loop): sub(node, a.offset.node) for a, node in pairs if a.loop is not None})
+    return substitute(effort, {index(a.loop): node for a, node in pairs if a.loop is not None})

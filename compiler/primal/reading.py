@@ -194,7 +194,7 @@ class Reader:
             return var(name, kind[1], *node.args, order=order)
         if kind == "ne":
             return self.book.nodes(self, node, ranges, inside)
-        if order and kind != "bf":
+        if order:
             plain = self.resolve(var(name, kind, *node.args), ranges, active)
             return self._derivative(plain, node)
         piece = self.piece(name, node.args, ranges)
@@ -220,27 +220,24 @@ class Reader:
 
     def _moving(self, node: Node, piece: Piece, ranges: Ranges, active: tuple[Node, ...]) -> Node:
         """Displacement or flow of a branch."""
-        kind, order, branch = node.data[1], node.data[2], piece.element.branch
+        kind, branch = node.data[1], piece.element.branch
         if piece.member is not None:
             m = piece.member
-            value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args), order=order))
+            value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args)))
             content = self.book.contents.get(piece.element.number)
             return value if kind == "bf" or content is None else add(value, param(content, *node.args))
         if branch.on is not None:
             value = self.at_piece(branch.on, piece, node.args)
-            for _ in range((kind == "bf") + order):
-                value = self._derivative(value, node)
-            return self.resolve(value, ranges, active)
-        ends = [self._end(c, "n" + kind[1], piece, node.args, order) for c in piece.element.ends]
-        value = ends[0] if len(ends) == 1 else sub(*ends)
-        return self.resolve(value, ranges, active)
+            return self.resolve(value if kind == "bq" else self._derivative(value, node), ranges, active)
+        ends = [self._end(c, "n" + kind[1], piece, node.args) for c in piece.element.ends]
+        return self.resolve(sub(*ends), ranges, active)
 
-    def _end(self, contact: Contact, kind: str, piece: Piece, at: tuple[Node, ...], order: int = 0) -> Node:
+    def _end(self, contact: Contact, kind: str, piece: Piece, at: tuple[Node, ...]) -> Node:
         """A quantity of the node at one end; that of a common-flow ground is zero."""
         if contact.node.startswith("#ground ") and kind != "ne":
             return const(0.0)
         loops = piece.element.loops_at(at)
-        return var(contact.node, kind, *(a.at(loops) for a in contact.at), order=order)
+        return var(contact.node, kind, *(a.at(loops) for a in contact.at))
 
     def at_piece(self, root: Node, piece: Piece, at: tuple[Node, ...]) -> Node:
         """An expression over an element's loops at the indices of its name; sums inside get variables of their own."""

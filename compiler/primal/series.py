@@ -190,14 +190,16 @@ def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: Likenes
         own = {likeness.axis(cell[0], d)[0]: d for d in range(len(element.loops))}
         at: list[tuple[int | None, Bound]] = []
         for k, place in enumerate(leader.at):
-            d = leader.loops.index(place.loop) if place.loop is not None else -1
-            axis, offset = likeness.axis(c.leader[0], d) if d >= 0 else ((-1, -1), number(0))
+            if place.loop is None:
+                at.append((None, place.offset))
+                continue
+            d = leader.loops.index(place.loop)
+            axis, offset = likeness.axis(c.leader[0], d)
             if k in c.kept and axis in own and cell[1][own[axis]] == c.leader[1][d]:
                 mine = likeness.axis(cell[0], own[axis])[1]
-                to = element.place_of(element.loops[own[axis]])
-                at.append((to, mine.minus(offset).minus(element.at[to].offset).plus(place.offset)))
+                at.append((element.place_of(element.loops[own[axis]]), mine.minus(offset)))
             else:
-                at.append((None, first[d].first.plus(place.offset) if d >= 0 else place.offset))
+                at.append((None, first[d].first))
         leads = cell == c.leader and not _tied(cell, likeness)
         kept = tuple(at[k] for k in c.kept)
         box = _named(element, likeness.box(cell))

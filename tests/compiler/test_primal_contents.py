@@ -182,7 +182,8 @@ def test_other_targets_are_equations():
     net = pair()
     guess = x.add(of("R", "be"), of("a", "ne"))
     found = pinned(starting(net, (guess, 1.0), (of("R", "be"), 2.0)))
-    assert [t for t, _, _ in found] == ["-2*C' + 2*C", "-2*C'"]
+    assert [t for t, _, _ in found] == ["-2*C' + 2*C", "C'"]
+    assert number(found[1][1]) == -1.0
 
 
 def test_springs_and_nodes_of_mechanisms():

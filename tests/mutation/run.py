@@ -41,9 +41,9 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 ROOMS = ("dsl", "compiler", "runtime", "cli", "api", "models")
 LOWERING = (
-    "lowering.py", "kane.py", "momenta.py", "integration.py", "audit.py", "mirror.py", "reflection.py",
-    "primal/balances.py", "primal/laws.py", "primal/series.py", "primal/potentials.py", "primal/reading.py",
-    "primal/contents.py",
+    "lowering.py", "kane.py", "momenta.py", "integration.py", "audit.py", "mirror.py", "reflection.py", "positions.py",
+    "islands.py", "primal/balances.py", "primal/choices.py", "primal/laws.py", "primal/series.py",
+    "primal/potentials.py", "primal/reading.py", "primal/contents.py", "primal/overlaps.py",
 )  # fmt: skip
 SEEDS = (
     "dc_motor", "knife_edge", "pendulum", "lead_filter", "two_link_arm", "bead_rod", "electrical_transformer",
