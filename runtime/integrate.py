@@ -105,7 +105,7 @@ class Integration:
         request = self.request
         self.method = Method(request.method, self.system, self.linear, self._order, self.underlying)
         self._atol = None if request.atol is None else np.full(self.system.unknowns, request.atol)
-        self._smooth = self.roles.differential.astype(np.int32)
+        self._smooth = self.roles.smooth.astype(np.int32)
         method = self.method.contents
         method.rtol, method.t_end = request.rtol, self.segments[0].end
         method.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
