@@ -1,6 +1,7 @@
 """`sysdyn golden`: a project's goldens recorded, checked, sabotaged, accepted."""
 
 import json
+import shutil
 import sys
 import tomllib
 from pathlib import Path
@@ -115,6 +116,23 @@ def test_all_is_well(project, capsys):
 def test_other_methods_and_backends_are_no_alarm(project):
     assert run(["golden", "check", "-q", "--method", "bdf", "--method", "radau"]) == 0
     assert run(["golden", "check", "-q", "spring", "--backend", "c", "--backend", "numpy"]) == 0
+
+
+@pytest.mark.parametrize("build", ["cc -O0", "cc -O3 -march=native -ffp-contract=fast", "clang", "tcc"])
+def test_another_compilers_build_is_no_alarm(project, capsys, monkeypatch, build):
+    """The goldens were recorded with the flags of compiler/build.py; a wrapper's own come last and win."""
+    name, *flags = build.split()
+    if shutil.which(name) is None:
+        pytest.skip(f"there is no {name}")
+    wrapper = project / "wrapper"
+    wrapper.write_text(f'#!/bin/sh\nexec {name} "$@" {" ".join(flags)}\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    monkeypatch.setenv("SYSDYN_CACHE", str(project / "cache"))
+    code, found = run_json(capsys, "golden", "check")
+    assert code == 0
+    assert len(found["result"]["checks"]) == 8
+    assert list((project / "cache").glob("model-*.so"))
 
 
 def test_a_sabotaged_parameter_is_named(project, capsys):
