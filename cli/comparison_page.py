@@ -42,7 +42,7 @@ def section(ref: Source, test: Source, verdict: Verdict) -> str:
     parts += [f'<p class="soft">{html.escape(note)}</p>' for note in verdict.notes]
     offenders = [c for c in verdict.quantities if c.status in ("differs", "nonfinite")]
     for c in offenders[:OFFENDERS]:
-        parts.append(f'<h2>{html.escape(c.name)}</h2><p>{html.escape(sentence(c))}</p><div class="pair">')
+        parts.append(f'<h3>{html.escape(c.name)}</h3><p>{html.escape(sentence(c))}</p><div class="pair">')
         parts += _pictures(ref, test, c, *verdict.span)
         parts.append("</div>")
     if len(offenders) > OFFENDERS:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from sysdyn.cli.prepare import Prepared, prepare
 from sysdyn.cli.starting import Started
+from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Report
 from sysdyn.runtime.redundancy import combination, dependent, reactions
 from sysdyn.runtime.system import System
@@ -60,6 +61,18 @@ def twins(prepared: Prepared, started: Started, until: float) -> Twins | None:
     k = int(np.argmax(ratio)) if ratio.size else -1
     label = system.row_label(k).label if ratio.size else ""
     return Twins(prepared.formulation, (prepared.backend, other.backend), float(np.max(ratio, initial=0.0)), label)
+
+
+def free_quantities(prepared: Prepared, started: Started) -> tuple[str, ...]:
+    """Traced quantities, as the trace names them, that read a multiplier of a redundant group."""
+    free = free_multipliers(started)
+    quantities = prepared.compiled.energies.quantities if free else ()
+    found = [q.name for q in quantities if q.stored and any(n.data[0] in free for n in _multipliers(q.expression))]
+    return tuple(name.replace("/", "\u2215") for name in found)
+
+
+def _multipliers(expression: ex.Node) -> list[ex.Node]:
+    return [n for n in ex.variables(expression) if n.op == "var" and n.data[1] in ("kappa", "mu")]
 
 
 def free_multipliers(started: Started) -> frozenset[str]:

@@ -23,7 +23,7 @@ from sysdyn.cli.options import FORMULATIONS
 from sysdyn.cli.prepare import Prepared
 from sysdyn.cli.running import ACCURACY, Ran, Request, check_tolerances, integrate, options_of, ready
 from sysdyn.cli.targets import Target
-from sysdyn.cli.twins import Twins, free_multipliers, twins
+from sysdyn.cli.twins import Twins, free_quantities, twins
 from sysdyn.cli.verified import Refusal, Run, Verified, disagreements, worst
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.diagnostics import Diagnostic, Report
@@ -158,10 +158,8 @@ class _Verification:
         pair = twins(ran.prepared, ran.started, until)
         if pair is not None:
             self.twins.append(pair)
-        free = free_multipliers(ran.started)
-        for quantity in ran.prepared.compiled.energies.quantities if free else ():
-            if quantity.stored and any(n.data[0] in free for n in _multipliers(quantity.expression)):
-                self.left_out[quantity.name.replace("/", "\u2215")] = "multiplier of a redundant constraint"
+        for name in free_quantities(ran.prepared, ran.started):
+            self.left_out[name] = "multiplier of a redundant constraint"
 
     def _advance(self, fraction: float, _left: float | None) -> None:
         """Progress over all runs."""
@@ -277,7 +275,3 @@ def _read(ran: Ran, options: Options) -> Run:
     trace = Trace.open(ran.outcome.trace)
     stores = any(ran.prepared.compiled.energies.functions.values())
     return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure, stores)
-
-
-def _multipliers(expression: ex.Node) -> list[ex.Node]:
-    return [n for n in ex.variables(expression) if n.op == "var" and n.data[1] in ("kappa", "mu")]

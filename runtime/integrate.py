@@ -109,7 +109,7 @@ class Integration:
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._met = np.zeros(self.system.unknowns)
-        self._smooth = self.roles.differential.astype(np.int32)
+        self._smooth = self.roles.smooth.astype(np.int32)
         method = self.method.contents
         method.rtol, method.t_end = request.rtol, self.segments[0].end
         method.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)

@@ -8,8 +8,8 @@ TraceWriter.  The layout of the file is trace_store.py's.
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
+import secrets
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from sysdyn.runtime.description import Floats
 from sysdyn.runtime.failures import TraceError
-from sysdyn.runtime.trace_store import Column, Layout, Parameter, Store, columns_of, input_output
+from sysdyn.runtime.trace_store import Column, Layout, Parameter, Store, clear, columns_of, input_output
 
 __all__ = ["Column", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
 
@@ -29,14 +29,14 @@ FLUSH_SECONDS = 0.8
 """Flushed at least every second of wall time: rows arrive about every 50 ms."""
 MANY = 1 << 20
 """Numbers that may wait in memory."""
-_COUNTER = itertools.count()
 
 
 class TraceWriter:
     """A trace being written.  rows: [k, 8 + 2 observed] as core/run.h lays them down.
 
-    Two stores stand beside the trace (.NAME.<n>.a, .b).  Each flush brings the one that is not visible up to date and
-    then gives it the trace's name (hard link, rename): what bears the name is never being written.
+    Two stores stand beside the trace (.NAME.<token>.a, .b).  Each flush brings the one that is not visible up to date
+    and then gives it the trace's name (hard link, rename): what bears the name is never being written.  What a killed
+    run leaves of them the next run of that trace removes.
     """
 
     def __init__(
@@ -61,12 +61,13 @@ class TraceWriter:
             self.path = self.path.resolve()
             if self.path.exists() and not self.path.is_file():
                 raise OSError(f"{self.path} is no regular file")
-            self._number = next(_COUNTER)
+            clear(self.path)
+            self._token = secrets.token_hex(4)
             self._visible = self._store("a")
             self._publish(self._visible)
 
     def _store(self, which: str) -> Store:
-        return Store(self.path.with_name(f".{self.path.name}.{self._number}.{which}"), self._layout)
+        return Store(self.path.with_name(f".{self.path.name}.{self._token}.{which}"), self._layout)
 
     def _publish(self, store: Store) -> None:
         """The trace's name for this store, in one step."""

@@ -8,8 +8,10 @@ fills up raises: the handle is turned to memory before HDF5 closes the file, whi
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import gc
 import os
+import re
 import resource
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -92,6 +94,24 @@ def _set(attributes: Any, values: Mapping[str, Any]) -> None:
         attributes[name] = _text(value) if isinstance(value, str) else value
 
 
+def clear(path: Path) -> None:
+    """Remove the stores that killed runs left beside a trace: those that nobody holds locked.
+
+    A run's stores are locked while it lives; where locks do not work nothing is removed.
+    """
+    name = re.compile(re.escape(f".{path.name}.") + r"[0-9a-f]{8}\.[ab](\.link)?")
+    with contextlib.suppress(OSError), os.scandir(path.parent) as items:
+        left = [item.path for item in items if name.fullmatch(item.name) and item.is_file(follow_symlinks=False)]
+        for item in left:
+            with contextlib.suppress(OSError):
+                handle = os.open(item, os.O_RDONLY)
+                try:
+                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    Path(item).unlink()
+                finally:
+                    os.close(handle)
+
+
 class Store:
     """A file of the trace's layout.  Raises OSError, RuntimeError, ValueError where it cannot be written."""
 
@@ -103,7 +123,9 @@ class Store:
         self._closed = False
         self._sets: list[tuple[Any, int]] = []
         self._room(0)
-        self._file = h5py.File(path, "w", libver=("earliest", "v110"))
+        self._file = h5py.File(path, "x", libver=("earliest", "v110"))
+        with contextlib.suppress(OSError):  # HDF5 does, but for HDF5_USE_FILE_LOCKING=FALSE
+            fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_EX | fcntl.LOCK_NB)
         try:
             _set(self._file.attrs, {**layout.attributes, "final": np.int64(0)})
             self._create(layout)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats, Ints
+from sysdyn.runtime.rates import unique
 from sysdyn.runtime.system import System
 
 
@@ -20,13 +21,15 @@ from sysdyn.runtime.system import System
 class Roles:
     """test [unknowns]: -1 left out, 0 tested, 1 tested with h; power [unknowns]: of h in Newton's norm.
 
-    state [unknowns]: carry the state; differential [unknowns]: their derivative occurs.
+    state [unknowns]: carry the state; differential [unknowns]: their derivative occurs;
+    smooth [unknowns]: it is determined.
     """
 
     test: Ints
     power: Ints
     state: NDArray[np.bool_]
     differential: NDArray[np.bool_]
+    smooth: NDArray[np.bool_]
 
 
 def roles(system: System, jyd: Floats, index: int) -> Roles:
@@ -50,4 +53,4 @@ def roles(system: System, jyd: Floats, index: int) -> Roles:
         test[kinds == "f"] = 0
     if (test < 0).all():
         test[:] = 0
-    return Roles(test.astype(np.int32), power, state, differential)
+    return Roles(test.astype(np.int32), power, state, differential, unique(system, jyd))

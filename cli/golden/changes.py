@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from html import escape
 
@@ -12,8 +13,12 @@ from sysdyn.cli.golden.checking import Case, loaded, tolerance_of
 from sysdyn.cli.golden.recording import Recorded
 from sysdyn.cli.golden.structures import changed
 from sysdyn.cli.page.document import document
+from sysdyn.cli.page.document import table as html_table
 from sysdyn.runtime.comparison.verdict import Incomparable
 from sysdyn.runtime.failures import TraceError
+
+BESIDE = ("structure", "meter", "run")
+"""Kinds of findings that are not in a case's own page of quantities."""
 
 
 def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str | None, str]:
@@ -55,13 +60,33 @@ def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str |
 
 
 def page(cases: Sequence[Case]) -> str:
-    """One page: every check, with pictures of what differs."""
-    parts = [f"<h1>{sum(c.exit != 0 for c in cases)} of {len(cases)} checks failed</h1>"]
-    for case in sorted(cases, key=lambda c: c.exit == 0):
-        word = "good" if case.exit == 0 else "bad"
-        parts.append(f'<h2>{escape(case.label)}</h2><p class="{word}">{escape(case.message)}</p>')
-        wrong = [text for _, text in case.cases if text is not None]
-        if wrong:
-            parts.append("<ul>" + "".join(f"<li>{escape(text)}</li>" for text in wrong) + "</ul>")
-        parts.append(case.page)
+    """One page: what failed, each with pictures of what differs, and what passed."""
+    wrong = sorted((c for c in cases if c.exit), key=lambda c: -c.ratio)
+    parts = [f"<h1>{len(wrong)} of {len(cases)} checks failed</h1>"]
+    if wrong:
+        parts.append(_summary([(f'<a href="#case{k}">{escape(_title(c))}</a>', c) for k, c in enumerate(wrong)]))
+    for k, case in enumerate(wrong):
+        parts.append(f'<h2 id="case{k}">{escape(_title(case))}</h2>')
+        beside = [t for name, t in case.cases if t is not None and name.partition(":")[0] in BESIDE]
+        if beside:
+            parts.append('<ul class="bad">' + "".join(f"<li>{escape(text)}</li>" for text in beside) + "</ul>")
+        parts.append(case.page or f'<p class="bad">{escape(case.message)}</p>')
+    if len(wrong) < len(cases):
+        parts.append("<h2>passed</h2>")
+        parts.append(_summary([(escape(_title(c)), c) for c in cases if not c.exit]))
     return document("golden traces", "\n".join(parts))
+
+
+def _title(case: Case) -> str:
+    how = (case.formulation, case.method, f"backend {case.backend}" if case.backend else "")
+    return f"{case.golden}: {', '.join(filter(None, how))}".removesuffix(": ")
+
+
+def _summary(cases: Sequence[tuple[str, Case]]) -> str:
+    """A row a check: the quantity that is nearest to its limit, or farthest over it."""
+    rows = []
+    for title, c in cases:
+        ratio = f"{c.ratio:.3g}" if math.isfinite(c.ratio) else "–"
+        at = "–" if c.time is None or math.isnan(c.time) else f"{c.time:.6g}"
+        rows.append([title, escape(c.variable or "–"), ratio, at, f"{c.seconds:.1f}"])
+    return html_table(("check", "worst quantity", "times the limit", "at [s]", "took [s]"), rows, left=(0, 1))

@@ -19,6 +19,7 @@ from sysdyn.cli.golden.runs import Run, Stopped, between, run
 from sysdyn.cli.golden.structures import changed
 from sysdyn.cli.running import Request
 from sysdyn.runtime.comparison.arrays import Arrays
+from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance, Verdict
 from sysdyn.runtime.failures import TraceError
@@ -235,7 +236,7 @@ def mutate(golden: Golden) -> Iterator[Mutant]:
             continue
         effect = _effect(base, one, tolerance_of(golden))
         insensitive = effect < NO_EFFECT
-        reason = f"it moves the traced quantities by {effect:.2g} of the limit: " + (
+        reason = f"it moves no traced quantity by more than {effect:.2g} of its limit: " + (
             "none depends on it"
             if insensitive
             else "trace one that depends more on it, or record with a smaller --rtol"
@@ -256,9 +257,17 @@ def _some(parameters: dict[str, float]) -> list[str]:
 
 
 def _effect(base: Run, mutant: Run, tolerance: Tolerance) -> float:
-    """How far the change moves the traces, in limits."""
-    worst = differences(base.trace, mutant.trace, tolerance).worst
-    return worst.worst.ratio if worst else 0.0
+    """How far the change moves the traces at the instants that both hold, in limits."""
+    instants = np.intersect1d(base.trace.time, mutant.trace.time)
+    one, two = (_at(r.trace, instants) for r in (base, mutant))
+    worst = differences(one, two, tolerance.part(NO_EFFECT)).worst
+    return NO_EFFECT * worst.worst.ratio if worst else 0.0
+
+
+def _at(trace: Arrays, instants: Floats) -> Arrays:
+    rows = np.searchsorted(trace.time, instants)
+    values, rates = ({n: v[rows] for n, v in of.items()} for of in (trace.values, trace.rates))
+    return Arrays(instants, values, rates, list(trace.quantities.values()), trace.events, trace.time_unit)
 
 
 def checkable(case: Case) -> dict[str, Any]:

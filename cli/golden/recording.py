@@ -1,9 +1,9 @@
 """A scene becomes a golden trace: its own error is measured first, and a tolerance too near to it is refused.
 
-The reference runs at rtol/50 (rtol/1000 where that is not enough).  Its error is the largest difference, between and at
-all instants, of its thinned trace from a run at a hundredth of that tolerance and from a run by another method; a
-tolerance below ten times that is refused.  Every formulation that can express the scene then runs as `check` will, by
-both methods, and has to be inside half the tube.
+The reference runs at rtol/50 (finer where that is not enough: REFERENCE), with more rows where its thinned trace does
+not tell them.  Its error is the largest difference, between and at all instants, of that thinned trace from a run at a
+hundredth of that tolerance and from a run by another method; a tolerance below ten times that is refused.  Every
+formulation that can express the scene then runs as `check` will, by both methods, and has to be inside half the tube.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.diffing import common, differences, sentence
-from sysdyn.cli.golden.runs import Run, Stopped, between, run
+from sysdyn.cli.golden.runs import APART, Run, Stopped, between, run
 from sysdyn.cli.running import Request
 from sysdyn.runtime.comparison.arrays import Arrays
-from sysdyn.runtime.comparison.curve import Curve
+from sysdyn.runtime.comparison.curve import Curve, Flags, bernstein, cells_at
 from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
 from sysdyn.runtime.comparison.verdict import SHARE, Tolerance, Verdict
 
-REFERENCE = (2e-2, 1e-3)
-"""Accuracy of the reference run, of rtol; the second where the first is not enough."""
+REFERENCE = (2e-2, 1e-3, 1e-5)
+"""Accuracy of the reference run, of rtol; the next where one is not enough."""
 FINER = 1e-2
 """Tolerance of the run that measures it, of the reference's."""
 FINEST = 1e-12
@@ -33,8 +33,14 @@ MARGIN = 10.0
 """A tolerance below this many times the measured error is refused."""
 INTERPOLATION = 1.0 / 40.0
 """What thinning may add, of the limit."""
+DENSER = 4
+"""Runs with rows between the kept ones, at most, until those tell kinks and vertical tangents too."""
+FEW = 4
+"""Parts into which such a run divides the cells that are not told."""
 STEEP = (1e-6, 1e-5)
-"""Time tolerances, of the span, that are tried where runs differ on a flank that is steep as a jump."""
+"""Time tolerances, of the span, that are tried where runs differ on a flank that is steep as a jump, by whichever
+formulation: the value there is a matter of the last digit of the time.
+"""
 ROUNDING = 0.25
 """Of that: what is kept has no digits that nobody compares, and packs to a third."""
 BOUND = 10.0
@@ -68,23 +74,34 @@ class Recorded:
 
 def record(request: Request, rtol: float, atol: float, say: Say) -> Recorded:
     """Measure a scene.  request: file, scene, settings.  Raises Refused, Stopped, UsageError."""
-    refused: Refused | None = None
     for share in REFERENCE:
+        base, runs, golden = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
+        first, *wider = _taus(golden, runs)
         try:
-            base, runs, golden, tolerance, error = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
+            _own_error(golden, runs, Tolerance(rtol, atol, first))
+            break
+        except Refused:
+            continue
+    refused: Refused | None = None
+    for tau in (first, *wider):
+        tolerance = Tolerance(rtol, atol, tau)
+        if refused is not None:
+            say(f"time tolerance {tau:g} s: {refused.args[0].partition(':')[0]}")
+        try:
+            error = _own_error(golden, runs, tolerance)
+            say(f"its own error: {error:.1e}, the tolerance is {rtol / error if error else np.inf:.3g} times that")
+            checked, structure, found = _formulations(request, base, golden, tolerance, say)
             break
         except Refused as error_:
-            refused = error_
+            refused = refused or error_
     else:
         assert refused is not None
         raise refused
-    say(f"its own error: {error:.1e}, the tolerance is {rtol / error if error else np.inf:.3g} times that")
-    checked, structure, found = _formulations(request, base, golden, tolerance, say)
     meters = [base, *runs, *found]
     return Recorded(
         golden,
         error,
-        tolerance.tau or 0.0,
+        tau,
         checked,
         max(BOUND * max(r.energy for r in meters), LEAST),
         max(BOUND * max(r.constraints for r in meters), LEAST),
@@ -93,17 +110,22 @@ def record(request: Request, rtol: float, atol: float, say: Say) -> Recorded:
     )
 
 
-def _reference(
-    request: Request, accuracy: float, rtol: float, atol: float, say: Say
-) -> tuple[Run, list[Run], Arrays, Tolerance, float]:
-    """(reference, the runs that measure it, its thinned trace, the tube, its error)."""
+def _reference(request: Request, accuracy: float, rtol: float, atol: float, say: Say) -> tuple[Run, list[Run], Arrays]:
+    """(reference, the runs that measure it, its thinned trace)."""
     base = run(replace(request, accuracy=accuracy))
     if not base.trace.values:
         raise Refused("the scene traces nothing: a golden trace needs quantities")
     golden = _thin(base, rtol, atol)
-    if len(base.trace.rates) < len(base.trace.values):  # lines between rows: more of them where they are needed
-        base = run(replace(request, accuracy=accuracy), between(golden.time))
+    also = between(golden.time)
+    for _ in range(DENSER):
+        base = run(replace(request, accuracy=accuracy), also)
+        untold = _untold(golden, base.trace, rtol, atol)
         golden = _thin(base, rtol, atol)
+        if not untold.any():
+            break
+        time = base.trace.time
+        cells = np.flatnonzero((untold[1:] | untold[:-1]) & (np.diff(time) > FEW * APART * (time[-1] - time[0])))
+        also = np.concatenate([time, *(np.linspace(time[k], time[k + 1], FEW + 1)[1:-1] for k in cells)])
     rows = f"{golden.time.size} of {base.trace.time.size} instants"
     say(f"reference: {base.formulation}, {base.method}, accuracy {accuracy:.0e}, {rows}")
     dense = between(golden.time)
@@ -113,39 +135,31 @@ def _reference(
         runs.append(run(replace(request, accuracy=accuracy, method=other), dense))
     except Stopped as stopped:
         say(f"no second method: {stopped}")
-    tolerance, error = _own_error(golden, runs, rtol, atol, say)
-    return base, runs, golden, tolerance, error
+    return base, runs, golden
 
 
-def _own_error(golden: Arrays, runs: Sequence[Run], rtol: float, atol: float, say: Say) -> tuple[Tolerance, float]:
-    """(the tube, the error relative to it) of the reference; where a steep flank is in the way, tau is widened."""
+def _taus(golden: Arrays, runs: Sequence[Run]) -> tuple[float, ...]:
+    """Time tolerances [s] to be tried, the widest last: where runs differ on a steep flank it is time that differs."""
     span = float(golden.time[-1] - golden.time[0])
     least = _tau(golden, [r.trace for r in runs])
-    refused: Refused | None = None
-    for share in (SHARE, *STEEP):
-        tau = max(least, float(f"{share * span:.3g}"))
-        tolerance = Tolerance(rtol, atol, tau)
-        try:
-            error = max(_error(differences(golden, r.trace, tolerance), rtol, r.method) for r in runs)
-        except Refused as error_:
-            refused = refused or error_
-            continue
-        if refused is not None:
-            say(f"time tolerance {tau:g} s: {refused.args[0].partition(':')[0]}")
-        return tolerance, error
-    assert refused is not None
-    raise refused
+    return tuple(dict.fromkeys(max(least, float(f"{share * span:.3g}")) for share in (SHARE, *STEEP)))
+
+
+def _own_error(golden: Arrays, runs: Sequence[Run], tolerance: Tolerance) -> float:
+    """The error of the reference, relative as rtol is.  Raises Refused."""
+    tenth = tolerance.part(1.0 / MARGIN)
+    return max(_error(differences(golden, r.trace, tenth), tolerance.rtol, r.method) for r in runs)
 
 
 def _error(verdict: Verdict, rtol: float, method: str) -> float:
-    """The largest difference, relative as rtol is."""
+    """The largest difference from the verdict within a MARGIN-th of the tube, relative as rtol is."""
     worst = verdict.worst
     if worst is None:
         return 0.0
     unlike = [c for c in verdict.traces if not c.equal]
     if unlike or any(c.status not in ("equal", "differs") for c in verdict.quantities):
         raise Refused(f"two runs of the scene do not agree ({method}): {sentence(worst)}")
-    error = max(c.worst.ratio for c in verdict.quantities) * rtol
+    error = max(c.worst.ratio for c in verdict.quantities) * rtol / MARGIN
     if MARGIN * error > rtol:
         message = f"the reference itself is off by {error:.1e} ({worst.name} at {worst.worst.time:.6g} s, {method})"
         help_ = f"--rtol {2 * MARGIN * error:.0e}" if error < 0.05 else "a shorter scene: it is chaotic or too stiff"
@@ -188,6 +202,18 @@ def _thin(base: Run, rtol: float, atol: float) -> Arrays:
     )
 
 
+def _untold(golden: Arrays, trace: Arrays, rtol: float, atol: float) -> Flags:
+    """Rows [n] of a trace that the thinned one does not tell: kinks, vertical tangents."""
+    cell = cells_at(golden.time, trace.time)
+    off = np.zeros(trace.time.size, dtype=bool)
+    for name, values in trace.values.items():
+        limit = 2.0 * INTERPOLATION * (atol + rtol * (trace.quantities[name].nominal or 0.0))
+        curve = Curve(golden.time, golden.values[name], golden.rates.get(name))
+        told = bernstein(curve, cell, trace.time, trace.time)[0]
+        off |= np.abs(told - values) > limit
+    return off
+
+
 def _formulations(
     request: Request, base: Run, golden: Arrays, tolerance: Tolerance, say: Say
 ) -> tuple[float, dict[str, Any], list[Run]]:
@@ -220,9 +246,10 @@ def _formulations(
 
 def _inside(request: Request, accuracy: float, golden: Arrays, tolerance: Tolerance) -> tuple[Run, Verdict]:
     one = run(replace(request, accuracy=accuracy), between(golden.time))
-    return one, differences(common(golden, set(one.trace.values)), one.trace, tolerance)
+    return one, differences(common(golden, set(one.trace.values)), one.trace, tolerance.part(HALF))
 
 
 def _margin(verdict: Verdict) -> float:
+    """Share of the limit that is used, from the verdict within HALF of it."""
     found = (*(c for c in verdict.traces if not c.equal), *verdict.quantities)
-    return max((c.worst.ratio for c in found), default=0.0)
+    return HALF * max((c.worst.ratio for c in found), default=0.0)

@@ -22,6 +22,8 @@ INSTANTS = 2000
 """Rows of each run besides its steps: what has no stored rate is a line between them."""
 PARTS = 16
 """Parts of each cell of the kept trace at whose ends a run has rows too: dense where the curves are not smooth."""
+APART = 1e-12
+"""Of the span: instants nearer than this are one, computed in two ways."""
 CLAIMS = ("E907", "E909")
 """Expectations are judged by `simulate`, at the scene's own accuracy."""
 
@@ -102,6 +104,7 @@ def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
             options = replace(options, accuracy=finest, accuracy_on=())
         even = np.linspace(options.t_start, options.t_end, INSTANTS + 1)
         wanted = even if also is None else np.union1d(even, also)
+        wanted = wanted[np.diff(wanted, prepend=-np.inf) > APART * (options.t_end - options.t_start)]
         inside = wanted[(wanted >= options.t_start) & (wanted <= options.t_end)]
         options = replace(options, every=None, at=tuple(inside.tolist()))
         return integrate(target, prepared, options, report)

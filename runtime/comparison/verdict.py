@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from sysdyn.runtime.comparison.curve import Floats
@@ -20,6 +20,10 @@ class Tolerance:
     rtol: float = 1e-3
     atol: float = 0.0
     tau: float | None = None
+
+    def part(self, share: float) -> Tolerance:
+        """A share of the tube in value, all of it in time: tau counts only where the limit is left."""
+        return replace(self, rtol=share * self.rtol, atol=share * self.atol)
 
 
 SHARE = 1e-9

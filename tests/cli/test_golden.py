@@ -1,6 +1,7 @@
 """`sysdyn golden`: a project's goldens recorded, checked, sabotaged, accepted."""
 
 import json
+import shutil
 import sys
 import tomllib
 from pathlib import Path
@@ -88,7 +89,7 @@ def test_what_is_recorded(project):
     assert data["model"] == "../../spring.sd"
     scene = data["scenes"]["ring"]
     assert scene["formulations"] == ["lagrangian", "hamiltonian"]
-    assert 0.0 < 10.0 * scene["error"] <= scene["rtol"] == 1e-3
+    assert 0.0 < 10.0 * scene["error"] <= scene["rtol"] == 2e-4
     assert scene["energy"] > 0.0
     assert scene["accepted"][0]["reason"] == "recorded"
     structure = json.loads((project / "golden/spring/ring.json").read_text())["formulations"]
@@ -115,6 +116,23 @@ def test_all_is_well(project, capsys):
 def test_other_methods_and_backends_are_no_alarm(project):
     assert run(["golden", "check", "-q", "--method", "bdf", "--method", "radau"]) == 0
     assert run(["golden", "check", "-q", "spring", "--backend", "c", "--backend", "numpy"]) == 0
+
+
+@pytest.mark.parametrize("build", ["cc -O0", "cc -O3 -march=native -ffp-contract=fast", "clang", "tcc"])
+def test_another_compilers_build_is_no_alarm(project, capsys, monkeypatch, build):
+    """The goldens were recorded with the flags of compiler/build.py; a wrapper's own come last and win."""
+    name, *flags = build.split()
+    if shutil.which(name) is None:
+        pytest.skip(f"there is no {name}")
+    wrapper = project / "wrapper"
+    wrapper.write_text(f'#!/bin/sh\nexec {name} "$@" {" ".join(flags)}\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    monkeypatch.setenv("SYSDYN_CACHE", str(project / "cache"))
+    code, found = run_json(capsys, "golden", "check")
+    assert code == 0
+    assert len(found["result"]["checks"]) == 8
+    assert list((project / "cache").glob("model-*.so"))
 
 
 def test_a_sabotaged_parameter_is_named(project, capsys):

@@ -56,6 +56,34 @@ def readable(path, rows=0):
     return trace
 
 
+def test_the_next_run_removes_what_a_killed_one_left(tmp_path, monkeypatch):
+    """But nothing of a run that lives, even of the same trace, or of another trace."""
+    path = write(tmp_path, ENDLESS)
+    monkeypatch.chdir(tmp_path)
+
+    def stores():
+        return {p.name for p in tmp_path.glob(".*")}
+
+    living = [started(path, name) for name in ("out.h5", "out.h5.0123abcd.a")]
+    killed = started(path, "out.h5")
+    for child in (*living, killed):
+        assert int(child.stdout.readline()) > 0
+    before = stores()
+    killed.kill()
+    killed.communicate(timeout=60)
+    assert len(before) >= 6
+    living.append(started(path, "out.h5"))
+    assert int(living[-1].stdout.readline()) > 0
+    assert len(before - stores()) == 2
+    for child in living:
+        child.send_signal(signal.SIGINT)
+    for child in living:
+        child.communicate(timeout=90)  # of its own at 60 s, should a callback swallow the signal
+    assert stores() == set()
+    readable("out.h5")
+    readable("out.h5.0123abcd.a")
+
+
 def test_killed_at_any_moment_the_trace_holds_what_was_acknowledged(tmp_path):
     path = write(tmp_path, ENDLESS)
     chance = random.Random(7)

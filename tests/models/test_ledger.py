@@ -54,8 +54,8 @@ def test_the_ledger_of_an_array(tmp_path, formulation):
 def test_a_ledger_tells_of_a_lost_flow(tmp_path, monkeypatch):
     """The balance of a node without the flow of the heater: its temperature is wrong, and the ledger says so."""
 
-    def losing(network, then=pipeline.primal):
-        found, *rest = then(network)
+    def losing(network, then=pipeline.primal, **options):
+        found, *rest = then(network, **options)
         law = next(c for c in found.constraints if c.name == "heater.law")
         lost = {n: const(0.0) for n in variables(law.expression) if n.op == "var"}
         assert len(lost) == 1

@@ -343,7 +343,7 @@ def coverage(workers: Workers, package: Path, names: Sequence[str], jobs: int) -
     """Verdict, time and lines of each model without a mutant; those known from an earlier run are kept."""
     store = Path(tempfile.gettempdir()) / "sysdyn-mutation"
     store.mkdir(exist_ok=True)
-    sources = hashlib.sha256()
+    sources = hashlib.sha256(repr(LOWERING).encode())
     for path in sorted(package.rglob("*.py")):
         sources.update(path.read_bytes())
     keys = {n: store / hashlib.sha256(sources.digest() + MODELS[n].read_bytes()).hexdigest() for n in names}
