@@ -54,18 +54,28 @@ MODELS: Mapping[str, Path] = {
     **{path.stem: path for path in sorted(HERE.glob("*.sd"))},
     **{f"seed/{name}": ROOT / "models" / "seed" / f"{name}.sd" for name in SEEDS},
 }
+_FORMS = "which laws are rows, states or implicit unknowns: another form of the same equations"
+_TEXT = "the text of a message, or the unit of a row in one"
 _CARRIERS = "which coordinates carry p as an unknown: it is dT*/df elsewhere, another form of the same equations"
 _INTEGRATED = "whether psi is integrated: B f + b = 0 and its primitive from the same start have the same solutions"
 EQUIVALENT = (
     ("kane.py", "_pivot", "uses.get(column, 0) + 1", "prefers one pivot; every regular one spans the same motions"),
     ("momenta.py", "inertial", "rates = ", _CARRIERS),
     ("momenta.py", "inertial", "found.add(", _CARRIERS),
-    ("momenta.py", "undefined", "yield ", "the name in the text of E606"),
+    ("momenta.py", "undefined", "yield ", _TEXT),
     ("integration.py", "_touches", "", _INTEGRATED),
     ("integration.py", "_exact", "flows = ", _INTEGRATED),
     ("mirror.py", "", "COMPLEMENTARY = ", "nothing reads it"),
-    ("integration.py", "_note", "", "the text of note N501"),
-    ("integration.py", "_at_start", "", "the text of note N501"),
+    ("integration.py", "_note", "", _TEXT),
+    ("integration.py", "_at_start", "", _TEXT),
+    ("primal/contents.py", "store", "places[", _TEXT),
+    ("primal/choices.py", "law", "outer = ", _FORMS),
+    ("primal/choices.py", "", "OWN = ", _FORMS),
+    ("primal/choices.py", "_kept", "", _TEXT),
+    ("primal/choices.py", "_said", "", _TEXT),
+    ("primal/laws.py", "say", 'b.side == "p"', _TEXT),
+    ("primal/laws.py", "_implicit", 'b.side == "p"', _TEXT),
+    ("primal/laws.py", "_stem", "", "labels of constraints"),
 )
 """Mutants that cannot change a result: file, function, what the line holds, and the reason."""
 TARGET = 0.95
