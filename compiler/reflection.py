@@ -170,7 +170,7 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
     used = sorted((n for n in ex.variables(piece) if n.op == "var"), key=lambda n: n.number)
     if not 1 <= len(used) <= 2 or any(n.data[1] != node_kind or n.data[2] for n in used):
         return None
-    a, b = (*used, None)[:2]
+    a, b = used[0], used[1] if len(used) == 2 else None
     slope = ex.derivative(piece, a)
     if b is not None and not vanishes(slope, ex.derivative(piece, b)):
         return None

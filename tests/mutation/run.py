@@ -20,6 +20,7 @@ import hashlib
 import importlib
 import importlib.abc
 import importlib.util
+import io
 import json
 import os
 import resource
@@ -107,6 +108,14 @@ class Site:
         return next((why for *_, why in entries), None)
 
 
+@dataclass(frozen=True)
+class Known:
+    """Of a model without a mutant: the digest of its forms, and the formulations in which verify ran it."""
+
+    printed: str
+    formulations: tuple[str, ...]
+
+
 def sites(name: str) -> list[Site]:
     """All mutants of a file of the compiler."""
     text = (ROOT / "compiler" / name).read_text()
@@ -163,26 +172,33 @@ def changed(text: str) -> str:
     return head + mark + line + rest if mark else line + text
 
 
-def judged(models: Iterable[str], known: Mapping[str, str] | None = None) -> str:
-    """The first model at which verify failed; "" where all pass.
+def judged(models: Iterable[str], known: Mapping[str, Known]) -> str:
+    """The first model at which verify failed, or refused a formulation that it ran before; "" where all pass.
 
     A model whose compiled forms are those known of the unchanged lowering would pass as it did: it is not run.
     """
-    run = importlib.import_module("sysdyn.cli.main").run
     tried = 0
     for model in models:
-        if known and print_of(model) == known[model]:
+        if print_of(model) == known[model].printed:
             continue
         tried += 1
-        if known and tried > MOST:  # it has passed many that it changed: it counts as a survivor
+        if tried > MOST:  # it has passed many that it changed: it counts as a survivor
             break
-        try:
-            code = run(["verify", "-q", "--progress", "never", "--max-wall", "30", str(MODELS[model])])
-        except BaseException as error:  # what a mutant may do
-            code = type(error).__name__
-        if code:
-            return f"{model} {code}"
+        code, formulations = verified(model)
+        if code or not set(known[model].formulations) <= formulations:
+            return f"{model} {code or 'refused'}"
     return ""
+
+
+def verified(model: str) -> tuple[int | str, set[str]]:
+    """Exit code of verify, or the name of what it raised; the formulations that it ran."""
+    run, said = importlib.import_module("sysdyn.cli.main").run, io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said):
+            code = run(["verify", "--json", "--progress", "never", "--max-wall", "30", str(MODELS[model])])
+    except BaseException as error:  # what a mutant may do
+        return type(error).__name__, set()
+    return code, {r["formulation"] for r in json.loads(said.getvalue())["result"]["runs"]} if not code else set()
 
 
 def print_of(model: str) -> str:
@@ -304,12 +320,12 @@ def _child(work: Callable[[], str], answer: str) -> None:
 def _foreign() -> str:
     """Modules that verify needs and that no mutant changes."""
     before = set(sys.modules)
-    judged([next(m for m in MODELS if m.startswith("seed/"))])
+    verified(next(m for m in MODELS if m.startswith("seed/")))
     names = [n for n in sys.modules if n not in before]
     return json.dumps([n for n in names if not n.startswith("sysdyn") or n.startswith("sysdyn.dsl")])
 
 
-def _mutated(site: Site, models: Sequence[str], known: Mapping[str, str]) -> Callable[[], str]:
+def _mutated(site: Site, models: Sequence[str], known: Mapping[str, Known]) -> Callable[[], str]:
     def work() -> str:
         module = "sysdyn.compiler." + site.name.removesuffix(".py").replace("/", ".")
         sys.meta_path.insert(0, _Mutated(module, changed(site.mutant.text)))
@@ -340,11 +356,11 @@ def _traced(model: str, package: Path) -> Callable[[], str]:
 
         sys.settrace(trace)
         began = time.monotonic()
-        verdict = judged([model])
+        code, formulations = verified(model)
         sys.settrace(None)
-        lines = {name: sorted(found) for name, found in seen.items()}
-        seconds = time.monotonic() - began
-        return json.dumps({"verdict": verdict, "seconds": seconds, "lines": lines, "print": print_of(model)})
+        fact = {"verdict": f"{model} {code}" if code else "", "seconds": time.monotonic() - began}
+        fact |= {"lines": {name: sorted(found) for name, found in seen.items()}}
+        return json.dumps({**fact, "print": print_of(model), "formulations": sorted(formulations)})
 
     return work
 
@@ -353,7 +369,7 @@ def coverage(workers: Workers, package: Path, names: Sequence[str], jobs: int) -
     """Verdict, time and lines of each model without a mutant; those known from an earlier run are kept."""
     store = Path(tempfile.gettempdir()) / "sysdyn-mutation"
     store.mkdir(exist_ok=True)
-    sources = hashlib.sha256(repr(LOWERING).encode())
+    sources = hashlib.sha256(Path(__file__).read_bytes())
     for path in sorted(package.rglob("*.py")):
         sources.update(path.read_bytes())
     keys = {n: store / hashlib.sha256(sources.digest() + MODELS[n].read_bytes()).hexdigest() for n in names}
@@ -404,8 +420,8 @@ def main() -> int:
                     print(f"{s}  {models}")
             return 0
         began, survivors = time.monotonic(), []
-        prints = {n: str(known[n]["print"]) for n in chosen}
-        works = [_mutated(s, models, prints) for s, models in zip(found, meets, strict=True)]
+        facts = {n: Known(known[n]["print"], tuple(known[n]["formulations"])) for n in chosen}
+        works = [_mutated(s, models, facts) for s, models in zip(found, meets, strict=True)]
         for done, (number, verdict) in enumerate(workers.all(works, options.jobs), 1):
             if not verdict:
                 survivors.append(found[number])
