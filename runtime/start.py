@@ -107,47 +107,62 @@ def _pairs(system: System) -> tuple[Ints, Ints]:
 
 
 class Starter:
-    """The equations of the start of one model (t0 apart)."""
+    """The equations of the start of one model (t0 apart).
 
-    def __init__(self, system: System) -> None:
+    measuring: guessed expressions hold but for an unknown of their own each, `missed`, behind those of y and its rates.
+    """
+
+    def __init__(self, system: System, *, measuring: bool = False) -> None:
         self.system = system
         self.settled = system.another("start")
         self.rates = rates_of(self.settled)
         self.given = _given(system)
-        kinds = alike(system)
-        self._alike = np.concatenate([kinds[: system.form.written], kinds.max(initial=0) + 1 + kinds[self.rates]])
         self.n = system.form.written
-        self.guessed = self._guessed()
-        self.every = ~self.guessed & ~self._unsettled()  # rows that must hold
+        self.guessed, self.unsaid = self._guessed()
+        self.missed = np.flatnonzero(self.guessed if measuring else np.zeros_like(self.guessed))
+        self.every = ~self._unsettled()  # rows that must hold
+        if not measuring:
+            self.every &= ~self.guessed
         self.kinds = system.kinds[: self.n]
         pattern = self.settled.pattern
         columns = pattern.columns_of()
         rate_at = np.full(self.n, -1, dtype=np.int64)
         rate_at[self.rates] = self.n + np.arange(self.rates.size)
         self._rated = rate_at[columns] >= 0
-        self.rows = np.concatenate([pattern.row, pattern.row[self._rated]]).astype(np.int64)
-        self.columns = np.concatenate([columns, rate_at[columns[self._rated]]])
+        self.first = self.n + self.rates.size  # place of the first that is missed
+        places = self.first + np.arange(self.missed.size)
+        self.rows = np.concatenate([pattern.row, pattern.row[self._rated], self.missed]).astype(np.int64)
+        self.columns = np.concatenate([columns, rate_at[columns[self._rated]], places])
         self._momentum, self._flow = _pairs(system)
         self._momenta = _of_groups(system, ("momentum",))
         in_y, in_rate = self.settled.structural()
-        self._structural = np.concatenate([in_y, in_rate[self._rated]])
+        self._structural = np.concatenate([in_y, in_rate[self._rated], np.ones(self.missed.size, dtype=bool)])
+        self._family = self._families()
+        kinds = alike(system)
+        largest = kinds.max(initial=0) + 1
+        self._alike = np.concatenate([kinds[: self.n], largest + kinds[self.rates], 2 * largest + self._family])
+        self.measured = self._measured()
+        self.moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
+        self.moving[self.first :] = self._read()
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
         y, yd = x[: self.n].copy(), np.zeros(self.n)
-        yd[self.rates] = x[self.n :]
+        yd[self.rates] = x[self.n : self.first]
         form = self.system.form
         yd[form.k_q] = y[form.k_f]
         return y, yd
 
     def residual(self, t: float, x: Floats) -> Floats:
         """All rows [rows]."""
-        return self.settled.residual(t, *self.expand(x))
+        rows = self.settled.residual(t, *self.expand(x))
+        rows[self.missed] -= x[self.first :]
+        return rows
 
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
         jy, jyd = self.settled.jacobian(t, *self.expand(x))
-        return np.concatenate([jy, jyd[self._rated]])
+        return np.concatenate([jy, jyd[self._rated], np.full(self.missed.size, -1.0)])
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups."""
@@ -155,19 +170,49 @@ class Starter:
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
-        outside = np.append(~np.isin(self.kinds, kinds), np.ones(self.rates.size, dtype=bool))
+        outside = ~np.isin(self.moving, kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
         mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
 
-    def _guessed(self) -> Mask:
-        """Rows of block initial that are guesses."""
-        mask = np.zeros(self.settled.rows, dtype=bool)
+    def _guessed(self) -> tuple[Mask, Mask]:
+        """Rows of block initial that are guesses, and those of them that no text says."""
+        guessed, unsaid = (np.zeros(self.settled.rows, dtype=bool) for _ in range(2))
         for group, family, first in self.settled.form.groups:
             rows = self.settled.description.rows[family]
             if group == "initial" and not rows.fixed:
-                mask[first : first + rows.size] = True
+                guessed[first : first + rows.size] = True
+                unsaid[first : first + rows.size] = not rows.written
+        return guessed, unsaid
+
+    def _families(self) -> Ints:
+        """Number of the unit of what is missed."""
+        found = np.zeros(self.settled.rows, dtype=np.int64)
+        units: dict[str, int] = {}
+        for group, family, first in self.settled.form.groups:
+            rows = self.settled.description.rows[family]
+            if group == "initial":
+                found[first : first + rows.size] = units.setdefault(rows.unit, len(units))
+        return found[self.missed]
+
+    def _measured(self) -> Mask:
+        """Unknowns of y that the contents of stores measure; a momentum with its flow."""
+        mask = np.zeros(self.n, dtype=bool)
+        own = self._structural & np.isin(self.rows, self.missed) & (self.columns < self.n)
+        mask[self.columns[own]] = True
+        mask[self._momentum] |= mask[self._flow]
         return mask
+
+    def _read(self) -> NDArray[np.str_]:
+        """The kind of unknowns that each guess is of; none where it is of several."""
+        found = np.full(self.settled.rows, "", dtype=self.moving.dtype)
+        many = np.zeros(self.settled.rows, dtype=bool)
+        read = self._structural & (self.columns < self.first)
+        for kind in np.unique(self.moving[: self.first]):
+            rows = self.rows[read & (self.moving[self.columns] == kind)]
+            many[rows] |= found[rows] != ""
+            found[rows] = kind
+        return np.where(many, "", found)[self.missed]
 
     def _unsettled(self) -> Mask:
         """Rates of balances with inertia: the start does not know them."""
@@ -191,8 +236,9 @@ class Starter:
         pattern = self.system.pattern
         inert = pattern.columns_of()[(jy != 0.0) & self._momenta[pattern.row]]
         carries[np.intersect1d(self._flow[carries[self._momentum]], inert)] = True
+        carries &= ~self.measured
         carries |= self.given.written & np.isin(self.kinds, STATE)
-        return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
+        return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool), np.zeros(self.missed.size, dtype=bool)])
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
@@ -208,6 +254,8 @@ class Starter:
         values = np.abs(self.jacobian(t, x))
         free = np.abs(self.residual(t, x))
         values, free = (np.where(np.isfinite(item), item, 0.0) for item in (values, free))
+        told = values * np.isin(self.rows, self.missed)
+        values = values - told
         # how fast what follows from the state moves says nothing of its size
         sizes = ~self.groups("dynamics_rate")[self.rows]
         found = propagate(known, self.rows[sizes], self.columns[sizes], values[sizes], free, self._alike)
@@ -217,6 +265,12 @@ class Starter:
             found[members] = np.maximum(found[members], 1e-3 * largest)
         found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
         found = propagate(found, self.rows, self.columns, values, free, self._alike)
+        # guesses of one unit are measured alike
+        size, largest = np.zeros(self.settled.rows), np.zeros(int(self._family.max(initial=0)) + 1)
+        own = self.columns < self.first
+        np.add.at(size, self.rows[own], (told * found[self.columns])[own])
+        np.maximum.at(largest, self._family, size[self.missed])
+        found[self.first :] = largest[self._family]
         return np.where(found > 1e-280, found, 1.0)
 
 
@@ -226,6 +280,7 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
     weight = np.full(x.size, _WEIGHT["unwritten"])
     weight[: starter.n][starter.given.written] = _WEIGHT["written"]
     weight[follows] = _WEIGHT["following"]
+    weight[starter.first :][~starter.unsaid[starter.missed]] = _WEIGHT["written"]
     # unknowns of one kind and unit are moved by one measure, whatever their values
     scale = starter.scale(t, x)
     weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
@@ -245,9 +300,10 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
 
 def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
-    if not starter.guessed.any():
+    written = starter.guessed & ~starter.unsaid
+    if not written.any():
         return guess
-    rows = starter.guessed | starter.groups("phi", "psi")
+    rows = written | starter.groups("phi", "psi")
     free = free & (np.arange(free.size) < starter.n)
     found = solve(_problem(starter, t, guess, guess, rows=rows, free=free), guess)
     return found.x if np.isfinite(found.residual) else guess
@@ -258,14 +314,13 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
     What follows from the state moves alone where that is enough.
     """
-    kinds = np.concatenate([starter.kinds, np.full(starter.rates.size, "rate")])
     for groups, moving in (
         (("phi",), ("q",)),
         (("phi_rate", "psi"), ("f",)),
         (("momentum",), ("p",)),
         (("phi", "phi_rate", "psi", "momentum"), STATE),
     ):
-        rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
+        rows, may = starter.groups(*groups), free & np.isin(starter.moving, moving)
         for use in (rows | starter.between(moving), rows):
             if not use.any() or not may.any():
                 continue
@@ -336,7 +391,7 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     Left out are gammas that are not linear, held what their text guesses of implicit unknowns (all that stand in them,
     where it guesses none).
     """
-    implicit = np.append(starter.kinds == "e", np.zeros(starter.rates.size, dtype=bool))
+    implicit = starter.moving == "e"
     gammas = starter.groups("gamma")
     if not gammas.any() or not implicit.any():
         return x
@@ -345,7 +400,7 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     bent = np.zeros(starter.settled.rows, dtype=bool)
     bent[starter.rows[here != there]] = True
     bent &= gammas
-    written = np.append(starter.given.written, np.zeros(starter.rates.size, dtype=bool))
+    written = np.append(starter.given.written, np.zeros(x.size - starter.n, dtype=bool))
     own = bent[starter.rows] & implicit[starter.columns]
     own_rows, own_columns = starter.rows[own], starter.columns[own]
     said = np.zeros(starter.settled.rows, dtype=bool)
@@ -381,7 +436,7 @@ def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
     found: list[str] = []
     values = starter.jacobian(t, x)
     hit = np.unique(starter.rows[(starter.columns == place) & (values != 0.0)])
-    for row in hit:
+    for row in hit[~starter.unsaid[hit]]:
         label = starter.settled.row_label(int(row))
         base = label.kind.split("_")[0]
         text = f"{base} {label.label}"
@@ -467,16 +522,18 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
 
     system: any index form of the model; near: a state to stay close to, else the guesses.  Raises InconsistentStart.
     """
-    starter = Starter(system if system.form.name == "3" else system.another("3"))
-    guess = np.concatenate([starter.given.guess, np.zeros(starter.rates.size)])
+    system = system if system.form.name == "3" else system.another("3")
+    starter = Starter(system, measuring=True)
+    guess = np.concatenate([starter.given.guess, np.zeros(starter.moving.size - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         guess[: starter.n] = np.where(np.isin(starter.kinds, (*STATE, "e")), near.y, guess[: starter.n])
-    free = np.concatenate([~starter.given.fixed, np.ones(starter.rates.size, dtype=bool)])
+        guess[starter.first :] = starter.residual(t0, guess)[starter.missed]
+    free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
     guess = _guess(starter, t0, guess, free)
     best, holds = _attempt(starter, t0, guess, free)
     if not holds:
         raise _explain(starter, t0, guess, free, best)
     y, yd = starter.expand(best.x)
-    freedom, names = _freedom(starter, t0, best.x, free)
+    freedom, names = _freedom(Starter(system), t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)

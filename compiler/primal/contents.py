@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.primal.bounds import Box, Interval, Sizes, shape_of, union
+from sysdyn.compiler.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.primal.choices import own
 from sysdyn.compiler.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.primal.integrals import line
-from sysdyn.compiler.primal.overlaps import beside, meeting, narrowed, ranges_of
 from sysdyn.compiler.primal.reading import Piece, Ranges, Reader, touches_network
 from sysdyn.compiler.primal.series import Member
 from sysdyn.dsl.expression import (
@@ -75,31 +74,6 @@ def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Reader) -> It
         target = var(touch.element.name, "be", *(a.at(at) for a in touch.element.at))
         value = initial.value if touch.end == PLUS else neg(initial.value)
         yield replace(initial, target=target, value=value, loops=loops)
-
-
-def at_rest(network: Network, sizes: Sizes) -> Iterator[Initial]:
-    """Masses on nodes begin at rest, as far as nothing is said of them, where a store between two nodes begins with a
-    flow: guesses, so that these nodes are what moves least.
-    """
-    said: dict[tuple[str, str], list[Initial]] = {}
-    for initial in network.initials:
-        if initial.target.op == "var" and initial.target.data[1:] in (("bf", 0), ("bp", 0), ("nf", 0)):
-            said.setdefault((initial.target.data[0], initial.target.data[1][0]), []).append(initial)
-    stores = [b for b in network.branches if b.kind == "kinetic" and b.domain.common == "flow" and b.plus is not None]
-    single = [b for b in stores if b.minus is None or b.minus.node is None]
-    if all(b in single or (b.name, "b") not in said for b in stores):
-        return
-    for b in single:
-        assert b.plus is not None
-        if b.plus.node is None:
-            continue
-        within = ranges_of(b.loops, sizes, b.place)
-        own = [meeting(i, b.at, within, sizes) for i in said.get((b.name, "b"), ())]
-        own += [meeting(i, b.plus.at, within, sizes) for i in said.get((b.plus.node, "n"), ())]
-        holes = [found[0] for found in own if found is not None]
-        for rest in beside(within, holes):
-            target = var(b.plus.node, "nf", *b.plus.at)
-            yield Initial(target, const(0.0), False, narrowed(b.loops, rest), b.place)
 
 
 def _between_ground(touch: Touch) -> bool:
