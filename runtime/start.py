@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve
+from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve, where_light
 from sysdyn.runtime.scales import alike, group_maximum, propagate
 from sysdyn.runtime.settled import rates_of
 from sysdyn.runtime.system import System
@@ -32,6 +32,7 @@ _FEW = 3
 EXACT = 1e-9
 OWN = 1e-6
 NOISE = 1e-13
+BACK = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +110,8 @@ def _pairs(system: System) -> tuple[Ints, Ints]:
 class Starter:
     """The equations of the start of one model (t0 apart).
 
-    measuring: guessed expressions hold but for an unknown of their own each, `missed`, behind those of y and its rates.
+    measuring: where contents of stores are guessed, guessed expressions hold but for an unknown of their own each,
+    behind those of y and its rates.
     """
 
     def __init__(self, system: System, *, measuring: bool = False) -> None:
@@ -119,7 +121,8 @@ class Starter:
         self.given = _given(system)
         self.n = system.form.written
         self.guessed, self.unsaid = self._guessed()
-        self.missed = np.flatnonzero(self.guessed if measuring else np.zeros_like(self.guessed))
+        measuring = measuring and bool(self.unsaid.any())
+        self.missed = np.flatnonzero(self.guessed & measuring)
         self.every = ~self._unsettled()  # rows that must hold
         if not measuring:
             self.every &= ~self.guessed
@@ -395,11 +398,7 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     gammas = starter.groups("gamma")
     if not gammas.any() or not implicit.any():
         return x
-    scale = starter.scale(t, x)
-    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * scale))
-    bent = np.zeros(starter.settled.rows, dtype=bool)
-    bent[starter.rows[here != there]] = True
-    bent &= gammas
+    bent = _bent(starter, t, x) & gammas
     written = np.append(starter.given.written, np.zeros(x.size - starter.n, dtype=bool))
     own = bent[starter.rows] & implicit[starter.columns]
     own_rows, own_columns = starter.rows[own], starter.columns[own]
@@ -413,6 +412,43 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     may = free & ~held & starter.following(t, x)
     found = solve(_problem(starter, t, x, guess, rows=rows, free=may), x)
     return found.x if found.residual < EXACT else x
+
+
+def _bent(starter: Starter, t: float, x: Floats) -> Mask:
+    """Rows that are not linear."""
+    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * starter.scale(t, x)))
+    bent = np.zeros(starter.settled.rows, dtype=bool)
+    bent[starter.rows[here != there]] = True
+    return bent
+
+
+def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: Mask) -> Solution:
+    """The solution without what guesses of the state moved for the sake of what follows from it: that costs nothing.
+
+    Guesses that can stay do so exactly.  Positions in curved constraints are left alone, and what is too large for full
+    matrices.
+    """
+    x = best.x
+    follows = starter.following(t, x)
+    curved = np.zeros(x.size, dtype=bool)
+    bent = _bent(starter, t, x) & starter.groups("phi")
+    curved[starter.columns[bent[starter.rows]]] = True
+    free = free & ~(curved & (starter.moving == "q"))
+    state = free & ~follows
+    if x.size > DENSE or not (x != guess)[state].any():
+        return best
+    problem = _problem(starter, t, x, guess, rows=starter.every, free=free)
+    aim = where_light(problem, x, follows)
+    moved = np.abs(aim - guess) * problem.weight / problem.scale
+    aim = np.where(moved > BACK * _WEIGHT["unwritten"], aim, guess)
+    for held in (state, state & (aim == guess)):
+        z = np.where(held, aim, x)
+        found = solve(replace(problem, free=free & ~held), z)
+        if found.residual < EXACT:
+            z = starter.without_noise(found.x, problem.scale)
+            if _own(starter, t, z, z) < OWN:
+                return replace(found, x=z)
+    return best
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -533,6 +569,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     best, holds = _attempt(starter, t0, guess, free)
     if not holds:
         raise _explain(starter, t0, guess, free, best)
+    best = _steadied(starter, t0, best, guess, free)
     y, yd = starter.expand(best.x)
     freedom, names = _freedom(Starter(system), t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
