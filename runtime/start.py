@@ -120,6 +120,7 @@ class Starter:
         self.rates = rates_of(self.settled)
         self.given = _given(system)
         self.n = system.form.written
+        self._momenta = _of_groups(system, ("momentum",))
         self.guessed, self.unsaid = self._guessed()
         measuring = measuring and bool(self.unsaid.any())
         self.missed = np.flatnonzero(self.guessed & measuring)
@@ -137,7 +138,6 @@ class Starter:
         self.rows = np.concatenate([pattern.row, pattern.row[self._rated], self.missed]).astype(np.int64)
         self.columns = np.concatenate([columns, rate_at[columns[self._rated]], places])
         self._momentum, self._flow = _pairs(system)
-        self._momenta = _of_groups(system, ("momentum",))
         in_y, in_rate = self.settled.structural()
         self._structural = np.concatenate([in_y, in_rate[self._rated], np.ones(self.missed.size, dtype=bool)])
         self._family = self._families()
@@ -218,9 +218,14 @@ class Starter:
         return np.where(many, "", found)[self.missed]
 
     def _unsettled(self) -> Mask:
-        """Rates of balances with inertia: the start does not know them."""
+        """Rates of balances with inertia: the start does not know them.  A momentum that nothing moves with is none."""
+        pattern = self.settled.pattern
+        in_y, in_rate = self.settled.structural()
+        columns = pattern.columns_of()
+        alone = in_y & self.groups("momentum")[pattern.row]
+        alone &= (np.bincount(pattern.row[alone], minlength=self.settled.rows) == 1)[pattern.row]
         inertial = np.zeros(self.settled.rows, dtype=bool)
-        inertial[self.settled.pattern.row[self.settled.structural()[1]]] = True
+        inertial[pattern.row[in_rate & ~np.isin(columns, columns[alone])]] = True
         balances = {family: first for group, family, first in self.settled.form.groups if group == "dynamics"}
         mask = np.zeros(self.settled.rows, dtype=bool)
         for group, family, first in self.settled.form.groups:
