@@ -76,6 +76,7 @@ class Target:
     nest: Nest
     place: Place
     store: str = ""
+    unit: str = "1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +204,7 @@ def _dynamics(network: Network) -> Iterator[Row]:
 def _initials(network: Network) -> Iterator[Target]:
     for i in network.initials:
         nest, (target, value) = canonical(i.loops, flows(i.target), flows(i.value))
-        yield Target(target, value, i.fixed, nest, i.place, i.store)
+        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit)
 
 
 def _quantities(network: Network) -> Iterator[Quantity]:

@@ -78,7 +78,7 @@ def add_initials(
     """One row family an equation, its shape the ranges of its loops."""
     for equation in equations:
         target = equation.target
-        said = Equations("initial", "initial", equation.owner, "initial", "1", target.place, fixed=target.fixed)
+        said = Equations("initial", "initial", equation.owner, "initial", target.unit, target.place, fixed=target.fixed)
         assembly.family(replace(said, label=target.store or said.label, written=not target.store))
         at = tuple(counter(k) for k in range(len(target.nest)))
         residual = resolve(model, carriers, sub(target.target, target.value))

@@ -140,11 +140,16 @@ class Starter:
         self._momentum, self._flow = _pairs(system)
         in_y, in_rate = self.settled.structural()
         self._structural = np.concatenate([in_y, in_rate[self._rated], np.ones(self.missed.size, dtype=bool)])
-        self._family = self._families()
+        self.units = self._units()
+        self._family = np.unique(self.units, return_inverse=True)[1].astype(np.int64)
         kinds = alike(system)
         largest = kinds.max(initial=0) + 1
         self._alike = np.concatenate([kinds[: self.n], largest + kinds[self.rates], 2 * largest + self._family])
+        self.written = np.concatenate(
+            [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
+        )
         self.measured = self._measured()
+        self.idle = self._idle()
         self.moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
         self.moving[self.first :] = self._read()
 
@@ -188,15 +193,14 @@ class Starter:
                 unsaid[first : first + rows.size] = not rows.written
         return guessed, unsaid
 
-    def _families(self) -> Ints:
-        """Number of the unit of what is missed."""
-        found = np.zeros(self.settled.rows, dtype=np.int64)
-        units: dict[str, int] = {}
+    def _units(self) -> list[str]:
+        """The unit of what each guess misses."""
+        found = [""] * self.settled.rows
         for group, family, first in self.settled.form.groups:
             rows = self.settled.description.rows[family]
             if group == "initial":
-                found[first : first + rows.size] = units.setdefault(rows.unit, len(units))
-        return found[self.missed]
+                found[first : first + rows.size] = [rows.unit] * rows.size
+        return [found[row] for row in self.missed]
 
     def _measured(self) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
@@ -205,6 +209,38 @@ class Starter:
         mask[self.columns[own]] = True
         mask[self._momentum] |= mask[self._flow]
         return mask
+
+    def by_content(self, t: float, x: Floats, scale: Floats) -> Floats:
+        """Weights of guesses that are not written: contents of one unit are measured alike, flows by their momenta."""
+        families, form = self.system.description.families, self.system.form
+        flows = {f.owner: form.at[k] for k, f in enumerate(families) if f.kind == "f"}
+        own = np.full(self.system.rows, -1, dtype=np.int64)
+        effort: dict[str, str] = {}
+        for group, family, first in form.groups:
+            rows = self.system.description.rows[family]
+            if group == "dynamics":
+                effort[rows.owner] = rows.unit
+                own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
+        units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
+        names = np.concatenate([np.array(units)[self.system.family_of[: self.n]], np.full(self.rates.size, ""), self.units])
+        pattern = self.system.pattern
+        inertia = pattern.columns_of() == own[pattern.row]
+        content = np.zeros(x.size)
+        content[pattern.columns_of()[inertia]] = np.abs(self.system.jacobian(t, *self.expand(x))[1][inertia])
+        content = np.where(content > 0.0, content, 1.0)
+        _, unit = np.unique(names, return_inverse=True)
+        largest = np.zeros(int(unit.max()) + 1)
+        np.maximum.at(largest, unit, content * scale)
+        return np.asarray(_WEIGHT["unwritten"] * content * scale / largest[unit])
+
+    def _idle(self) -> Mask:
+        """Displacements that stand in constraints alone, where contents of stores are measured: they hold nothing."""
+        held = np.zeros(self.first + self.missed.size, dtype=bool)
+        if self.missed.size:
+            held[: self.n] = (self.kinds == "q") & ~self.given.written
+            elsewhere = self._structural & ~self.groups("phi")[self.rows]
+            held[self.columns[elsewhere]] = False
+        return held
 
     def _read(self) -> NDArray[np.str_]:
         """The kind of unknowns that each guess is of; none where it is of several."""
@@ -248,6 +284,10 @@ class Starter:
         carries |= self.given.written & np.isin(self.kinds, STATE)
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool), np.zeros(self.missed.size, dtype=bool)])
 
+    def carried(self) -> Ints:
+        """Flows whose momenta are unknowns, and of which nothing is written."""
+        return self._flow[~self.given.written[self._flow]]
+
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
         largest = np.zeros(int(self._alike.max(initial=0)) + 1)
@@ -286,9 +326,8 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
     """The equations `rows` in the unknowns `free`, the others as in x."""
     follows = starter.following(t, x)
     weight = np.full(x.size, _WEIGHT["unwritten"])
-    weight[: starter.n][starter.given.written] = _WEIGHT["written"]
+    weight[starter.written] = _WEIGHT["written"]
     weight[follows] = _WEIGHT["following"]
-    weight[starter.first :][~starter.unsaid[starter.missed]] = _WEIGHT["written"]
     # unknowns of one kind and unit are moved by one measure, whatever their values
     scale = starter.scale(t, x)
     weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
@@ -404,13 +443,12 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     if not gammas.any() or not implicit.any():
         return x
     bent = _bent(starter, t, x) & gammas
-    written = np.append(starter.given.written, np.zeros(x.size - starter.n, dtype=bool))
     own = bent[starter.rows] & implicit[starter.columns]
     own_rows, own_columns = starter.rows[own], starter.columns[own]
     said = np.zeros(starter.settled.rows, dtype=bool)
-    said[own_rows[written[own_columns]]] = True
+    said[own_rows[starter.written[own_columns]]] = True
     held = np.zeros(x.size, dtype=bool)
-    held[own_columns[written[own_columns] | ~said[own_rows]]] = True
+    held[own_columns[starter.written[own_columns] | ~said[own_rows]]] = True
     if not held.any():
         return x
     rows = starter.every & ~bent & ~starter.groups("gamma_rate")
@@ -434,7 +472,8 @@ def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: M
     matrices.
     """
     x = best.x
-    follows = starter.following(t, x)
+    follows = starter.following(t, x) | starter.idle
+    follows[starter.carried()] = True
     curved = np.zeros(x.size, dtype=bool)
     bent = _bent(starter, t, x) & starter.groups("phi")
     curved[starter.columns[bent[starter.rows]]] = True
@@ -443,6 +482,8 @@ def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: M
     if x.size > DENSE or not (x != guess)[state].any():
         return best
     problem = _problem(starter, t, x, guess, rows=starter.every, free=free)
+    by_content = starter.by_content(t, x, problem.scale)
+    problem = replace(problem, weight=np.where(state & ~starter.written, by_content, problem.weight))
     aim = where_light(problem, x, follows)
     moved = np.abs(aim - guess) * problem.weight / problem.scale
     aim = np.where(moved > BACK * _WEIGHT["unwritten"], aim, guess)

@@ -1,7 +1,8 @@
 """Initial conditions of a network as those of its coordinates; stores in series that start with different contents.
 
 In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + c, with c its own
-initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`.
+initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`; a dynamic variable
+of rate zero where not all of these are fixed, for the start to choose.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from sysdyn.compiler.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.primal.choices import own
 from sysdyn.compiler.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.primal.integrals import line
+from sysdyn.compiler.primal.overlaps import cut_off
 from sysdyn.compiler.primal.reading import Piece, Ranges, Reader, touches_network
 from sysdyn.compiler.primal.series import Member
 from sysdyn.dsl.expression import (
@@ -30,7 +32,7 @@ from sysdyn.dsl.expression import (
     var,
     variables,
 )
-from sysdyn.dsl.network import Branch, Initial, Loop, Network, Parameter
+from sysdyn.dsl.network import Branch, Dynamic, Initial, Loop, Network, Parameter, State
 
 
 def charge(branch: Branch, effort: Node) -> Node | None:
@@ -89,6 +91,8 @@ class Contents:
         self.members = members
         self.initials = initials
         self.parameters: list[Parameter] = []
+        self.states: list[State] = []
+        self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box, Node]]] = {}
         self._pinned: set[Node] = set()
         for initial in initials:
@@ -155,11 +159,26 @@ class Contents:
             value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
         if is_const(value, 0.0):
             return
-        taken, stem = {p.name for p in self.parameters}, f"{element.name}.content"
+        taken = {p.name for p in (*self.parameters, *self.states)}
+        stem, place = f"{element.name}.content", element.branch.place
         name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
         unit, shape = element.branch.domain.displacement, shape_of(element.named)
-        self.parameters.append(Parameter(name, shape, unit, (value,), counters, element.branch.place))
-        self.reader.book.contents[element.number] = name
+        fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
+        self.reader.book.contents[element.number] = name, fixed
+        if fixed:
+            self.parameters.append(Parameter(name, shape, unit, (value,), counters, place))
+            return
+        loops = tuple(Loop(c, low, high) for c, (low, high) in zip(counters, shape, strict=True))
+        self.states.append(State(name, shape, unit, place))
+        self.dynamics.append(Dynamic(var(name, "s", *at), const(0.0), loops, place))
+
+    def _fixed(self, name: str, box: Box) -> bool:
+        """Whether the text fixes the contents of all these elements."""
+        left = [box]
+        for initial, said, _ in self._given.get(name, ()):
+            if initial.fixed:
+                left = [part for rest in left for part in cut_off(rest, said)]
+        return not left
 
     # -- initial conditions -------------------------------------------------------------------------------------
 
@@ -198,6 +217,11 @@ class Contents:
             piece = self.reader.piece(target.data[0], target.args, ranges)
         if piece is not None and piece.member is not None and self._charge(piece, initial) is not None:
             m = piece.member
+            if not self.reader.book.contents.get(piece.element.number, ("", True))[1]:
+                moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
+                content = self._charge(piece, initial)
+                assert content is not None
+                return "pin", moved, content
             q = var(m.coordinate, "q", *m.indices(target.args))
             first = self.start(m.leader.name, m.leader_at(target.args))
             if m.leads and len(m.index) == len(target.args):
@@ -225,6 +249,12 @@ def _pin(target: Node, value: Node) -> tuple[Node, Node]:
         if straight is not None:
             return unknowns[0], straight.inverse(value)
     return target, value
+
+
+def _led_by(m: Member) -> Box:
+    """The elements of the leader that a member follows."""
+    pairs = ((None if k is None else m.box[k], c) for k, c in m.leader_index)
+    return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
 
 
 def _follows(m: Member) -> bool:

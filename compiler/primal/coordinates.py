@@ -47,7 +47,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
         parameters=(*network.parameters, *contents.parameters),
         coordinates=(*network.coordinates, *_node_coordinates(network), *classes.coordinates),
         unknowns=(*network.unknowns, *said.unknowns.values()),
-        states=(*network.states, *said.states.values()),
+        states=(*network.states, *said.states.values(), *contents.states),
         initials=(*contents.resolved(), *unsaid(network, initials, sizes, reader, reflected=reflected)),
         nodes=(),
         branches=(),
@@ -57,6 +57,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
         read=frozenset(),
         **_statements(network, said, nodes.constraints, reader),
     )
+    found = replace(found, dynamics=(*found.dynamics, *contents.dynamics))
     return found, tuple(said.notes), account(network, classes, nodes)
 
 

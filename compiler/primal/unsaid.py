@@ -31,14 +31,15 @@ def unsaid(
     for b in network.branches:
         if b.kind not in _CONTENT or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
             continue
+        unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
         for _, content in _contents(b, b.loops, reader):
             read = _unknowns(content)
             if len(read) > 1:
                 shared |= _owners(read)
         for part in _parts(b, initials, sizes):
             for loops, content in _contents(b, part, reader):
-                unsaid = Initial(content, const(0.0), False, loops, b.place, b.name)
-                found.append((unsaid, _owners(_unknowns(content))))
+                guess = Initial(content, const(0.0), False, loops, b.place, b.name, unit.text)
+                found.append((guess, _owners(_unknowns(content))))
     shared -= _written(network.energies)
     yield from (initial for initial, owners in found if owners & shared)
 
