@@ -285,8 +285,8 @@ class Starter:
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool), np.zeros(self.missed.size, dtype=bool)])
 
     def carried(self) -> Ints:
-        """Flows whose momenta are unknowns, and of which nothing is written."""
-        return self._flow[~self.given.written[self._flow]]
+        """Of flows with momenta: the momentum where the flow is written, else the flow."""
+        return np.where(self.given.written[self._flow], self._momentum, self._flow)
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
