@@ -28,6 +28,7 @@ def unsaid(
     """
     found: list[tuple[Initial, set[str]]] = []
     shared: set[str] = set()
+    known = {initial.store for initial in initials}
     for b in network.branches:
         if b.kind not in _CONTENT or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
             continue
@@ -36,7 +37,7 @@ def unsaid(
             read = _unknowns(content)
             if len(read) > 1:
                 shared |= _owners(read)
-        for part in _parts(b, initials, sizes):
+        for part in () if b.name in known else _parts(b, initials, sizes):
             for loops, content in _contents(b, part, reader):
                 guess = Initial(content, const(0.0), False, loops, b.place, b.name, unit.text)
                 found.append((guess, _owners(_unknowns(content))))
