@@ -107,6 +107,17 @@ def _pairs(system: System) -> tuple[Ints, Ints]:
     return momenta, np.concatenate([nothing, *(places - places[:1] + first for places, first in found)])
 
 
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    """Rows [k] that hold weights [k, n] times the rows `of` [n] instead; entries of these, and the n of each."""
+
+    rows: Ints
+    of: Ints
+    weights: Floats
+    entries: Ints
+    place: Ints
+
+
 class Starter:
     """The equations of the start of one model (t0 apart).
 
@@ -122,9 +133,10 @@ class Starter:
         self.n = system.form.written
         self._momenta = _of_groups(system, ("momentum",))
         self.guessed, self.unsaid = self._guessed()
-        measuring = measuring and bool(self.unsaid.any())
+        starting, measuring = measuring, measuring and bool(self.unsaid.any())
         self.missed = np.flatnonzero(self.guessed & measuring)
-        self.every = ~self._unsettled()  # rows that must hold
+        unsettled = self._unsettled()
+        self.every = ~unsettled  # rows that must hold
         if not measuring:
             self.every &= ~self.guessed
         self.kinds = system.kinds[: self.n]
@@ -140,6 +152,14 @@ class Starter:
         self._momentum, self._flow = _pairs(system)
         in_y, in_rate = self.settled.structural()
         self._structural = np.concatenate([in_y, in_rate[self._rated], np.ones(self.missed.size, dtype=bool)])
+        self._sums = self._floating(np.flatnonzero(unsettled)) if starting else None
+        if self._sums is not None:
+            self.every[self._sums.rows] = True
+            self.rows = np.concatenate([self.rows, np.repeat(self._sums.rows, self._sums.entries.size)])
+            columns = self.columns[self._sums.entries]
+            self.columns = np.concatenate([self.columns, np.tile(columns, self._sums.rows.size)])
+            more = self._structural[self._sums.entries]
+            self._structural = np.concatenate([self._structural, np.tile(more, self._sums.rows.size)])
         self.units = self._units()
         self._family = np.unique(self.units, return_inverse=True)[1].astype(np.int64)
         kinds = alike(system)
@@ -165,12 +185,19 @@ class Starter:
         """All rows [rows]."""
         rows = self.settled.residual(t, *self.expand(x))
         rows[self.missed] -= x[self.first :]
+        if self._sums is not None:
+            rows[self._sums.rows] = self._sums.weights @ rows[self._sums.of]
         return rows
 
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
         jy, jyd = self.settled.jacobian(t, *self.expand(x))
-        return np.concatenate([jy, jyd[self._rated], np.full(self.missed.size, -1.0)])
+        values = np.concatenate([jy, jyd[self._rated], np.full(self.missed.size, -1.0)])
+        if self._sums is None:
+            return values
+        summed = self._sums.weights[:, self._sums.place] * values[self._sums.entries]
+        values[self._sums.entries] = 0.0
+        return np.concatenate([values, summed.ravel()])
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups."""
@@ -192,6 +219,50 @@ class Starter:
                 guessed[first : first + rows.size] = True
                 unsaid[first : first + rows.size] = not rows.written
         return guessed, unsaid
+
+    def _floating(self, unsettled: Ints) -> _Sums | None:
+        """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
+
+        They are taken from the matrix of inertia at two points: what moves with the state is left out.
+        """
+        if not 0 < unsettled.size <= DENSE:
+            return None
+        matrix = np.hstack([self._inertia(unsettled, shift) for shift in (0.0, 0.1)])
+        if not np.isfinite(matrix).all():
+            return None
+        size = np.abs(matrix).max(axis=0)
+        left, sigma, _ = np.linalg.svd(matrix / np.where(size > 0.0, size, 1.0))
+        weights = left[:, int((sigma > 1e-10 * sigma.max(initial=0.0)).sum()) :].T
+        if not weights.size:
+            return None
+        number = np.full(self.settled.rows, -1, dtype=np.int64)
+        number[unsettled] = np.arange(unsettled.size)
+        entries = np.flatnonzero(number[self.rows] >= 0)
+        return _Sums(unsettled[: len(weights)], unsettled, weights, entries, number[self.rows[entries]])
+
+    def _inertia(self, unsettled: Ints, shift: float) -> Floats:
+        """The matrix of inertia beside a state [dynamics_rate rows, flows]: of f' in the balances, of f in momenta."""
+        form, families = self.settled.form, self.settled.description.rows
+        first = {(group, families[k].owner): place for group, k, place in form.groups}
+        y = self.given.guess + shift * (1.0 + np.abs(self.given.guess)) * np.cos(np.arange(self.n))
+        jy, jyd = self.settled.jacobian(0.0, y, np.zeros(self.n))
+        matrix = np.zeros((self.settled.rows, self.n))
+        pattern = self.settled.pattern
+        columns = pattern.columns_of()
+        flows = (self.kinds == "f")[columns]
+        np.add.at(matrix, (pattern.row[flows], columns[flows]), jyd[flows])
+        carried = flows & self.groups("momentum")[pattern.row]
+        np.add.at(matrix, (pattern.row[carried], columns[carried]), -jy[carried])
+        found = np.zeros((unsettled.size, self.n))
+        for group, k, place in form.groups:
+            if group != "dynamics_rate":
+                continue
+            mine = np.flatnonzero((unsettled >= place) & (unsettled < place + families[k].size))
+            for base in ("dynamics", "momentum"):
+                at = first.get((base, families[k].owner))
+                if at is not None:
+                    found[mine] += matrix[at + unsettled[mine] - place]
+        return found
 
     def _units(self) -> list[str]:
         """The unit of what each guess misses."""
@@ -218,7 +289,7 @@ class Starter:
         effort: dict[str, str] = {}
         for group, family, first in form.groups:
             rows = self.system.description.rows[family]
-            if group == "dynamics":
+            if group == "dynamics" and rows.owner in flows:
                 effort[rows.owner] = rows.unit
                 own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
