@@ -60,6 +60,7 @@ class Equations:
     rate: bool = True  # whether every row of it has its time derivative as a block
     stored: bool = False  # a traced quantity (of block observe)
     fixed: bool = False  # of block initial
+    written: bool = True  # of block initial: whether the text says it
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,13 +68,15 @@ class Offset:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """`init`: target = value (fixed) or ~ value, for all iterations of the nest."""
+    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; store: whose content, where unsaid."""
 
     target: Node
     value: Node
     fixed: bool
     nest: Nest
     place: Place
+    store: str = ""
+    unit: str = "1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +204,7 @@ def _dynamics(network: Network) -> Iterator[Row]:
 def _initials(network: Network) -> Iterator[Target]:
     for i in network.initials:
         nest, (target, value) = canonical(i.loops, flows(i.target), flows(i.value))
-        yield Target(target, value, i.fixed, nest, i.place)
+        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit)
 
 
 def _quantities(network: Network) -> Iterator[Quantity]:

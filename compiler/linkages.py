@@ -2,23 +2,25 @@
 
 In the complementary family a common-effort node has one momentum, and a store between two nodes holds their difference.
 Around a loop of stores the initial momenta need not add up to zero: each store of such a part of the network then holds
-the difference and a constant, its own initial momentum (the reflection of language, section 11, 11).
+the difference and a constant, its own initial momentum (the reflection of language, section 11, 11).  A store in such a
+loop that nothing is said of, beside one of which something is, has a dynamic variable of rate zero for it, which the
+start chooses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.initially import initially
 from sysdyn.compiler.primal.integrals import line
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.expression import Node
-from sysdyn.dsl.network import Branch, Initial, Network, Parameter
+from sysdyn.dsl.network import Branch, Dynamic, Initial, Network, Parameter, Shape, State
 
 
 def with_linkages(network: Network) -> Network:
-    """The network with a parameter `branch.linkage` for each store of a loop that starts with a momentum."""
+    """The network with a constant `branch.linkage` for each store of a loop that starts with a momentum, or may."""
     given: dict[str, list[Initial]] = {}
     for initial in network.initials:
         if initial.target.op == "var" and initial.target.data[1:] in (("bf", 0), ("bp", 0)):
@@ -26,47 +28,62 @@ def with_linkages(network: Network) -> Network:
     kinetic = [b for b in network.branches if b.kind == "kinetic" and b.domain.common == "effort"]
     stores = [b for b in kinetic if b.minus is not None]
     parameters: dict[str, Parameter] = {}
-    for branch in _in_loops(stores):
+    looped = [b for b in _in_loops(stores) if sum(b.name == other.name for other in network.branches) == 1]
+    for branch in looped:
         momentum = _momentum(branch, given.get(branch.name, ()))
-        alone = sum(b.name == branch.name for b in network.branches) == 1
-        if momentum is not None and alone:
-            shape = tuple((loop.first, loop.last) for loop in branch.loops)
+        if momentum is not None:
             counters = tuple(loop.index for loop in branch.loops)
             name, unit = f"{branch.name}.linkage", branch.domain.momentum
-            parameters[branch.name] = Parameter(name, shape, unit, (momentum,), counters, branch.place)
+            parameters[branch.name] = Parameter(name, _shape(branch), unit, (momentum,), counters, branch.place)
     if not parameters:
         return network
+    free = {b.name: b for b in looped if b.name not in given and b.law is not None and _closes(b, stores)}
+
+    constants = {*parameters, *free}
+
+    def constant(name: str, at: tuple[Node, ...]) -> Node:
+        if name in free:
+            return ex.var(f"{name}.linkage", "s", *at)
+        return ex.param(parameters[name].name, *at)
 
     def held(root: Node) -> Node:
         """Momenta of these stores as the node's difference and the constant."""
         change = {
-            n: ex.add(n, _constant(parameters, n.data[0], n.args))
+            n: ex.add(n, constant(n.data[0], n.args))
             for n in ex.topological([root])
-            if n.op == "var" and n.data[1:] == ("bp", 0) and n.data[0] in parameters
+            if n.op == "var" and n.data[1:] == ("bp", 0) and n.data[0] in constants
         }
         return ex.substitute(root, change) if change else root
 
     def law(branch: Branch) -> Branch:
-        if branch.name not in parameters or branch.law is None:
+        if branch.name not in constants or branch.law is None:
             return replace(branch, law=None if branch.law is None else held(branch.law))
         if branch.side == "p":
-            return replace(branch, law=ex.sub(held(branch.law), _constant(parameters, branch.name, branch.at)))
+            return replace(branch, law=ex.sub(held(branch.law), constant(branch.name, branch.at)))
         return replace(branch, law=held(branch.law))
 
     def start(initial: Initial) -> Initial:
         target = initial.target
         if target.op == "var" and target.data[1:] == ("bp", 0) and target.data[0] in parameters:
-            constant = _constant(parameters, target.data[0], target.args)
-            return replace(initial, value=ex.sub(initial.value, constant))
+            return replace(initial, value=ex.sub(initial.value, constant(target.data[0], target.args)))
         return replace(initial, target=held(target))
+
+    def unsaid(branch: Branch) -> Initial:
+        content = held(ex.var(branch.name, "bp", *branch.at))
+        zero, unit = ex.const(0.0), branch.domain.momentum.text
+        return Initial(content, zero, False, branch.loops, branch.place, branch.name, unit)
 
     return replace(
         network,
         parameters=(*network.parameters, *parameters.values()),
         branches=tuple(law(b) for b in network.branches),
-        initials=tuple(start(i) for i in network.initials),
+        initials=(*(start(i) for i in network.initials), *(unsaid(b) for b in free.values())),
+        states=(*network.states, *(State(f"{n}.linkage", _shape(b), b.domain.momentum, b.place) for n, b in free.items())),
         constraints=tuple(replace(c, expression=held(c.expression)) for c in network.constraints),
-        dynamics=tuple(replace(d, expression=held(d.expression)) for d in network.dynamics),
+        dynamics=(
+            *(replace(d, expression=held(d.expression)) for d in network.dynamics),
+            *(Dynamic(constant(b.name, b.at), ex.const(0.0), b.loops, b.place) for b in free.values()),
+        ),
         observations=tuple(replace(o, expression=held(o.expression)) for o in network.observations),
         expectations=tuple(
             replace(e, left=held(e.left), right=held(e.right), within=None if e.within is None else held(e.within))
@@ -75,8 +92,19 @@ def with_linkages(network: Network) -> Network:
     )
 
 
-def _constant(parameters: dict[str, Parameter], name: str, at: tuple[Node, ...]) -> Node:
-    return ex.param(parameters[name].name, *at)
+def _shape(branch: Branch) -> Shape:
+    return tuple((loop.first, loop.last) for loop in branch.loops)
+
+
+def _closes(branch: Branch, stores: Sequence[Branch]) -> bool:
+    """Whether other stores lead from one end of a branch to the other, by families of nodes."""
+    pairs = [{_family(b, t) for t in (b.plus, b.minus)} for b in stores if b is not branch]
+    reached, goal = {_family(branch, branch.plus)}, _family(branch, branch.minus)
+    if goal in reached:
+        return reached in pairs
+    while found := [pair for pair in pairs if pair & reached and pair - reached]:
+        reached.update(*found)
+    return goal in reached
 
 
 def _in_loops(stores: Sequence[Branch]) -> list[Branch]:

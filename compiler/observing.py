@@ -7,7 +7,7 @@ dropped; anything else is an equation on the initial state, a row of block `init
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sysdyn.compiler.assembly import Assembly
 from sysdyn.compiler.descriptor import Equations, Pin, Unknowns
@@ -61,7 +61,7 @@ def pins_and_equations(
     equations: list[Equation] = []
     for target in model.initials:
         node = target.target
-        if node.op == "var" and node.data[2] == 0 and not variables(target.value):
+        if node.op == "var" and node.data[2] == 0 and not variables(target.value) and not target.store:
             if node.data[:2] in numbers:
                 family = numbers[node.data[:2]]
                 pins.append(Pin(family, node.args, target.value, target.fixed, target.nest, target.place))
@@ -78,8 +78,8 @@ def add_initials(
     """One row family an equation, its shape the ranges of its loops."""
     for equation in equations:
         target = equation.target
-        family = Equations("initial", "initial", equation.owner, "initial", "1", target.place, fixed=target.fixed)
-        assembly.family(family)
+        said = Equations("initial", "initial", equation.owner, "initial", target.unit, target.place, fixed=target.fixed)
+        assembly.family(replace(said, label=target.store or said.label, written=not target.store))
         at = tuple(counter(k) for k in range(len(target.nest)))
         residual = resolve(model, carriers, sub(target.target, target.value))
         for term in without_nested(split(residual, target.nest, target.place), "an initial condition"):

@@ -237,6 +237,7 @@ class Initial:
     """target = value (fixed) or ~ value (a guess) at the start; target may be any expression of the unknowns.
 
     Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
+    store: whose content that is, where no text says it; unit: of a displacement, of the rate of a momentum.
     """
 
     target: Node
@@ -244,6 +245,8 @@ class Initial:
     fixed: bool
     loops: tuple[Loop, ...]
     place: Place
+    store: str = ""
+    unit: str = "1"
 
 
 @dataclass(frozen=True, slots=True)

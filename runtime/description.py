@@ -74,7 +74,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class RowFamily:
-    """Rows of one label.  name, stored, rate: of the rows of block observe; fixed: of block initial."""
+    """Rows of one label.  name, stored, rate: of the rows of block observe; fixed, written: of block initial."""
 
     block: str
     label: str
@@ -88,6 +88,7 @@ class RowFamily:
     stored: bool
     rate: bool
     fixed: bool
+    written: bool
 
     @property
     def size(self) -> int:
@@ -200,6 +201,7 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
         stored=bool(value.get("stored", True)),
         rate=bool(value.get("rate", False)),
         fixed=bool(value.get("fixed", True)),
+        written=bool(value.get("written", True)),
     )
 
 

@@ -24,6 +24,8 @@ EPS = 1e-13
 """Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
+_LIGHT = 1e-9
+"""The same of unknowns without magnitudes."""
 _ITERATIONS = 60
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
@@ -178,6 +180,26 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         x = tried
     return best
+
+
+def where_light(problem: Problem, x: Floats, light: Mask) -> Floats:
+    """The point nearest to problem.guess by the rows linearised at x, full matrices; moves of the light unknowns cost
+    nothing, and these stay as in x.
+    """
+    linear, light = _Linear(problem, x), light[problem.free]
+    a = np.zeros(linear.shape)
+    i, j, v = linear.entries
+    np.add.at(a, (i, j), v)
+    u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
+    aim = a[:, ~light] @ u[~light] - (problem.residual(x) * linear.row_scale)[problem.use]
+    size = np.abs(a[:, light]).max(axis=0, initial=0.0)
+    left, sigma, _ = np.linalg.svd(a[:, light] / np.where(size > 0.0, size, 1.0))
+    rest = left[:, int((sigma > _LIGHT * sigma.max(initial=0.0)).sum()) :].T
+    heavy = np.flatnonzero(problem.free)[~light]
+    u = np.linalg.lstsq(rest @ a[:, ~light], rest @ aim, rcond=RANK)[0]
+    found = x.copy()
+    found[heavy] = problem.guess[heavy] + u * linear.unit[heavy]
+    return found
 
 
 def least_residual(problem: Problem, x: Floats) -> Floats:

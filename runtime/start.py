@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve
+from sysdyn.runtime.least_change import DENSE, Problem, Solution, least_residual, solve, where_light
 from sysdyn.runtime.scales import alike, group_maximum, propagate
 from sysdyn.runtime.settled import rates_of
 from sysdyn.runtime.system import System
@@ -32,6 +32,7 @@ _FEW = 3
 EXACT = 1e-9
 OWN = 1e-6
 NOISE = 1e-13
+BACK = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,48 +107,97 @@ def _pairs(system: System) -> tuple[Ints, Ints]:
     return momenta, np.concatenate([nothing, *(places - places[:1] + first for places, first in found)])
 
 
-class Starter:
-    """The equations of the start of one model (t0 apart)."""
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    """Rows [k] that hold weights [k, n] times the rows `of` [n] instead; entries of these, and the n of each."""
 
-    def __init__(self, system: System) -> None:
+    rows: Ints
+    of: Ints
+    weights: Floats
+    entries: Ints
+    place: Ints
+
+
+class Starter:
+    """The equations of the start of one model (t0 apart).
+
+    measuring: where contents of stores are guessed, guessed expressions hold but for an unknown of their own each,
+    behind those of y and its rates.
+    """
+
+    def __init__(self, system: System, *, measuring: bool = False) -> None:
         self.system = system
         self.settled = system.another("start")
         self.rates = rates_of(self.settled)
         self.given = _given(system)
-        kinds = alike(system)
-        self._alike = np.concatenate([kinds[: system.form.written], kinds.max(initial=0) + 1 + kinds[self.rates]])
         self.n = system.form.written
-        self.guessed = self._guessed()
-        self.every = ~self.guessed & ~self._unsettled()  # rows that must hold
+        self._momenta = _of_groups(system, ("momentum",))
+        self.guessed, self.unsaid = self._guessed()
+        starting, measuring = measuring, measuring and bool(self.unsaid.any())
+        self.missed = np.flatnonzero(self.guessed & measuring)
+        unsettled = self._unsettled()
+        self.every = ~unsettled  # rows that must hold
+        if not measuring:
+            self.every &= ~self.guessed
         self.kinds = system.kinds[: self.n]
         pattern = self.settled.pattern
         columns = pattern.columns_of()
         rate_at = np.full(self.n, -1, dtype=np.int64)
         rate_at[self.rates] = self.n + np.arange(self.rates.size)
         self._rated = rate_at[columns] >= 0
-        self.rows = np.concatenate([pattern.row, pattern.row[self._rated]]).astype(np.int64)
-        self.columns = np.concatenate([columns, rate_at[columns[self._rated]]])
+        self.first = self.n + self.rates.size  # place of the first that is missed
+        places = self.first + np.arange(self.missed.size)
+        self.rows = np.concatenate([pattern.row, pattern.row[self._rated], self.missed]).astype(np.int64)
+        self.columns = np.concatenate([columns, rate_at[columns[self._rated]], places])
         self._momentum, self._flow = _pairs(system)
-        self._momenta = _of_groups(system, ("momentum",))
         in_y, in_rate = self.settled.structural()
-        self._structural = np.concatenate([in_y, in_rate[self._rated]])
+        self._structural = np.concatenate([in_y, in_rate[self._rated], np.ones(self.missed.size, dtype=bool)])
+        self._sums = self._floating(np.flatnonzero(unsettled)) if starting else None
+        if self._sums is not None:
+            self.every[self._sums.rows] = True
+            self.rows = np.concatenate([self.rows, np.repeat(self._sums.rows, self._sums.entries.size)])
+            columns = self.columns[self._sums.entries]
+            self.columns = np.concatenate([self.columns, np.tile(columns, self._sums.rows.size)])
+            more = self._structural[self._sums.entries]
+            self._structural = np.concatenate([self._structural, np.tile(more, self._sums.rows.size)])
+        self.units = self._units()
+        self._family = np.unique(self.units, return_inverse=True)[1].astype(np.int64)
+        kinds = alike(system)
+        largest = kinds.max(initial=0) + 1
+        self._alike = np.concatenate([kinds[: self.n], largest + kinds[self.rates], 2 * largest + self._family])
+        self.written = np.concatenate(
+            [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
+        )
+        self.measured = self._measured()
+        self.idle = self._idle()
+        self.moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
+        self.moving[self.first :] = self._read()
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
         y, yd = x[: self.n].copy(), np.zeros(self.n)
-        yd[self.rates] = x[self.n :]
+        yd[self.rates] = x[self.n : self.first]
         form = self.system.form
         yd[form.k_q] = y[form.k_f]
         return y, yd
 
     def residual(self, t: float, x: Floats) -> Floats:
         """All rows [rows]."""
-        return self.settled.residual(t, *self.expand(x))
+        rows = self.settled.residual(t, *self.expand(x))
+        rows[self.missed] -= x[self.first :]
+        if self._sums is not None:
+            rows[self._sums.rows] = self._sums.weights @ rows[self._sums.of]
+        return rows
 
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
         jy, jyd = self.settled.jacobian(t, *self.expand(x))
-        return np.concatenate([jy, jyd[self._rated]])
+        values = np.concatenate([jy, jyd[self._rated], np.full(self.missed.size, -1.0)])
+        if self._sums is None:
+            return values
+        summed = self._sums.weights[:, self._sums.place] * values[self._sums.entries]
+        values[self._sums.entries] = 0.0
+        return np.concatenate([values, summed.ravel()])
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups."""
@@ -155,24 +205,134 @@ class Starter:
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
-        outside = np.append(~np.isin(self.kinds, kinds), np.ones(self.rates.size, dtype=bool))
+        outside = ~np.isin(self.moving, kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
         mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
 
-    def _guessed(self) -> Mask:
-        """Rows of block initial that are guesses."""
-        mask = np.zeros(self.settled.rows, dtype=bool)
+    def _guessed(self) -> tuple[Mask, Mask]:
+        """Rows of block initial that are guesses, and those of them that no text says."""
+        guessed, unsaid = (np.zeros(self.settled.rows, dtype=bool) for _ in range(2))
         for group, family, first in self.settled.form.groups:
             rows = self.settled.description.rows[family]
             if group == "initial" and not rows.fixed:
-                mask[first : first + rows.size] = True
+                guessed[first : first + rows.size] = True
+                unsaid[first : first + rows.size] = not rows.written
+        return guessed, unsaid
+
+    def _floating(self, unsettled: Ints) -> _Sums | None:
+        """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
+
+        They are taken from the matrix of inertia at two points: what moves with the state is left out.
+        """
+        if not 0 < unsettled.size <= DENSE:
+            return None
+        matrix = np.hstack([self._inertia(unsettled, shift) for shift in (0.0, 0.1)])
+        if not np.isfinite(matrix).all():
+            return None
+        size = np.abs(matrix).max(axis=0)
+        left, sigma, _ = np.linalg.svd(matrix / np.where(size > 0.0, size, 1.0))
+        weights = left[:, int((sigma > 1e-10 * sigma.max(initial=0.0)).sum()) :].T
+        if not weights.size:
+            return None
+        number = np.full(self.settled.rows, -1, dtype=np.int64)
+        number[unsettled] = np.arange(unsettled.size)
+        entries = np.flatnonzero(number[self.rows] >= 0)
+        return _Sums(unsettled[: len(weights)], unsettled, weights, entries, number[self.rows[entries]])
+
+    def _inertia(self, unsettled: Ints, shift: float) -> Floats:
+        """The matrix of inertia beside a state [dynamics_rate rows, flows]: of f' in the balances, of f in momenta."""
+        form, families = self.settled.form, self.settled.description.rows
+        first = {(group, families[k].owner): place for group, k, place in form.groups}
+        y = self.given.guess + shift * (1.0 + np.abs(self.given.guess)) * np.cos(np.arange(self.n))
+        jy, jyd = self.settled.jacobian(0.0, y, np.zeros(self.n))
+        matrix = np.zeros((self.settled.rows, self.n))
+        pattern = self.settled.pattern
+        columns = pattern.columns_of()
+        flows = (self.kinds == "f")[columns]
+        np.add.at(matrix, (pattern.row[flows], columns[flows]), jyd[flows])
+        carried = flows & self.groups("momentum")[pattern.row]
+        np.add.at(matrix, (pattern.row[carried], columns[carried]), -jy[carried])
+        found = np.zeros((unsettled.size, self.n))
+        for group, k, place in form.groups:
+            if group != "dynamics_rate":
+                continue
+            mine = np.flatnonzero((unsettled >= place) & (unsettled < place + families[k].size))
+            for base in ("dynamics", "momentum"):
+                at = first.get((base, families[k].owner))
+                if at is not None:
+                    found[mine] += matrix[at + unsettled[mine] - place]
+        return found
+
+    def _units(self) -> list[str]:
+        """The unit of what each guess misses."""
+        found = [""] * self.settled.rows
+        for group, family, first in self.settled.form.groups:
+            rows = self.settled.description.rows[family]
+            if group == "initial":
+                found[first : first + rows.size] = [rows.unit] * rows.size
+        return [found[row] for row in self.missed]
+
+    def _measured(self) -> Mask:
+        """Unknowns of y that the contents of stores measure; a momentum with its flow."""
+        mask = np.zeros(self.n, dtype=bool)
+        own = self._structural & np.isin(self.rows, self.missed) & (self.columns < self.n)
+        mask[self.columns[own]] = True
+        mask[self._momentum] |= mask[self._flow]
         return mask
 
+    def by_content(self, t: float, x: Floats, scale: Floats) -> Floats:
+        """Weights of guesses that are not written: contents of one unit are measured alike, flows by their momenta."""
+        families, form = self.system.description.families, self.system.form
+        flows = {f.owner: form.at[k] for k, f in enumerate(families) if f.kind == "f"}
+        own = np.full(self.system.rows, -1, dtype=np.int64)
+        effort: dict[str, str] = {}
+        for group, family, first in form.groups:
+            rows = self.system.description.rows[family]
+            if group == "dynamics" and rows.owner in flows:
+                effort[rows.owner] = rows.unit
+                own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
+        units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
+        names = np.concatenate([np.array(units)[self.system.family_of[: self.n]], np.full(self.rates.size, ""), self.units])
+        pattern = self.system.pattern
+        inertia = pattern.columns_of() == own[pattern.row]
+        content = np.zeros(x.size)
+        content[pattern.columns_of()[inertia]] = np.abs(self.system.jacobian(t, *self.expand(x))[1][inertia])
+        content = np.where(content > 0.0, content, 1.0)
+        _, unit = np.unique(names, return_inverse=True)
+        largest = np.zeros(int(unit.max()) + 1)
+        np.maximum.at(largest, unit, content * scale)
+        return np.asarray(_WEIGHT["unwritten"] * content * scale / largest[unit])
+
+    def _idle(self) -> Mask:
+        """Displacements that stand in constraints alone, where contents of stores are measured: they hold nothing."""
+        held = np.zeros(self.first + self.missed.size, dtype=bool)
+        if self.missed.size:
+            held[: self.n] = (self.kinds == "q") & ~self.given.written
+            elsewhere = self._structural & ~self.groups("phi")[self.rows]
+            held[self.columns[elsewhere]] = False
+        return held
+
+    def _read(self) -> NDArray[np.str_]:
+        """The kind of unknowns that each guess is of; none where it is of several."""
+        found = np.full(self.settled.rows, "", dtype=self.moving.dtype)
+        many = np.zeros(self.settled.rows, dtype=bool)
+        read = self._structural & (self.columns < self.first)
+        for kind in np.unique(self.moving[: self.first]):
+            rows = self.rows[read & (self.moving[self.columns] == kind)]
+            many[rows] |= found[rows] != ""
+            found[rows] = kind
+        return np.where(many, "", found)[self.missed]
+
     def _unsettled(self) -> Mask:
-        """Rates of balances with inertia: the start does not know them."""
+        """Rates of balances with inertia: the start does not know them.  A momentum that nothing moves with is none."""
+        pattern = self.settled.pattern
+        in_y, in_rate = self.settled.structural()
+        columns = pattern.columns_of()
+        alone = in_y & self.groups("momentum")[pattern.row]
+        alone &= (np.bincount(pattern.row[alone], minlength=self.settled.rows) == 1)[pattern.row]
         inertial = np.zeros(self.settled.rows, dtype=bool)
-        inertial[self.settled.pattern.row[self.settled.structural()[1]]] = True
+        inertial[pattern.row[in_rate & ~np.isin(columns, columns[alone])]] = True
         balances = {family: first for group, family, first in self.settled.form.groups if group == "dynamics"}
         mask = np.zeros(self.settled.rows, dtype=bool)
         for group, family, first in self.settled.form.groups:
@@ -191,8 +351,13 @@ class Starter:
         pattern = self.system.pattern
         inert = pattern.columns_of()[(jy != 0.0) & self._momenta[pattern.row]]
         carries[np.intersect1d(self._flow[carries[self._momentum]], inert)] = True
+        carries &= ~self.measured
         carries |= self.given.written & np.isin(self.kinds, STATE)
-        return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool)])
+        return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool), np.zeros(self.missed.size, dtype=bool)])
+
+    def carried(self) -> Ints:
+        """Of flows with momenta: the momentum where the flow is written, else the flow."""
+        return np.where(self.given.written[self._flow], self._momentum, self._flow)
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
@@ -208,6 +373,8 @@ class Starter:
         values = np.abs(self.jacobian(t, x))
         free = np.abs(self.residual(t, x))
         values, free = (np.where(np.isfinite(item), item, 0.0) for item in (values, free))
+        told = values * np.isin(self.rows, self.missed)
+        values = values - told
         # how fast what follows from the state moves says nothing of its size
         sizes = ~self.groups("dynamics_rate")[self.rows]
         found = propagate(known, self.rows[sizes], self.columns[sizes], values[sizes], free, self._alike)
@@ -217,6 +384,12 @@ class Starter:
             found[members] = np.maximum(found[members], 1e-3 * largest)
         found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
         found = propagate(found, self.rows, self.columns, values, free, self._alike)
+        # guesses of one unit are measured alike
+        size, largest = np.zeros(self.settled.rows), np.zeros(int(self._family.max(initial=0)) + 1)
+        own = self.columns < self.first
+        np.add.at(size, self.rows[own], (told * found[self.columns])[own])
+        np.maximum.at(largest, self._family, size[self.missed])
+        found[self.first :] = largest[self._family]
         return np.where(found > 1e-280, found, 1.0)
 
 
@@ -224,7 +397,7 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
     """The equations `rows` in the unknowns `free`, the others as in x."""
     follows = starter.following(t, x)
     weight = np.full(x.size, _WEIGHT["unwritten"])
-    weight[: starter.n][starter.given.written] = _WEIGHT["written"]
+    weight[starter.written] = _WEIGHT["written"]
     weight[follows] = _WEIGHT["following"]
     # unknowns of one kind and unit are moved by one measure, whatever their values
     scale = starter.scale(t, x)
@@ -245,9 +418,10 @@ def _problem(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask
 
 def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
-    if not starter.guessed.any():
+    written = starter.guessed & ~starter.unsaid
+    if not written.any():
         return guess
-    rows = starter.guessed | starter.groups("phi", "psi")
+    rows = written | starter.groups("phi", "psi")
     free = free & (np.arange(free.size) < starter.n)
     found = solve(_problem(starter, t, guess, guess, rows=rows, free=free), guess)
     return found.x if np.isfinite(found.residual) else guess
@@ -258,14 +432,13 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
     What follows from the state moves alone where that is enough.
     """
-    kinds = np.concatenate([starter.kinds, np.full(starter.rates.size, "rate")])
     for groups, moving in (
         (("phi",), ("q",)),
         (("phi_rate", "psi"), ("f",)),
         (("momentum",), ("p",)),
         (("phi", "phi_rate", "psi", "momentum"), STATE),
     ):
-        rows, may = starter.groups(*groups), free & np.isin(kinds, moving)
+        rows, may = starter.groups(*groups), free & np.isin(starter.moving, moving)
         for use in (rows | starter.between(moving), rows):
             if not use.any() or not may.any():
                 continue
@@ -336,28 +509,63 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     Left out are gammas that are not linear, held what their text guesses of implicit unknowns (all that stand in them,
     where it guesses none).
     """
-    implicit = np.append(starter.kinds == "e", np.zeros(starter.rates.size, dtype=bool))
+    implicit = starter.moving == "e"
     gammas = starter.groups("gamma")
     if not gammas.any() or not implicit.any():
         return x
-    scale = starter.scale(t, x)
-    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * scale))
-    bent = np.zeros(starter.settled.rows, dtype=bool)
-    bent[starter.rows[here != there]] = True
-    bent &= gammas
-    written = np.append(starter.given.written, np.zeros(starter.rates.size, dtype=bool))
+    bent = _bent(starter, t, x) & gammas
     own = bent[starter.rows] & implicit[starter.columns]
     own_rows, own_columns = starter.rows[own], starter.columns[own]
     said = np.zeros(starter.settled.rows, dtype=bool)
-    said[own_rows[written[own_columns]]] = True
+    said[own_rows[starter.written[own_columns]]] = True
     held = np.zeros(x.size, dtype=bool)
-    held[own_columns[written[own_columns] | ~said[own_rows]]] = True
+    held[own_columns[starter.written[own_columns] | ~said[own_rows]]] = True
     if not held.any():
         return x
     rows = starter.every & ~bent & ~starter.groups("gamma_rate")
     may = free & ~held & starter.following(t, x)
     found = solve(_problem(starter, t, x, guess, rows=rows, free=may), x)
     return found.x if found.residual < EXACT else x
+
+
+def _bent(starter: Starter, t: float, x: Floats) -> Mask:
+    """Rows that are not linear."""
+    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * starter.scale(t, x)))
+    bent = np.zeros(starter.settled.rows, dtype=bool)
+    bent[starter.rows[here != there]] = True
+    return bent
+
+
+def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: Mask) -> Solution:
+    """The solution without what guesses of the state moved for the sake of what follows from it: that costs nothing.
+
+    Guesses that can stay do so exactly.  Positions in curved constraints are left alone, and what is too large for full
+    matrices.
+    """
+    x = best.x
+    follows = starter.following(t, x) | starter.idle
+    follows[starter.carried()] = True
+    curved = np.zeros(x.size, dtype=bool)
+    bent = _bent(starter, t, x) & starter.groups("phi")
+    curved[starter.columns[bent[starter.rows]]] = True
+    free = free & ~(curved & (starter.moving == "q"))
+    state = free & ~follows
+    if x.size > DENSE or not (x != guess)[state].any():
+        return best
+    problem = _problem(starter, t, x, guess, rows=starter.every, free=free)
+    by_content = starter.by_content(t, x, problem.scale)
+    problem = replace(problem, weight=np.where(state & ~starter.written, by_content, problem.weight))
+    aim = where_light(problem, x, follows)
+    moved = np.abs(aim - guess) * problem.weight / problem.scale
+    aim = np.where(moved > BACK * _WEIGHT["unwritten"], aim, guess)
+    for held in (state, state & (aim == guess)):
+        z = np.where(held, aim, x)
+        found = solve(replace(problem, free=free & ~held), z)
+        if found.residual < EXACT:
+            z = starter.without_noise(found.x, problem.scale)
+            if _own(starter, t, z, z) < OWN:
+                return replace(found, x=z)
+    return best
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -381,7 +589,7 @@ def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
     found: list[str] = []
     values = starter.jacobian(t, x)
     hit = np.unique(starter.rows[(starter.columns == place) & (values != 0.0)])
-    for row in hit:
+    for row in hit[~starter.unsaid[hit]]:
         label = starter.settled.row_label(int(row))
         base = label.kind.split("_")[0]
         text = f"{base} {label.label}"
@@ -467,16 +675,19 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
 
     system: any index form of the model; near: a state to stay close to, else the guesses.  Raises InconsistentStart.
     """
-    starter = Starter(system if system.form.name == "3" else system.another("3"))
-    guess = np.concatenate([starter.given.guess, np.zeros(starter.rates.size)])
+    system = system if system.form.name == "3" else system.another("3")
+    starter = Starter(system, measuring=True)
+    guess = np.concatenate([starter.given.guess, np.zeros(starter.moving.size - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         guess[: starter.n] = np.where(np.isin(starter.kinds, (*STATE, "e")), near.y, guess[: starter.n])
-    free = np.concatenate([~starter.given.fixed, np.ones(starter.rates.size, dtype=bool)])
+        guess[starter.first :] = starter.residual(t0, guess)[starter.missed]
+    free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
     guess = _guess(starter, t0, guess, free)
     best, holds = _attempt(starter, t0, guess, free)
     if not holds:
         raise _explain(starter, t0, guess, free, best)
+    best = _steadied(starter, t0, best, guess, free)
     y, yd = starter.expand(best.x)
-    freedom, names = _freedom(starter, t0, best.x, free)
+    freedom, names = _freedom(Starter(system), t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)

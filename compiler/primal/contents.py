@@ -1,7 +1,8 @@
 """Initial conditions of a network as those of its coordinates; stores in series that start with different contents.
 
 In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + c, with c its own
-initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`.
+initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`; a dynamic variable
+of rate zero where not all of these are fixed, for the start to choose.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.primal.bounds import Box, Interval, Sizes, shape_of, union
+from sysdyn.compiler.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.primal.choices import own
 from sysdyn.compiler.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.primal.integrals import line
-from sysdyn.compiler.primal.overlaps import beside, meeting, narrowed, ranges_of
+from sysdyn.compiler.primal.overlaps import cut_off
 from sysdyn.compiler.primal.reading import Piece, Ranges, Reader, touches_network
 from sysdyn.compiler.primal.series import Member
 from sysdyn.dsl.expression import (
@@ -31,7 +32,7 @@ from sysdyn.dsl.expression import (
     var,
     variables,
 )
-from sysdyn.dsl.network import Branch, Initial, Loop, Network, Parameter
+from sysdyn.dsl.network import Branch, Dynamic, Initial, Loop, Network, Parameter, State
 
 
 def charge(branch: Branch, effort: Node) -> Node | None:
@@ -77,31 +78,6 @@ def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Reader) -> It
         yield replace(initial, target=target, value=value, loops=loops)
 
 
-def at_rest(network: Network, sizes: Sizes) -> Iterator[Initial]:
-    """Masses on nodes begin at rest, as far as nothing is said of them, where a store between two nodes begins with a
-    flow: guesses, so that these nodes are what moves least.
-    """
-    said: dict[tuple[str, str], list[Initial]] = {}
-    for initial in network.initials:
-        if initial.target.op == "var" and initial.target.data[1:] in (("bf", 0), ("bp", 0), ("nf", 0)):
-            said.setdefault((initial.target.data[0], initial.target.data[1][0]), []).append(initial)
-    stores = [b for b in network.branches if b.kind == "kinetic" and b.domain.common == "flow" and b.plus is not None]
-    single = [b for b in stores if b.minus is None or b.minus.node is None]
-    if all(b in single or (b.name, "b") not in said for b in stores):
-        return
-    for b in single:
-        assert b.plus is not None
-        if b.plus.node is None:
-            continue
-        within = ranges_of(b.loops, sizes, b.place)
-        own = [meeting(i, b.at, within, sizes) for i in said.get((b.name, "b"), ())]
-        own += [meeting(i, b.plus.at, within, sizes) for i in said.get((b.plus.node, "n"), ())]
-        holes = [found[0] for found in own if found is not None]
-        for rest in beside(within, holes):
-            target = var(b.plus.node, "nf", *b.plus.at)
-            yield Initial(target, const(0.0), False, narrowed(b.loops, rest), b.place)
-
-
 def _between_ground(touch: Touch) -> bool:
     other = touch.element.ends[1 - touch.end].node
     return not touch.free and other.startswith("#ground ") and charge(touch.element.branch, const(1.0)) is not None
@@ -115,6 +91,8 @@ class Contents:
         self.members = members
         self.initials = initials
         self.parameters: list[Parameter] = []
+        self.states: list[State] = []
+        self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box, Node]]] = {}
         self._pinned: set[Node] = set()
         for initial in initials:
@@ -181,11 +159,26 @@ class Contents:
             value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
         if is_const(value, 0.0):
             return
-        taken, stem = {p.name for p in self.parameters}, f"{element.name}.content"
+        taken = {p.name for p in (*self.parameters, *self.states)}
+        stem, place = f"{element.name}.content", element.branch.place
         name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
         unit, shape = element.branch.domain.displacement, shape_of(element.named)
-        self.parameters.append(Parameter(name, shape, unit, (value,), counters, element.branch.place))
-        self.reader.book.contents[element.number] = name
+        fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
+        self.reader.book.contents[element.number] = name, fixed
+        if fixed:
+            self.parameters.append(Parameter(name, shape, unit, (value,), counters, place))
+            return
+        loops = tuple(Loop(c, low, high) for c, (low, high) in zip(counters, shape, strict=True))
+        self.states.append(State(name, shape, unit, place))
+        self.dynamics.append(Dynamic(var(name, "s", *at), const(0.0), loops, place))
+
+    def _fixed(self, name: str, box: Box) -> bool:
+        """Whether the text fixes the contents of all these elements."""
+        left = [box]
+        for initial, said, _ in self._given.get(name, ()):
+            if initial.fixed:
+                left = [part for rest in left for part in cut_off(rest, said)]
+        return not left
 
     # -- initial conditions -------------------------------------------------------------------------------------
 
@@ -224,6 +217,11 @@ class Contents:
             piece = self.reader.piece(target.data[0], target.args, ranges)
         if piece is not None and piece.member is not None and self._charge(piece, initial) is not None:
             m = piece.member
+            if not self.reader.book.contents.get(piece.element.number, ("", True))[1]:
+                moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
+                content = self._charge(piece, initial)
+                assert content is not None
+                return "pin", moved, content
             q = var(m.coordinate, "q", *m.indices(target.args))
             first = self.start(m.leader.name, m.leader_at(target.args))
             if m.leads and len(m.index) == len(target.args):
@@ -248,6 +246,12 @@ def _pin(target: Node, value: Node) -> tuple[Node, Node]:
         if straight is not None:
             return unknowns[0], straight.inverse(value)
     return target, value
+
+
+def _led_by(m: Member) -> Box:
+    """The elements of the leader that a member follows."""
+    pairs = ((None if k is None else m.box[k], c) for k, c in m.leader_index)
+    return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
 
 
 def _follows(m: Member) -> bool:

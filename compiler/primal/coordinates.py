@@ -15,12 +15,13 @@ from typing import Any
 from sysdyn.compiler.primal.account import Step, account
 from sysdyn.compiler.primal.balances import balances
 from sysdyn.compiler.primal.bounds import Sizes
-from sysdyn.compiler.primal.contents import Contents, at_rest, at_stores
+from sysdyn.compiler.primal.contents import Contents, at_stores
 from sysdyn.compiler.primal.incidence import Element, Incidence
 from sysdyn.compiler.primal.laws import Laws, laws
 from sysdyn.compiler.primal.potentials import Potentials
 from sysdyn.compiler.primal.reading import Book, Piece, Reader
 from sysdyn.compiler.primal.series import Series, series
+from sysdyn.compiler.primal.unsaid import unsaid
 from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place
 from sysdyn.dsl.expression import Node, variables
 from sysdyn.dsl.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
@@ -39,15 +40,15 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     said = laws(network, incidence.elements, sizes, reflected=reflected)
     potentials = Potentials(nodes.efforts)
     reader = Reader(sizes, Book(_pieces(incidence.elements, classes), said.efforts, said.momenta, potentials.read))
-    initials = (*at_rest(network, sizes), *at_stores(network, incidence, reader))
+    initials = tuple(at_stores(network, incidence, reader))
     contents = Contents(reader, classes.members, initials)
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),
         coordinates=(*network.coordinates, *_node_coordinates(network), *classes.coordinates),
         unknowns=(*network.unknowns, *said.unknowns.values()),
-        states=(*network.states, *said.states.values()),
-        initials=tuple(contents.resolved()),
+        states=(*network.states, *said.states.values(), *contents.states),
+        initials=(*contents.resolved(), *unsaid(network, initials, sizes, reader, reflected=reflected)),
         nodes=(),
         branches=(),
         couplings=(),
@@ -56,6 +57,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
         read=frozenset(),
         **_statements(network, said, nodes.constraints, reader),
     )
+    found = replace(found, dynamics=(*found.dynamics, *contents.dynamics))
     return found, tuple(said.notes), account(network, classes, nodes)
 
 

@@ -65,11 +65,12 @@ def beside(within: Ranges, holes: Sequence[Ranges]) -> Iterator[Ranges]:
     """The ranges without the holes in them, as ranges."""
     left: list[Box] = [tuple(within.values())]
     for hole in holes:
-        left = [part for box in left for part in _cut(box, tuple(hole.values()))]
+        left = [part for box in left for part in cut_off(box, tuple(hole.values()))]
     yield from (dict(zip(within, box, strict=True)) for box in left)
 
 
-def _cut(box: Box, hole: Box) -> Iterator[Box]:
+def cut_off(box: Box, hole: Box) -> Iterator[Box]:
+    """The parts of a box outside a hole that may reach beyond it."""
     inner = tuple(common(a, b) for a, b in zip(box, hole, strict=True))
     if all(i.size for i in inner):
         yield from without(box, inner)

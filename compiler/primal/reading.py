@@ -73,13 +73,14 @@ class Piece:
 
 @dataclass(slots=True)
 class Book:
-    """All that is needed to read: pieces by family, efforts and momenta by element, contents by element."""
+    """All that is needed to read: pieces by family, efforts and momenta by element, contents by element: name of the
+    constant, and whether it is a parameter."""
 
     pieces: dict[str, list[Piece]]
     efforts: dict[int, Node]
     momenta: dict[int, Node]
     nodes: Callable[[Reader, Node, Ranges, tuple[Node, ...]], Node]
-    contents: dict[int, str] = field(default_factory=dict)
+    contents: dict[int, tuple[str, bool]] = field(default_factory=dict)
 
 
 def touches_network(root: Node) -> bool:
@@ -225,7 +226,10 @@ class Reader:
             m = piece.member
             value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args)))
             content = self.book.contents.get(piece.element.number)
-            return value if kind == "bf" or content is None else add(value, param(content, *node.args))
+            if kind == "bf" or content is None:
+                return value
+            constant, fixed = content
+            return add(value, param(constant, *node.args) if fixed else var(constant, "s", *node.args))
         if branch.on is not None:
             value = self.at_piece(branch.on, piece, node.args)
             return self.resolve(value if kind == "bq" else self._derivative(value, node), ranges, active)
