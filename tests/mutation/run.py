@@ -44,7 +44,7 @@ ROOMS = ("dsl", "compiler", "runtime", "cli", "api", "models")
 LOWERING = (
     "lowering.py", "kane.py", "momenta.py", "integration.py", "audit.py", "mirror.py", "reflection.py", "positions.py",
     "islands.py", "primal/balances.py", "primal/choices.py", "primal/laws.py", "primal/series.py",
-    "primal/potentials.py", "primal/reading.py", "primal/contents.py", "primal/overlaps.py",
+    "primal/potentials.py", "primal/reading.py", "primal/contents.py", "primal/overlaps.py", "primal/unsaid.py",
 )  # fmt: skip
 SEEDS = (
     "dc_motor", "knife_edge", "pendulum", "lead_filter", "two_link_arm", "bead_rod", "electrical_transformer",
@@ -63,6 +63,9 @@ EQUIVALENT = (
     ("kane.py", "_pivot", "uses.get(column, 0) + 1", "prefers one pivot; every regular one spans the same motions"),
     ("momenta.py", "inertial", "rates = ", _CARRIERS),
     ("momenta.py", "inertial", "found.add(", _CARRIERS),
+    ("lowering.py", "_massless", "for function, kind in", "the start leaves out the rows that have inertia"),
+    ("lowering.py", "_massless", "moved.add(", "the start leaves out the rows that have inertia"),
+    ("positions.py", "read", "over_ground(", "a quadrature takes its place"),
     ("momenta.py", "undefined", "yield ", _TEXT),
     ("integration.py", "_touches", "", _INTEGRATED),
     ("integration.py", "_exact", "flows = ", _INTEGRATED),
