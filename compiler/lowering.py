@@ -19,9 +19,10 @@ from sysdyn.compiler.energies import EnergyModel, Family, Row
 from sysdyn.compiler.momenta import given, inertial, resolved
 from sysdyn.compiler.observing import add_initials, add_observations, observed, pins_and_equations
 from sysdyn.compiler.terms import Nest, counter, local_variables
-from sysdyn.dsl.diagnostics import Place
+from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Place
 from sysdyn.dsl.expression import (
     Node,
+    add,
     derivative,
     differential,
     mul,
@@ -29,6 +30,7 @@ from sysdyn.dsl.expression import (
     signals_held,
     substitute,
     time_derivative,
+    to_text,
     var,
     variables,
 )
@@ -92,13 +94,20 @@ def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
             for n in local_variables(term.expression, kind):
                 if not n.args or (n.args == at and bounds == shapes[n.data[0]]):
                     moved.add(n.data[0])
-    moved |= {
-        node.data[0]
-        for work in model.works
-        if any(n.op == "var" and n.data[2] for n in variables(work.effort))
-        for node in local_variables(work.on, m.coordinate)
-    }
     return frozenset(shapes) - moved
+
+
+def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:
+    """Indices and rate of each dynamic variable whose dynamic is one expression over its whole range."""
+    rows: dict[str, list[Row]] = {}
+    for row in model.of_kind("lambda"):
+        rows.setdefault(row.name, []).append(row)
+    single = {name: found[0] for name, found in rows.items() if len(found) == 1}
+    return {
+        name: (row.at, add(*(t.expression for t in row.terms)))
+        for name, row in single.items()
+        if all(t.loops == row.nest for t in row.terms) and all(a.op == "index" for a in row.at)
+    }
 
 
 def total_rate(root: Node) -> Node:
@@ -115,6 +124,7 @@ class _Lowering:
         self.stores = stores
         self.carriers = carriers
         self.massless = _massless(model, carriers)
+        self.speeds = _speeds(model)
         self.assembly = Assembly()
         self.covers: list[Cover] = []
         self.families = self._families()
@@ -239,6 +249,23 @@ class _Lowering:
                 own = var(row.name, "s", *row.at, order=1)
                 self.assembly.add("lambda", row.name, row.at, row.nest, own)
 
+    def _in_states(self, root: Node, what: str, place: Place | None) -> Node:
+        """The expression with the rates of dynamic variables replaced by what they are: it has a rate of its own."""
+        for _ in range(1 + len(self.speeds)):
+            rates = [n for n in variables(root) if n.op == "var" and n.data[1:] == ("s", 1)]
+            if not rates:
+                return root
+            if any(n.data[0] not in self.speeds for n in rates):
+                break
+            root = substitute(root, {n: self._speed(n) for n in rates})
+        names = ", ".join(sorted(to_text(n) for n in rates))
+        text = f"the rate of {what} is needed, and with it that of {names}, whose dynamic is said in parts"
+        raise ModelError([Diagnostic("E518", text, place, "one dynamic over the whole range")])
+
+    def _speed(self, rate: Node) -> Node:
+        at, speed = self.speeds[rate.data[0]]
+        return substitute(speed, dict(zip(at, rate.args, strict=True)))
+
     def _reaction(self, row: Row, nest: Nest, expression: Node) -> None:
         m = self.model.mirror
         kind, name = (m.coordinate, "kappa") if row.kind == "phi" else (m.rate, "mu")
@@ -252,12 +279,13 @@ class _Lowering:
         """A summand of the balance of a coordinate; where that is algebraic, its rate holds too."""
         self.assembly.add(block, on.data[0], on.args, nest, value)
         if on.data[0] in self.massless:
-            self.assembly.add("dynamics_rate", on.data[0], on.args, nest, total_rate(value))
+            rate = total_rate(self._in_states(value, f"the balance of {on.data[0]}", None))
+            self.assembly.add("dynamics_rate", on.data[0], on.args, nest, rate)
 
     def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
         if not self._has_rate(row):
             return
-        rate = time_derivative(expression)
+        rate = time_derivative(self._in_states(expression, f"{row.kind} {row.name}", row.place))
         self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
         if row.kind == "phi":
             self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))

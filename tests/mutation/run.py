@@ -75,6 +75,7 @@ EQUIVALENT = (
     ("primal/contents.py", "store", "places[", _TEXT),
     ("primal/choices.py", "law", "outer = ", _FORMS),
     ("primal/choices.py", "", "OWN = ", _FORMS),
+    ("primal/choices.py", "_inside_out", "OWN[", _FORMS),
     ("primal/choices.py", "_kept", "", _TEXT),
     ("primal/choices.py", "_said", "", _TEXT),
     ("primal/laws.py", "say", 'b.side == "p"', _TEXT),
