@@ -23,6 +23,7 @@ from sysdyn.runtime.settled import rates_of
 from sysdyn.runtime.system import System
 
 Mask = NDArray[np.bool_]
+Places = NDArray[np.integer]
 STATE = ("q", "f", "p", "s")
 _WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
@@ -111,11 +112,11 @@ def _pairs(system: System) -> tuple[Ints, Ints]:
 class _Sums:
     """Rows [k] that hold weights [k, n] times the rows `of` [n] instead; entries of these, and the n of each."""
 
-    rows: Ints
-    of: Ints
+    rows: Places
+    of: Places
     weights: Floats
-    entries: Ints
-    place: Ints
+    entries: Places
+    place: Places
 
 
 class Starter:
@@ -220,7 +221,7 @@ class Starter:
                 unsaid[first : first + rows.size] = not rows.written
         return guessed, unsaid
 
-    def _floating(self, unsettled: Ints) -> _Sums | None:
+    def _floating(self, unsettled: Places) -> _Sums | None:
         """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
 
         They are taken from the matrix of inertia at two points: what moves with the state is left out.
@@ -240,7 +241,7 @@ class Starter:
         entries = np.flatnonzero(number[self.rows] >= 0)
         return _Sums(unsettled[: len(weights)], unsettled, weights, entries, number[self.rows[entries]])
 
-    def _inertia(self, unsettled: Ints, shift: float) -> Floats:
+    def _inertia(self, unsettled: Places, shift: float) -> Floats:
         """The matrix of inertia beside a state [dynamics_rate rows, flows]: of f' in the balances, of f in momenta."""
         form, families = self.settled.form, self.settled.description.rows
         first = {(group, families[k].owner): place for group, k, place in form.groups}
@@ -293,7 +294,8 @@ class Starter:
                 effort[rows.owner] = rows.unit
                 own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
-        names = np.concatenate([np.array(units)[self.system.family_of[: self.n]], np.full(self.rates.size, ""), self.units])
+        own_units = np.array(units)[self.system.family_of[: self.n]]
+        names = np.concatenate([own_units, np.full(self.rates.size, ""), self.units])
         pattern = self.system.pattern
         inertia = pattern.columns_of() == own[pattern.row]
         content = np.zeros(x.size)
@@ -305,12 +307,13 @@ class Starter:
         return np.asarray(_WEIGHT["unwritten"] * content * scale / largest[unit])
 
     def _idle(self) -> Mask:
-        """Displacements that stand in constraints alone, where contents of stores are measured: they hold nothing."""
+        """Displacements that stand in constraints alone and move without inertia: they hold nothing."""
+        form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
+        inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
+        inertial[self._flow] = True
         held = np.zeros(self.first + self.missed.size, dtype=bool)
-        if self.missed.size:
-            held[: self.n] = (self.kinds == "q") & ~self.given.written
-            elsewhere = self._structural & ~self.groups("phi")[self.rows]
-            held[self.columns[elsewhere]] = False
+        held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
+        held[self.columns[self._structural & ~self.groups("phi")[self.rows]]] = False
         return held
 
     def _read(self) -> NDArray[np.str_]:

@@ -138,7 +138,7 @@ class Choice:
         return Law("state" if kinetic else "implicit", sub(v, law), (("N604", text),), kept=kept)
 
     def _stored(self, law: Node, given: Node) -> Node | None:
-        """The energy of a store whose law is one of `given` alone, int f dp or int e dq; None where that is not closed."""
+        """The energy of a store whose law is one of `given` alone, int f dp or int e dq; None if that is not closed."""
         branch, rests = self.branch, list[tuple[Node, int]]()
         if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
             return None
