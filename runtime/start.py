@@ -6,6 +6,9 @@ Guesses move least: each step is the minimum-norm solution of the linearised row
 in unknowns scaled by magnitude, rank-deficient rows tolerated).  Stages: positions onto phi and what else holds between
 them, then flows and momenta onto the first derivatives, then everything.  Where the rows are singular at the guess (a
 valve C f|f| at rest), seeded perturbations of the free unknowns are tried.
+
+Where contents of stores follow from several coordinates, each has a row of block `initial` and an unknown of its own,
+what the row misses; these are what moves least, and the coordinates follow.
 """
 
 from __future__ import annotations
@@ -123,7 +126,7 @@ class Starter:
     """The equations of the start of one model (t0 apart).
 
     measuring: where contents of stores are guessed, guessed expressions hold but for an unknown of their own each,
-    behind those of y and its rates.
+    behind those of y and its rates; sums of balances without inertia have their rates.
     """
 
     def __init__(self, system: System, *, measuring: bool = False) -> None:
@@ -226,7 +229,7 @@ class Starter:
 
         They are taken from the matrix of inertia at two points: what moves with the state is left out.
         """
-        if not 0 < unsettled.size <= DENSE:
+        if not unsettled.size or self.n > DENSE:
             return None
         matrix = np.hstack([self._inertia(unsettled, shift) for shift in (0.0, 0.1)])
         if not np.isfinite(matrix).all():
@@ -691,6 +694,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
         raise _explain(starter, t0, guess, free, best)
     best = _steadied(starter, t0, best, guess, free)
     y, yd = starter.expand(best.x)
-    freedom, names = _freedom(Starter(system), t0, best.x[: starter.first], free[: starter.first])
+    counted = Starter(system) if starter.missed.size else starter
+    freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)
