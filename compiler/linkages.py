@@ -9,11 +9,12 @@ start chooses.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.initially import initially
 from sysdyn.compiler.primal.integrals import line
+from sysdyn.compiler.primal.rings import closes, family
 from sysdyn.dsl import expression as ex
 from sysdyn.dsl.expression import Node
 from sysdyn.dsl.network import Branch, Dynamic, Initial, Network, Parameter, Shape, State
@@ -37,7 +38,7 @@ def with_linkages(network: Network) -> Network:
             parameters[branch.name] = Parameter(name, _shape(branch), unit, (momentum,), counters, branch.place)
     if not parameters:
         return network
-    free = {b.name: b for b in looped if b.name not in given and b.law is not None and _closes(b, stores)}
+    free = {b.name: b for b in looped if b.name not in given and b.law is not None and closes(b, stores)}
 
     constants = {*parameters, *free}
 
@@ -68,6 +69,8 @@ def with_linkages(network: Network) -> Network:
             return replace(initial, value=ex.sub(initial.value, constant(target.data[0], target.args)))
         return replace(initial, target=held(target))
 
+    states = [State(f"{name}.linkage", _shape(b), b.domain.momentum, b.place) for name, b in free.items()]
+
     def unsaid(branch: Branch) -> Initial:
         content = held(ex.var(branch.name, "bp", *branch.at))
         zero, unit = ex.const(0.0), branch.domain.momentum.text
@@ -78,7 +81,7 @@ def with_linkages(network: Network) -> Network:
         parameters=(*network.parameters, *parameters.values()),
         branches=tuple(law(b) for b in network.branches),
         initials=(*(start(i) for i in network.initials), *(unsaid(b) for b in free.values())),
-        states=(*network.states, *(State(f"{n}.linkage", _shape(b), b.domain.momentum, b.place) for n, b in free.items())),
+        states=(*network.states, *states),
         constraints=tuple(replace(c, expression=held(c.expression)) for c in network.constraints),
         dynamics=(
             *(replace(d, expression=held(d.expression)) for d in network.dynamics),
@@ -96,17 +99,6 @@ def _shape(branch: Branch) -> Shape:
     return tuple((loop.first, loop.last) for loop in branch.loops)
 
 
-def _closes(branch: Branch, stores: Sequence[Branch]) -> bool:
-    """Whether other stores lead from one end of a branch to the other, by families of nodes."""
-    pairs = [{_family(b, t) for t in (b.plus, b.minus)} for b in stores if b is not branch]
-    reached, goal = {_family(branch, branch.plus)}, _family(branch, branch.minus)
-    if goal in reached:
-        return reached in pairs
-    while found := [pair for pair in pairs if pair & reached and pair - reached]:
-        reached.update(*found)
-    return goal in reached
-
-
 def _in_loops(stores: Sequence[Branch]) -> list[Branch]:
     """Stores of parts of the network in which a loop of them is closed, by families of nodes."""
     part: dict[str, str] = {}
@@ -116,7 +108,7 @@ def _in_loops(stores: Sequence[Branch]) -> list[Branch]:
             name = part[name]
         return name
 
-    ends = {id(b): tuple(_family(b, t) for t in (b.plus, b.minus)) for b in stores}
+    ends = {id(b): tuple(family(b, t) for t in (b.plus, b.minus)) for b in stores}
     within: dict[str, int] = {}
     closed: set[str] = set()
     for b in stores:
@@ -130,11 +122,6 @@ def _in_loops(stores: Sequence[Branch]) -> list[Branch]:
     closed |= {name for name, count in within.items() if count > 1}
     roots = {root(name) for name in closed}
     return [b for b in stores if root(ends[id(b)][0]) in roots]
-
-
-def _family(branch: Branch, terminal: object) -> str:
-    node = getattr(terminal, "node", None)
-    return f"#ground {branch.domain.name}" if node is None else str(node)
 
 
 def _momentum(branch: Branch, initials: Sequence[Initial]) -> Node | None:

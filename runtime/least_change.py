@@ -196,9 +196,9 @@ def where_light(problem: Problem, x: Floats, light: Mask) -> Floats:
     left, sigma, _ = np.linalg.svd(a[:, light] / np.where(size > 0.0, size, 1.0))
     rest = left[:, int((sigma > _LIGHT * sigma.max(initial=0.0)).sum()) :].T
     heavy = np.flatnonzero(problem.free)[~light]
-    u = np.linalg.lstsq(rest @ a[:, ~light], rest @ aim, rcond=RANK)[0]
+    moved = np.linalg.lstsq(rest @ a[:, ~light], rest @ aim, rcond=RANK)[0]
     found = x.copy()
-    found[heavy] = problem.guess[heavy] + u * linear.unit[heavy]
+    found[heavy] = problem.guess[heavy] + moved * linear.unit[heavy]
     return found
 
 

@@ -6,6 +6,9 @@ Guesses move least: each step is the minimum-norm solution of the linearised row
 in unknowns scaled by magnitude, rank-deficient rows tolerated).  Stages: positions onto phi and what else holds between
 them, then flows and momenta onto the first derivatives, then everything.  Where the rows are singular at the guess (a
 valve C f|f| at rest), seeded perturbations of the free unknowns are tried.
+
+Where contents of stores follow from several coordinates, each has a row of block `initial` and an unknown of its own,
+what the row misses; these are what moves least, and the coordinates follow.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from sysdyn.runtime.settled import rates_of
 from sysdyn.runtime.system import System
 
 Mask = NDArray[np.bool_]
+Places = NDArray[np.integer]
 STATE = ("q", "f", "p", "s")
 _WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
@@ -111,18 +115,18 @@ def _pairs(system: System) -> tuple[Ints, Ints]:
 class _Sums:
     """Rows [k] that hold weights [k, n] times the rows `of` [n] instead; entries of these, and the n of each."""
 
-    rows: Ints
-    of: Ints
+    rows: Places
+    of: Places
     weights: Floats
-    entries: Ints
-    place: Ints
+    entries: Places
+    place: Places
 
 
 class Starter:
     """The equations of the start of one model (t0 apart).
 
     measuring: where contents of stores are guessed, guessed expressions hold but for an unknown of their own each,
-    behind those of y and its rates.
+    behind those of y and its rates; sums of balances without inertia have their rates.
     """
 
     def __init__(self, system: System, *, measuring: bool = False) -> None:
@@ -220,12 +224,12 @@ class Starter:
                 unsaid[first : first + rows.size] = not rows.written
         return guessed, unsaid
 
-    def _floating(self, unsettled: Ints) -> _Sums | None:
+    def _floating(self, unsettled: Places) -> _Sums | None:
         """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
 
         They are taken from the matrix of inertia at two points: what moves with the state is left out.
         """
-        if not 0 < unsettled.size <= DENSE:
+        if not unsettled.size or self.n > DENSE:
             return None
         matrix = np.hstack([self._inertia(unsettled, shift) for shift in (0.0, 0.1)])
         if not np.isfinite(matrix).all():
@@ -240,7 +244,7 @@ class Starter:
         entries = np.flatnonzero(number[self.rows] >= 0)
         return _Sums(unsettled[: len(weights)], unsettled, weights, entries, number[self.rows[entries]])
 
-    def _inertia(self, unsettled: Ints, shift: float) -> Floats:
+    def _inertia(self, unsettled: Places, shift: float) -> Floats:
         """The matrix of inertia beside a state [dynamics_rate rows, flows]: of f' in the balances, of f in momenta."""
         form, families = self.settled.form, self.settled.description.rows
         first = {(group, families[k].owner): place for group, k, place in form.groups}
@@ -293,7 +297,8 @@ class Starter:
                 effort[rows.owner] = rows.unit
                 own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
-        names = np.concatenate([np.array(units)[self.system.family_of[: self.n]], np.full(self.rates.size, ""), self.units])
+        own_units = np.array(units)[self.system.family_of[: self.n]]
+        names = np.concatenate([own_units, np.full(self.rates.size, ""), self.units])
         pattern = self.system.pattern
         inertia = pattern.columns_of() == own[pattern.row]
         content = np.zeros(x.size)
@@ -305,12 +310,13 @@ class Starter:
         return np.asarray(_WEIGHT["unwritten"] * content * scale / largest[unit])
 
     def _idle(self) -> Mask:
-        """Displacements that stand in constraints alone, where contents of stores are measured: they hold nothing."""
+        """Displacements that stand in constraints alone and move without inertia: they hold nothing."""
+        form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
+        inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
+        inertial[self._flow] = True
         held = np.zeros(self.first + self.missed.size, dtype=bool)
-        if self.missed.size:
-            held[: self.n] = (self.kinds == "q") & ~self.given.written
-            elsewhere = self._structural & ~self.groups("phi")[self.rows]
-            held[self.columns[elsewhere]] = False
+        held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
+        held[self.columns[self._structural & ~self.groups("phi")[self.rows]]] = False
         return held
 
     def _read(self) -> NDArray[np.str_]:
@@ -688,6 +694,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
         raise _explain(starter, t0, guess, free, best)
     best = _steadied(starter, t0, best, guess, free)
     y, yd = starter.expand(best.x)
-    freedom, names = _freedom(Starter(system), t0, best.x[: starter.first], free[: starter.first])
+    counted = Starter(system) if starter.missed.size else starter
+    freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)

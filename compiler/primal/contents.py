@@ -2,7 +2,7 @@
 
 In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + c, with c its own
 initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`; a dynamic variable
-of rate zero where not all of these are fixed, for the start to choose.
+of rate zero where not all of these are fixed and a loop of stores and efforts may ask for others.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from sysdyn.compiler.primal.incidence import PLUS, Element, Incidence, NodeCell,
 from sysdyn.compiler.primal.integrals import line
 from sysdyn.compiler.primal.overlaps import cut_off
 from sysdyn.compiler.primal.reading import Piece, Ranges, Reader, touches_network
+from sysdyn.compiler.primal.rings import closes
 from sysdyn.compiler.primal.series import Member
 from sysdyn.dsl.expression import (
     Node,
@@ -86,10 +87,13 @@ def _between_ground(touch: Touch) -> bool:
 class Contents:
     """Initial contents of potential stores: constants of followers, and the initial conditions that remain."""
 
-    def __init__(self, reader: Reader, members: Sequence[Member], initials: Sequence[Initial]) -> None:
+    def __init__(
+        self, reader: Reader, members: Sequence[Member], initials: Sequence[Initial], branches: Sequence[Branch]
+    ) -> None:
         self.reader = reader
         self.members = members
         self.initials = initials
+        self.stiff = [b for b in branches if b.kind in ("potential", "effort")]
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
@@ -157,13 +161,14 @@ class Contents:
         for m in members:
             first = self.start(m.leader.name, m.leader_at(at))
             value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
-        if is_const(value, 0.0):
+        fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
+        fixed |= not closes(element.branch, self.stiff)
+        if fixed and is_const(value, 0.0):
             return
-        taken = {p.name for p in (*self.parameters, *self.states)}
+        taken = {p.name for p in self.parameters} | {s.name for s in self.states}
         stem, place = f"{element.name}.content", element.branch.place
         name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
         unit, shape = element.branch.domain.displacement, shape_of(element.named)
-        fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
         self.reader.book.contents[element.number] = name, fixed
         if fixed:
             self.parameters.append(Parameter(name, shape, unit, (value,), counters, place))

@@ -41,7 +41,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     potentials = Potentials(nodes.efforts)
     reader = Reader(sizes, Book(_pieces(incidence.elements, classes), said.efforts, said.momenta, potentials.read))
     initials = tuple(at_stores(network, incidence, reader))
-    contents = Contents(reader, classes.members, initials)
+    contents = Contents(reader, classes.members, initials, network.branches)
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),

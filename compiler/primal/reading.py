@@ -73,8 +73,10 @@ class Piece:
 
 @dataclass(slots=True)
 class Book:
-    """All that is needed to read: pieces by family, efforts and momenta by element, contents by element: name of the
-    constant, and whether it is a parameter."""
+    """All that is needed to read: pieces by family, efforts and momenta by element, contents by element.
+
+    A content is the name of a constant, and whether that is a parameter.
+    """
 
     pieces: dict[str, list[Piece]]
     efforts: dict[int, Node]

@@ -43,7 +43,7 @@ ROOT = HERE.parents[1]
 ROOMS = ("dsl", "compiler", "runtime", "cli", "api", "models")
 LOWERING = (
     "lowering.py", "kane.py", "momenta.py", "integration.py", "audit.py", "mirror.py", "reflection.py", "positions.py",
-    "islands.py", "primal/balances.py", "primal/choices.py", "primal/laws.py", "primal/series.py",
+    "primal/balances.py", "primal/choices.py", "primal/laws.py", "primal/series.py",
     "primal/potentials.py", "primal/reading.py", "primal/contents.py", "primal/overlaps.py", "primal/unsaid.py",
 )  # fmt: skip
 SEEDS = (
@@ -78,7 +78,6 @@ EQUIVALENT = (
     ("primal/choices.py", "_inside_out", "OWN[", _FORMS),
     ("primal/choices.py", "_kept", "", _TEXT),
     ("primal/choices.py", "_said", "", _TEXT),
-    ("primal/laws.py", "say", 'b.side == "p"', _TEXT),
     ("primal/laws.py", "_implicit", 'b.side == "p"', _TEXT),
     ("primal/laws.py", "_stem", "", "labels of constraints"),
 )
