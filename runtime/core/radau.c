@@ -12,6 +12,9 @@
 #define GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
 #define SHRINK 0.2
 #define SLOW 0.99          /* contraction above which Newton gives up */
+#define CREEPS 4           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
+#define LEAP 8.0           /* the next one is tried that much longer, with fresh slopes at its end */
+#define EXACT 1e-15        /* of the terms of a row: round-off */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
@@ -163,7 +166,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->h = fmin(radau->fixed_h > 0.0 ? radau->fixed_h : h, radau->h_max);
     radau->h_used = radau->h_before = 0.0;
     radau->error_accepted = 0.0;
-    radau->ready = radau->old_jacobian = radau->rejected = 0;
+    radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
     radau->theta = 1.0;
 }
 
@@ -262,6 +265,27 @@ static double correct(sd_radau *radau)
     return sqrt(sum / (3.0 * n));
 }
 
+/* SD_FINE where what is left of the rows in all stages is round-off of their terms: a flow that its square gives is
+ * known to the root of that, and no iteration brings it nearer */
+static int solved(sd_radau *radau)
+{
+    const sd_system *system = radau->system;
+    int cause = residuals(radau);
+    if (cause)
+        return cause;
+    memset(radau->ee, 0, (size_t)radau->n * sizeof(double));
+    for (int32_t j = 0; j < radau->n; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
+            double slope = fabs(radau->jy[e]) + fabs(radau->jyd[e]) / radau->h;
+            radau->ee[system->row[e]] += slope * (fabs(radau->phi[j]) + fabs(radau->z[2][j]));
+        }
+    for (int s = 0; s < SD_STAGES; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            if (!(fabs(radau->d[s][i]) <= EXACT * radau->ee[i]))
+                return SD_NEWTON;
+    return SD_FINE;
+}
+
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 static int iterate(sd_radau *radau, int full, int *used, double *retry)
 {
@@ -282,7 +306,7 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
             radau->theta = m == 2 ? ratio : sqrt(ratio * ratio_before);
             ratio_before = ratio;
             if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2))
-                return size <= STAGNANT * tolerance ? SD_FINE : SD_NEWTON;
+                return size <= STAGNANT * tolerance ? SD_FINE : full ? solved(radau) : SD_NEWTON;
             trust = radau->theta < SLOW ? radau->theta / (1.0 - radau->theta) : 1.0 / DBL_EPSILON;
             double end = trust * size * pow(radau->theta, ITERATIONS - 1 - m) / tolerance;
             if (!patient && end >= 1.0 && trust * size > tolerance) {
@@ -301,7 +325,7 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
                 return cause;
         }
     }
-    return SD_NEWTON;
+    return full ? solved(radau) : SD_NEWTON;
 }
 
 /* error of the step in the weights, filtered once more where it is large after a rejection or at the start */
@@ -409,7 +433,7 @@ static void project(sd_radau *radau)
 
 int sd_radau_step(sd_radau *radau)
 {
-    int singular = 0, iterations = 0, failures = 0;
+    int singular = 0, iterations = 0, failures = 0, leap = 0;
     double retry = 0.5, error = 0.0;
     set_weights(radau);
     radau->cause = SD_FINE;
@@ -426,10 +450,10 @@ int sd_radau_step(sd_radau *radau)
         int fresh = !radau->old_jacobian;
         sd_radau_extrapolate(radau, radau->h);
         if (!radau->ready || radau->h != radau->h_factored)
-            cause = factorise(radau, failures > 0);
+            cause = factorise(radau, failures > 0 || leap == 1);
         if (cause == SD_FINE) {
             radau->theta = 0.0; /* one iteration: the Jacobian is good enough */
-            cause = iterate(radau, failures > 1, &iterations, &retry);
+            cause = iterate(radau, failures > 1 || leap == 1, &iterations, &retry);
         }
         if (cause == SD_FINE && !(radau->fixed_h > 0.0)) {
             cause = estimate_error(radau, &error);
@@ -456,6 +480,15 @@ int sd_radau_step(sd_radau *radau)
                 radau->old_jacobian = 0; /* once more with fresh slopes */
                 continue;
             }
+            if (leap == 1) {
+                radau->h /= LEAP;
+                leap = 2;
+            } else if (leap == 0 && radau->creeping >= CREEPS && cause == SD_NEWTON) {
+                radau->h *= LEAP;
+                radau->old_jacobian = 0;
+                leap = 1;
+                continue;
+            }
             radau->h *= cause == SD_NEWTON ? retry : 0.25;
             if (++failures > 2)
                 radau->h *= 0.5;
@@ -464,6 +497,7 @@ int sd_radau_step(sd_radau *radau)
         }
     }
     radau->cause = SD_FINE;
+    radau->creeping = failures > 0 ? radau->creeping + 1 : 0;
     accept(radau, error, iterations);
     if (radau->project)
         project(radau);

@@ -37,6 +37,7 @@ typedef struct sd_radau {
     double tolerance;         /* 0.1 rtol^(2/3) */
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta;
     int32_t ready, old_jacobian, rejected;
+    int32_t creeping;                               /* steps in a row for which Newton failed at first */
     double *phi, *yd;         /* [n] the last accepted point */
     double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */
     double *slope[SD_STAGES]; /* [n] derivatives at phi, last, before, for values within the step */

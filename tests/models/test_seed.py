@@ -20,12 +20,8 @@ FINE = 1e-9
 FINELY_ALLOWED = 1e-8
 """At an accuracy of FINE."""
 LONG = os.environ.get("SYSDYN_LONG") == "1"
-COARSER = {("nonlinear_fluid", "co_hamiltonian"): 5e-6}
-"""Accuracy where Newton's iteration ends earlier: the flow of a valve at rest has no slope in its pressure."""
 INTEGRATION = ("q10", "q20", "q30", "q40")
 """Constants of integration: by default what the initial values make them."""
-UNREACHED = {("nonlinear_fluid", form, FINE) for form in ("co_lagrangian", "co_hamiltonian")}
-"""Where, for the same reason, the run says that it cannot vouch for the accuracy (it has it all the same)."""
 FACTORS = (0.8, 1.3, 0.7, 1.5, 1.1)
 EVENTS = {"bouncing_ball", "coulomb_planar_stop", "coulomb_slide", "stick_slip_belt", "stiction_oscillator"}
 SEED = ROOT / "models" / "seed"
@@ -64,7 +60,7 @@ def simulated(tmp_path, model, *, formulation, times, backend="c", settings=(), 
         scene="reference",
         formulation=formulation,
         backend=backend,
-        accuracy=accuracy or COARSER.get((model, formulation), 1e-6),
+        accuracy=accuracy or 1e-6,
         at=",".join(map(repr, times)),
         settings=tuple((name, repr(value)) for name, value in settings),
         output=str(tmp_path / "trace.h5"),
@@ -75,8 +71,7 @@ def simulated(tmp_path, model, *, formulation, times, backend="c", settings=(), 
     assert ran.exit == 0
     assert ran.prepared.formulation == formulation
     assert ran.prepared.backend == backend
-    if (model, formulation, accuracy) not in UNREACHED:
-        assert not ran.outcome.warnings
+    assert not ran.outcome.warnings
     trace = Trace.open(tmp_path / "trace.h5")
     places = [int(np.argmin(np.abs(trace.time - t))) for t in times]
     np.testing.assert_allclose(trace.time[places], times, rtol=1e-14)
