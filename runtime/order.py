@@ -11,7 +11,8 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 from sysdyn.runtime.description import Floats
-from sysdyn.runtime.start import ConsistentState, Starter
+from sysdyn.runtime.start import ConsistentState
+from sysdyn.runtime.starter import Starter
 from sysdyn.runtime.system import System
 
 DENSE = 600

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats, Ints
 from sysdyn.runtime.least_change import Problem, solve
-from sysdyn.runtime.start import EXACT, ConsistentState, Starter
+from sysdyn.runtime.start import EXACT, ConsistentState
+from sysdyn.runtime.starter import Starter
 from sysdyn.runtime.system import System
 
 Longs = NDArray[np.int64]

@@ -13,7 +13,7 @@ from sysdyn.runtime.description import Floats
 from sysdyn.runtime.impulses import Impulses, group_rows
 from sysdyn.runtime.least_change import Problem, solve
 from sysdyn.runtime.settled import Settler
-from sysdyn.runtime.start import Starter
+from sysdyn.runtime.starter import Starter
 
 EXACT = 1e-9
 """Scaled residual with which the slower search is content."""

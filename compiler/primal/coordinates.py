@@ -48,7 +48,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
         coordinates=(*network.coordinates, *_node_coordinates(network), *classes.coordinates),
         unknowns=(*network.unknowns, *said.unknowns.values()),
         states=(*network.states, *said.states.values(), *contents.states),
-        initials=(*contents.resolved(), *unsaid(network, initials, reader, reflected=reflected)),
+        initials=(*contents.resolved(), *unsaid(network, initials, sizes, reader, reflected=reflected)),
         nodes=(),
         branches=(),
         couplings=(),

@@ -9,16 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from sysdyn.compiler.primal.bounds import Sizes
+from sysdyn.compiler.primal.overlaps import beside, meeting, narrowed, ranges_of
 from sysdyn.compiler.primal.reading import Reader
 from sysdyn.dsl.expression import Node, const, var, variables
 from sysdyn.dsl.network import Branch, Energy, Initial, Loop, Network
 
 _CONTENT = {"potential": "bq", "kinetic": "bp"}
+_SAYING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 
 
-def unsaid(network: Network, initials: Sequence[Initial], reader: Reader, *, reflected: bool) -> Iterator[Initial]:
-    """One guess for the stores of a statement whose contents follow from several coordinates, or beside those; where
-    the text says something of them that counts a million times as much.
+def unsaid(
+    network: Network, initials: Sequence[Initial], sizes: Sizes, reader: Reader, *, reflected: bool
+) -> Iterator[Initial]:
+    """One guess for the stores of a statement whose contents follow from several coordinates, or beside those.
 
     Between common-flow nodes of the author's network positions are guessed, not lengths.
     """
@@ -29,21 +33,35 @@ def unsaid(network: Network, initials: Sequence[Initial], reader: Reader, *, ref
         if b.kind not in _CONTENT or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
-        for loops, content in _contents(b, reader):
-            read = {n for n in variables(content) if n.op == "var"}
+        for _, content in _contents(b, b.loops, reader):
+            read = _unknowns(content)
             if len(read) > 1:
                 shared |= _owners(read)
-            if b.name not in known:
+        for part in () if b.name in known else _parts(b, initials, sizes):
+            for loops, content in _contents(b, part, reader):
                 guess = Initial(content, const(0.0), False, loops, b.place, b.name, unit.text)
-                found.append((guess, _owners(read)))
+                found.append((guess, _owners(_unknowns(content))))
     shared -= _written(network.energies)
     yield from (initial for initial, owners in found if owners & shared)
 
 
-def _contents(b: Branch, reader: Reader) -> Iterator[tuple[tuple[Loop, ...], Node]]:
-    """The contents of the elements of a statement, in coordinates, over the loops in which they are alike."""
+def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[tuple[Loop, ...]]:
+    """The loops over the elements of a statement but for those whose content is guessed: a fixed one stays anyway."""
+    within = ranges_of(b.loops, sizes, b.place)
+    said = [i for i in initials if not i.fixed and i.target.op == "var" and i.target.data[0] == b.name]
+    said = [i for i in said if i.target.data[1] in _SAYING[b.kind] and not i.target.data[2]]
+    holes = [found[0] for i in said if (found := meeting(i, b.at, within, sizes)) is not None]
+    yield from (narrowed(b.loops, rest) for rest in beside(within, holes))
+
+
+def _contents(b: Branch, loops: tuple[Loop, ...], reader: Reader) -> Iterator[tuple[tuple[Loop, ...], Node]]:
+    """The contents of the elements of a statement over these loops, in coordinates."""
     content = var(b.name, _CONTENT[b.kind], *b.at)
-    return reader.cut(b.loops, b.place, lambda ranges: reader.resolve(content, ranges))
+    return reader.cut(loops, b.place, lambda ranges: reader.resolve(content, ranges))
+
+
+def _unknowns(root: Node) -> set[Node]:
+    return {n for n in variables(root) if n.op == "var"}
 
 
 def _owners(read: Iterable[Node]) -> set[str]:
