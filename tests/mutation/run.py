@@ -85,7 +85,7 @@ EQUIVALENT = (
 )
 """Mutants that cannot change a result: file, function, what the line holds, and the reason."""
 TARGET = 0.95
-MOST = 15
+MOST = 30
 """Models that a mutant changes and verify may accept before it counts as a survivor."""
 STRIDE = 5
 """Mutants that are neighbours in the text stand that many parts of a run apart."""
