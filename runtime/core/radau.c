@@ -12,9 +12,9 @@
 #define GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
 #define SHRINK 0.2
 #define SLOW 0.99          /* contraction above which Newton gives up */
-#define CREEPS 4           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
+#define CREEPS 8           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
+#define IDLE 1e-6          /* error of a step that only Newton keeps short */
 #define LEAP 8.0           /* the next one is tried that much longer, with fresh slopes at its end */
-#define EXACT 1e-15        /* of the terms of a row: round-off */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
@@ -265,27 +265,6 @@ static double correct(sd_radau *radau)
     return sqrt(sum / (3.0 * n));
 }
 
-/* SD_FINE where what is left of the rows in all stages is round-off of their terms: a flow that its square gives is
- * known to the root of that, and no iteration brings it nearer */
-static int solved(sd_radau *radau)
-{
-    const sd_system *system = radau->system;
-    int cause = residuals(radau);
-    if (cause)
-        return cause;
-    memset(radau->ee, 0, (size_t)radau->n * sizeof(double));
-    for (int32_t j = 0; j < radau->n; j++)
-        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
-            double slope = fabs(radau->jy[e]) + fabs(radau->jyd[e]) / radau->h;
-            radau->ee[system->row[e]] += slope * (fabs(radau->phi[j]) + fabs(radau->z[2][j]));
-        }
-    for (int s = 0; s < SD_STAGES; s++)
-        for (int32_t i = 0; i < radau->n; i++)
-            if (!(fabs(radau->d[s][i]) <= EXACT * radau->ee[i]))
-                return SD_NEWTON;
-    return SD_FINE;
-}
-
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 static int iterate(sd_radau *radau, int full, int *used, double *retry)
 {
@@ -306,7 +285,7 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
             radau->theta = m == 2 ? ratio : sqrt(ratio * ratio_before);
             ratio_before = ratio;
             if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2))
-                return size <= STAGNANT * tolerance ? SD_FINE : full ? solved(radau) : SD_NEWTON;
+                return size <= STAGNANT * tolerance ? SD_FINE : SD_NEWTON;
             trust = radau->theta < SLOW ? radau->theta / (1.0 - radau->theta) : 1.0 / DBL_EPSILON;
             double end = trust * size * pow(radau->theta, ITERATIONS - 1 - m) / tolerance;
             if (!patient && end >= 1.0 && trust * size > tolerance) {
@@ -316,16 +295,15 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
             }
         }
         before = fmax(size, DBL_MIN);
-        if (trust * size <= tolerance) {
+        if (trust * size <= tolerance && !(full && m == 1)) /* far up an exponential every correction is small */
             return SD_FINE;
-        }
         if (full) {
             radau->old_jacobian = 0;
             if ((cause = factorise(radau, 1)))
                 return cause;
         }
     }
-    return full ? solved(radau) : SD_NEWTON;
+    return SD_NEWTON;
 }
 
 /* error of the step in the weights, filtered once more where it is large after a rejection or at the start */
@@ -497,7 +475,7 @@ int sd_radau_step(sd_radau *radau)
         }
     }
     radau->cause = SD_FINE;
-    radau->creeping = failures > 0 ? radau->creeping + 1 : 0;
+    radau->creeping = failures > 0 && error < IDLE ? radau->creeping + 1 : 0;
     accept(radau, error, iterations);
     if (radau->project)
         project(radau);
