@@ -6,7 +6,7 @@ instants, curves are its cubic Hermite interpolant.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -82,6 +82,16 @@ def curve(trace: Trace, name: str) -> tuple[Floats, Floats]:
     inner = np.where(np.isfinite(inner), inner, left + (right - left) * s)
     fine = time[:-1, None] + h * s
     return np.append(fine.ravel(), time[-1]), np.append(inner.ravel(), values[-1])
+
+
+def styled(panel: Panel, traces: Sequence[tuple[str, Trace]]) -> Iterator[tuple[str, Trace, str, str, int]]:
+    """Curves of a panel: name, trace, label, colour and the number of the trace."""
+    single = len(panel.names) == 1
+    for j, name in enumerate(panel.names):
+        for k, (label, trace) in enumerate(traces):
+            if name in trace:
+                shown = name if len(traces) == 1 else label if single else f"{name}, {label}"
+                yield name, trace, shown, COLOURS[(k if single else j) % len(COLOURS)], k
 
 
 def time_unit(traces: Sequence[Trace]) -> tuple[float, str]:

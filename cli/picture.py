@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-from sysdyn.cli.panels import COLOURS, Panel, curve, panels_of, time_unit, unit_text
+from sysdyn.cli.panels import Panel, curve, panels_of, styled, time_unit, unit_text
 from sysdyn.runtime.trace import Trace
 
 STYLES = ("-", "--", ":", "-.")
@@ -89,19 +89,13 @@ def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:
 
 
 def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float) -> None:
-    single = len(panel.names) == 1
     curves = []
-    for j, name in enumerate(panel.names):
-        for k, (label, trace) in enumerate(traces):
-            if name not in trace:
-                continue
-            time, values = curve(trace, name)
-            colour = COLOURS[(k if single else j) % len(COLOURS)]
-            shown = name if len(traces) == 1 else label if single else f"{name}, {label}"
-            (line,) = axis.plot(time * scale, values, STYLES[k % len(STYLES)], color=colour)
-            curves.append((line, _legible(shown)))
+    for name, trace, label, colour, k in styled(panel, traces):
+        time, values = curve(trace, name)
+        (line,) = axis.plot(time * scale, values, STYLES[k % len(STYLES)], color=colour)
+        curves.append((line, _legible(label)))
     unit = unit_text(panel.unit)
-    if single:
+    if len(panel.names) == 1:
         axis.set_ylabel(", ".join(filter(None, [_legible(panel.names[0]), unit])))
     else:
         axis.set_ylabel(unit)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.description import Floats, Ints
-from sysdyn.runtime.least_change import Problem, solve
+from sysdyn.runtime.least_change import solve
 from sysdyn.runtime.start import EXACT, ConsistentState
-from sysdyn.runtime.starter import Starter
+from sysdyn.runtime.starter import Starter, weighted
 from sysdyn.runtime.system import System
 
 Longs = NDArray[np.int64]
@@ -129,29 +129,15 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
             shaken = x + amplitude * size * direction
             rows = starter.groups("phi")
             if rows.any() and q.any():
-                solution = solve(_problem(starter, state.t, shaken, rows, q), shaken)
+                scale, weight = starter.scale(state.t, shaken), np.ones(shaken.size)
+                problem = weighted(starter, state.t, shaken, rows=rows, free=q, scale=scale, weight=weight)
+                solution = solve(problem, shaken)
                 if not solution.residual < EXACT or np.any(np.abs(solution.x - x) > NEAR * amplitude * size):
                     continue
                 shaken = solution.x
             found.append(starter.expand(shaken)[0])
             break
     return found
-
-
-def _problem(starter: Starter, t: float, guess: Floats, rows: NDArray[np.bool_], free: NDArray[np.bool_]) -> Problem:
-    """The rows in the free unknowns, nearest to the guess."""
-    return Problem(
-        residual=lambda z: starter.residual(t, z),
-        jacobian=lambda z: starter.jacobian(t, z),
-        rows=starter.rows,
-        columns=starter.columns,
-        number=starter.settled.rows,
-        use=rows,
-        free=free,
-        guess=guess,
-        scale=starter.scale(t, guess),
-        weight=np.ones(guess.size),
-    )
 
 
 def combination(found: Reactions, left: Ints) -> Floats:

@@ -374,6 +374,13 @@ def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Ma
     # unknowns of one kind and unit are moved by one measure, whatever their values
     scale = starter.scale(t, x)
     weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
+    return weighted(starter, t, guess, rows=rows, free=free, scale=scale, weight=weight)
+
+
+def weighted(
+    starter: Starter, t: float, guess: Floats, *, rows: Mask, free: Mask, scale: Floats, weight: Floats
+) -> Problem:
+    """The equations `rows` in the unknowns `free`, which move from the guess by scale and weight [unknowns]."""
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),

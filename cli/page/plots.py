@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.page.document import document, escape
-from sysdyn.cli.panels import COLOURS, Floats, Panel, curve, panels_of, time_unit, unit_text
+from sysdyn.cli.panels import Floats, Panel, curve, panels_of, styled, time_unit, unit_text
 from sysdyn.runtime.trace import Trace
 
 SCRIPT = "plots.js"
@@ -61,18 +61,12 @@ def figures(traces: Sequence[tuple[str, Trace]], names: Sequence[str]) -> str:
 
 
 def _panel(panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float, arrays: _Arrays) -> dict[str, Any]:
-    single = len(panel.names) == 1
     curves = []
-    for j, name in enumerate(panel.names):
-        for k, (label, trace) in enumerate(traces):
-            if name not in trace:
-                continue
-            time, values = thinned(*curve(trace, name), arrays.most)
-            shown = name if len(traces) == 1 else label if single else f"{name}, {label}"
-            colour = COLOURS[(k if single else j) % len(COLOURS)]
-            places = {"time": arrays.add(time * scale), "values": arrays.add(values)}
-            curves.append({"label": shown, "colour": colour, "dash": k % 2 == 1, **places})
-    name, unit = panel.names[0] if single else "", unit_text(panel.unit)
+    for name, trace, shown, colour, k in styled(panel, traces):
+        time, values = thinned(*curve(trace, name), arrays.most)
+        places = {"time": arrays.add(time * scale), "values": arrays.add(values)}
+        curves.append({"label": shown, "colour": colour, "dash": k % 2 == 1, **places})
+    name, unit = panel.names[0] if len(panel.names) == 1 else "", unit_text(panel.unit)
     label = f"{', '.join(panel.names)} over time"
     height = 320 if len(panel.names) > 3 else 250
     return {"name": name, "unit": unit, "label": label, "height": height, "curves": curves}

@@ -220,21 +220,17 @@ class Contents:
         piece = None
         if target.op == "var" and target.data[1] in ("be", "bq") and not variables(initial.value):
             piece = self.reader.piece(target.data[0], target.args, ranges)
-        if piece is not None and piece.member is not None and self._charge(piece, initial) is not None:
+        content = None if piece is None else self._charge(piece, initial)
+        if piece is not None and piece.member is not None and content is not None:
             m = piece.member
             if not self.reader.book.contents.get(piece.element.number, ("", True))[1]:
-                moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
-                content = self._charge(piece, initial)
-                assert content is not None
-                return "pin", moved, content
+                return "pin", self.reader.resolve(var(target.data[0], "bq", *target.args), ranges), content
             q = var(m.coordinate, "q", *m.indices(target.args))
             first = self.start(m.leader.name, m.leader_at(target.args))
             if m.leads and len(m.index) == len(target.args):
-                content = self._charge(piece, initial)
-                assert content is not None
                 return "pin", q, content
             return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
-        if piece is not None and piece.member is None and (content := self._charge(piece, initial)) is not None:
+        if piece is not None and piece.member is None and content is not None:
             moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
             return "pin", *_pin(moved, content)
         new, value = (self.reader.resolve(node, ranges) for node in (target, initial.value))
