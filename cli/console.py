@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import click
 from sysdyn.cli.failures import envelope, plain
-from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
 
@@ -65,7 +65,7 @@ class Console:
         return diagnostic.code in ROUTINE and not self.explain
 
     def _render(self, found: Iterable[Diagnostic]) -> None:
-        from sysdyn.dsl.render import render
+        from sysdyn.dsl.text.render import render
 
         shown = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
         for diagnostic in shown:

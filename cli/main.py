@@ -23,7 +23,7 @@ COMMANDS = {
 
 
 class Group(click.Group):
-    """Knows its commands by name; imports `sysdyn.cli.<name>` when it is called."""
+    """Knows its commands by name; imports `sysdyn.cli.commands.<name>_command` when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of the alphabet."""
@@ -33,7 +33,7 @@ class Group(click.Group):
         """The command of that name."""
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"sysdyn.cli.{cmd_name}_command")
+        module = importlib.import_module(f"sysdyn.cli.commands.{cmd_name}_command")
         found = module.command
         assert isinstance(found, click.Command)
         return found

@@ -6,10 +6,10 @@ displacements (book 5.14), and coordinates of one style serve one family.
 
 from __future__ import annotations
 
-from sysdyn.compiler.reflection import unreflectable
-from sysdyn.dsl.diagnostics import Diagnostic, Place, Related
-from sysdyn.dsl.expression import Node, variables
-from sysdyn.dsl.network import Network
+from sysdyn.compiler.network.reflection import unreflectable
+from sysdyn.dsl.model.expression import Node, variables
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related
 
 PRIMAL = ("lagrangian", "hamiltonian", "kane")
 COMPLEMENTARY = ("co_lagrangian", "co_hamiltonian")

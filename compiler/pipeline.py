@@ -12,27 +12,30 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from sysdyn.compiler import binding as binding_
-from sysdyn.compiler import build, descriptor, energies, manifest
-from sysdyn.compiler import program as program_
-from sysdyn.compiler.binding import Binding, Overrides
-from sysdyn.compiler.checks import check_energies
-from sysdyn.compiler.counts import check_counts
-from sysdyn.compiler.descriptor import DescriptorForm
-from sysdyn.compiler.emit_c import emit_c
-from sysdyn.compiler.emit_numpy import emit_numpy
-from sysdyn.compiler.energies import EnergyModel
-from sysdyn.compiler.floating import anchored
-from sysdyn.compiler.hamiltonian import hamiltonian
-from sysdyn.compiler.integration import integrate
-from sysdyn.compiler.kane import kane
-from sysdyn.compiler.lagrangian import lagrangian
-from sysdyn.compiler.primal import Step, primal
-from sysdyn.compiler.program import Program
-from sysdyn.compiler.program_text import verify_program
-from sysdyn.compiler.reflection import reflect
-from sysdyn.dsl.diagnostics import Diagnostic, ModelError
-from sysdyn.dsl.network import Network
+from sysdyn.compiler.binding import binding as binding_
+from sysdyn.compiler.binding import manifest
+from sysdyn.compiler.binding.binding import Binding, Overrides
+from sysdyn.compiler.binding.checks import check_energies
+from sysdyn.compiler.binding.counts import check_counts
+from sysdyn.compiler.forms import descriptor
+from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.compiler.forms.floating import anchored
+from sysdyn.compiler.forms.hamiltonian import hamiltonian
+from sysdyn.compiler.forms.integration import integrate
+from sysdyn.compiler.forms.kane import kane
+from sysdyn.compiler.forms.lagrangian import lagrangian
+from sysdyn.compiler.model import energies
+from sysdyn.compiler.model.energies import EnergyModel
+from sysdyn.compiler.network.primal import Step, primal
+from sysdyn.compiler.network.reflection import reflect
+from sysdyn.compiler.program import build
+from sysdyn.compiler.program import program as program_
+from sysdyn.compiler.program.emit_c import emit_c
+from sysdyn.compiler.program.emit_numpy import emit_numpy
+from sysdyn.compiler.program.program import Program
+from sysdyn.compiler.program.program_text import verify_program
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
 FORMULATIONS: dict[str, Callable[[EnergyModel], DescriptorForm]] = {
     "lagrangian": lagrangian,

@@ -9,21 +9,22 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sysdyn.dsl import checks, graph_checks, syntax
-from sysdyn.dsl import dimensions as dim
-from sysdyn.dsl import expression as ex
-from sysdyn.dsl.context import Failed
-from sysdyn.dsl.diagnostics import Place, Report, SourceText
-from sysdyn.dsl.elaborate import Elaborator
-from sysdyn.dsl.files import FileScope
-from sysdyn.dsl.network import Network, Scene
-from sysdyn.dsl.parse import parse
-from sysdyn.dsl.parts import Parts
-from sysdyn.dsl.resolve import Resolver
-from sysdyn.dsl.scenes import SceneReader
-from sysdyn.dsl.symbols import Space, nearest
-from sysdyn.dsl.units import Dimension
-from sysdyn.dsl.values import Values
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.elaborate.files import FileScope
+from sysdyn.dsl.elaborate.parts import Parts
+from sysdyn.dsl.elaborate.scenes import SceneReader
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Network, Scene
+from sysdyn.dsl.model.units import Dimension
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.resolve import Resolver
+from sysdyn.dsl.names.symbols import Space, nearest
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.rules import checks, graph_checks
+from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.tree import syntax
 
 _FRAMES = 20_000  # nesting is bounded by the parser (200 levels); chains of definitions by the file's size
 

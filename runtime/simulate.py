@@ -11,17 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.runtime.accuracy import FINEST, Achieved, control
-from sysdyn.runtime.carrier import Carrier
-from sysdyn.runtime.description import Description, Floats, describe
-from sysdyn.runtime.failures import NoSuchForm, SolverFailure
-from sysdyn.runtime.options import Options, choose_index, choose_method
-from sysdyn.runtime.rates import determined
-from sysdyn.runtime.runs import LONG, Runs, Samples
-from sysdyn.runtime.start import ConsistentState, consistent_start
-from sysdyn.runtime.structure import Structure, index_of, structure
-from sysdyn.runtime.system import System
-from sysdyn.runtime.underlying import obstacle
+from sysdyn.runtime.integrate.accuracy import FINEST, Achieved, control
+from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
+from sysdyn.runtime.integrate.runs import LONG, Runs, Samples
+from sysdyn.runtime.integrate.underlying import obstacle
+from sysdyn.runtime.model.carrier import Carrier
+from sysdyn.runtime.model.description import Description, Floats, describe
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState, consistent_start
+from sysdyn.runtime.structure.rates import determined
+from sysdyn.runtime.structure.structure import Structure, index_of, structure
 
 FINEST_RADAU = 1e-17
 """Smallest tolerance of Radau: its error test works with a tenth of the power 2/3 of it (core/radau.h)."""

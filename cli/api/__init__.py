@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli import targets
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.prepare import Prepared, prepare
-from sysdyn.cli.running import Request, run
-from sysdyn.cli.starting import start
-from sysdyn.compiler.binding import Binding
-from sysdyn.dsl import expression as ex
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.cli.run.running import Request, run
+from sysdyn.cli.run.starting import start
+from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
-from sysdyn.dsl.diagnostics import ModelError, Report
-from sysdyn.runtime.failures import SolverFailure
-from sysdyn.runtime.system import System
-from sysdyn.runtime.trace import Trace
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.trace.trace import Trace
 
 __all__ = ["ModelError", "Module", "SolverFailure", "Trace", "UsageError", "compile_model", "simulate"]
 

@@ -117,7 +117,7 @@ def find(root: Path, names: Sequence[str] = ()) -> tuple[Golden, ...]:
     for name in names:
         here = [g for g in found if name in (g.label, g.folder.name, g.model.name, str(g.model), str(g.folder))]
         if not here:
-            from sysdyn.dsl.symbols import nearest
+            from sysdyn.dsl.names.symbols import nearest
 
             near = nearest(name, [g.label for g in found])
             hint = f"nearest: '{near}'" if near else f"there are: {', '.join(g.label for g in found)}"

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from sysdyn.cli.diffing import differences, headline, table
+from sysdyn.cli.compare.diffing import differences, headline, table
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.checking import Case, loaded, tolerance_of
 from sysdyn.cli.golden.recording import Recorded
@@ -15,7 +15,7 @@ from sysdyn.cli.golden.structures import changed
 from sysdyn.cli.page.document import document
 from sysdyn.cli.page.document import table as html_table
 from sysdyn.runtime.comparison.verdict import Incomparable
-from sysdyn.runtime.failures import TraceError
+from sysdyn.runtime.model.failures import TraceError
 
 BESIDE = ("structure", "meter", "run")
 """Kinds of findings that are not in a case's own page of quantities."""

@@ -12,17 +12,17 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.diffing import as_json, cases, common, differences, headline
+from sysdyn.cli.compare.diffing import as_json, cases, common, differences, headline
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.runs import Run, Stopped, between, run
 from sysdyn.cli.golden.structures import changed
-from sysdyn.cli.running import Request
+from sysdyn.cli.run.running import Request
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance, Verdict
-from sysdyn.runtime.failures import TraceError
+from sysdyn.runtime.model.failures import TraceError
 
 DIFFERENT, SOLVER, INPUT_OUTPUT = 1, 3, 5
 SHARE = 0.01
@@ -160,7 +160,7 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
     different = not verdict.equal or failed is not None
     page = ""
     if with_page and different:
-        from sysdyn.cli.comparison_page import section
+        from sysdyn.cli.compare.comparison_page import section
 
         page = section(common(kept, set(structure["quantities"])), one.trace, verdict)
     return Case(

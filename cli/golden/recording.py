@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.diffing import common, differences, sentence
+from sysdyn.cli.compare.diffing import common, differences, sentence
 from sysdyn.cli.golden.runs import APART, Run, Stopped, between, run
-from sysdyn.cli.running import Request
+from sysdyn.cli.run.running import Request
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Curve, Flags, bernstein, cells_at
 from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned

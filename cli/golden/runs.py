@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.cli import targets
-from sysdyn.cli.running import Ran, Request, integrate, options_of, ready
-from sysdyn.compiler import energies
-from sysdyn.dsl import expression as ex
-from sysdyn.dsl.diagnostics import Report
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.running import Ran, Request, integrate, options_of, ready
+from sysdyn.compiler.model import energies
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.arrays import Arrays, arrays_of
 from sysdyn.runtime.comparison.curve import Floats
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.trace.trace import Trace
 
 INSTANTS = 2000
 """Rows of each run besides its steps: what has no stored rate is a line between them."""

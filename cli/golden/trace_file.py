@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.comparison.arrays import Arrays
-from sysdyn.runtime.trace_store import input_output
+from sysdyn.runtime.trace.trace_store import input_output
 
 
 def write_trace(path: Path, trace: Arrays, attributes: Mapping[str, str | float | int], most: float) -> int:

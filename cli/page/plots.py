@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.page.document import document, escape
-from sysdyn.cli.panels import Floats, Panel, curve, panels_of, styled, time_unit, unit_text
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.page.panels import Floats, Panel, curve, panels_of, styled, time_unit, unit_text
+from sysdyn.runtime.trace.trace import Trace
 
 SCRIPT = "plots.js"
 NUMBERS = 1_000_000

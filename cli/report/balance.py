@@ -12,14 +12,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from sysdyn.cli.page.document import escape, table
-from sysdyn.compiler.energies import flows
-from sysdyn.compiler.terms import canonical, local_variables, split, terms
-from sysdyn.dsl import dimensions as dim
-from sysdyn.dsl.diagnostics import ModelError, Place
-from sysdyn.dsl.expression import Node, add, const, derivative, index, mul, neg, rate, reduction, sub, substitute, var
-from sysdyn.dsl.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
-from sysdyn.dsl.units import si
-from sysdyn.runtime.trace import Trace
+from sysdyn.compiler.model.energies import flows
+from sysdyn.compiler.model.terms import canonical, local_variables, split, terms
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    const,
+    derivative,
+    index,
+    mul,
+    neg,
+    rate,
+    reduction,
+    sub,
+    substitute,
+    var,
+)
+from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
+from sysdyn.dsl.model.units import si
+from sysdyn.dsl.text.diagnostics import ModelError, Place
+from sysdyn.runtime.trace.trace import Trace
 
 MOST = 400
 """Elements and statements whose power is observed."""

@@ -9,20 +9,20 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from sysdyn.cli import targets
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.prepare import Prepared, prepare
 from sysdyn.cli.report.balance import Share, observed, shares
 from sysdyn.cli.report.study import Study, sources_of
-from sysdyn.cli.running import Ran, Request, check_tolerances, integrate, options_of
-from sysdyn.cli.starting import start
-from sysdyn.cli.targets import Target
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, options_of
+from sysdyn.cli.run.starting import start
+from sysdyn.cli.run.targets import Target
 from sysdyn.dsl import load
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.dsl.network import Network
-from sysdyn.runtime.failures import TraceError
-from sysdyn.runtime.options import Options, Progress
-from sysdyn.runtime.trace import Trace
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.integrate.options import Options, Progress
+from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.trace import Trace
 
 LONG = 20.0
 """Wall seconds of a run that is not repeated for the energies of its elements."""

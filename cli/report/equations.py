@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from sysdyn.cli.page.document import escape
 from sysdyn.cli.report.mathml import LARGEST, Typesetter, math, mi, mo, row
 from sysdyn.cli.report.study import Study
-from sysdyn.compiler.descriptor import HOME, DescriptorForm, Summand
-from sysdyn.compiler.terms import Nest, Term
-from sysdyn.dsl.expression import Node, add, index, is_const, sub, substitute, topological
-from sysdyn.dsl.network import Loop
+from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Summand
+from sysdyn.compiler.model.terms import Nest, Term
+from sysdyn.dsl.model.expression import Node, add, index, is_const, sub, substitute, topological
+from sysdyn.dsl.model.network import Loop
 
 MOST = 200
 """Equations that a page typesets."""

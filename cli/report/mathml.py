@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from sysdyn.dsl.expression import Node, topological
-from sysdyn.dsl.network import Loop
+from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.dsl.model.network import Loop
 
 LARGEST = 500
 """Nodes of one expression that is written out."""

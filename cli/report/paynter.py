@@ -6,9 +6,9 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.balance import shown
 from sysdyn.cli.report.mathml import Typesetter, math, mi, mo, row
 from sysdyn.cli.report.study import Study
-from sysdyn.dsl.expression import var
-from sysdyn.dsl.network import Branch
-from sysdyn.runtime.description import count
+from sysdyn.dsl.model.expression import var
+from sysdyn.dsl.model.network import Branch
+from sysdyn.runtime.model.description import count
 
 EDGES = ("p-f", "q-e", "e-f", "p'", "q'")
 """Kinetic, potential, dissipative; what is the rate of p (efforts), what is the rate of q (flows)."""

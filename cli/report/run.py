@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
-from sysdyn.cli.starting import described
-from sysdyn.runtime.description import element
+from sysdyn.cli.run.starting import described
+from sysdyn.runtime.model.description import element
 
 SHOWN = 60
 """Rows of a table of values."""

@@ -10,12 +10,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from sysdyn.cli.page.document import escape
-from sysdyn.cli.panels import COLOURS
+from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.report.layout import places
 from sysdyn.cli.report.study import Study
-from sysdyn.dsl.diagnostics import Place
-from sysdyn.dsl.expression import Node, topological
-from sysdyn.dsl.network import Branch, Loop, Shape, Terminal
+from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.dsl.model.network import Branch, Loop, Shape, Terminal
+from sysdyn.dsl.text.diagnostics import Place
 
 MOST = 250
 """Boxes of a picture that can be read."""

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysdyn.cli.prepare import Prepared
 from sysdyn.cli.report.balance import Share
 from sysdyn.cli.report.mathml import Typesetter
-from sysdyn.cli.running import Ran
-from sysdyn.cli.starting import Started
-from sysdyn.cli.targets import Target
-from sysdyn.dsl.diagnostics import Place
-from sysdyn.dsl.network import Network
-from sysdyn.dsl.source import SourceText
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import Ran
+from sysdyn.cli.run.starting import Started
+from sysdyn.cli.run.targets import Target
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.runtime.trace.trace import Trace
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import re
 
 from sysdyn.cli.page.document import escape
 from sysdyn.cli.report.study import Study
-from sysdyn.dsl.source import SourceText
+from sysdyn.dsl.text.source import SourceText
 
 WORDS = (
     "accuracy|as|at|branch|cocoord|component|const|content|coord|discrete|domain|dynamic|energy|every|expect|extends|fn"

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.verdict import About, Event
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.trace.trace import Trace
 
 
 class Arrays:

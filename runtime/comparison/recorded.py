@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.verdict import About, Event, Incomparable
-from sysdyn.runtime.failures import TraceError
+from sysdyn.runtime.model.failures import TraceError
 
 CACHE = 1 << 16
 """Bytes of chunks that HDF5 keeps of each open data set: its own default is 8 MB, and a trace has hundreds."""

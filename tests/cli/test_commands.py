@@ -116,7 +116,7 @@ def test_exit_codes(tmp_path, capsys):
 
 
 def test_a_fault_is_told_from_the_users_mistakes(tmp_path, capsys, monkeypatch):
-    from sysdyn.cli import targets
+    from sysdyn.cli.run import targets
 
     def broken(*_):
         raise ZeroDivisionError("inside")
@@ -127,7 +127,7 @@ def test_a_fault_is_told_from_the_users_mistakes(tmp_path, capsys, monkeypatch):
 
 
 def test_interruption(tmp_path, capsys, monkeypatch):
-    from sysdyn.cli import targets
+    from sysdyn.cli.run import targets
 
     def interrupted(*_):
         raise KeyboardInterrupt
@@ -138,7 +138,7 @@ def test_interruption(tmp_path, capsys, monkeypatch):
 
 
 def test_strict_counts_warnings(tmp_path, capsys, monkeypatch):
-    from sysdyn.cli import check_command
+    from sysdyn.cli.commands import check_command
     from sysdyn.dsl import load
 
     path = write(tmp_path, PENDULUM)
@@ -231,7 +231,7 @@ def test_explain(capsys):
 
 
 def test_every_code_has_a_page(capsys):
-    from sysdyn.dsl import codes
+    from sysdyn.dsl.text import codes
 
     for code in codes.codes():
         assert run(["explain", code]) == 0

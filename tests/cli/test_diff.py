@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 import pytest
 from schema import NUMBER, conforms, envelope
-from sysdyn.cli.diffing import junit
+from sysdyn.cli.compare.diffing import junit
 from sysdyn.cli.main import run
-from sysdyn.cli.unit_text import conversion
+from sysdyn.cli.page.unit_text import conversion
 from texts import PENDULUM, process, run_json, write
 
 DIFF = {"equal": bool, "worst": dict, "variables": list, "traces": list, "tolerance": dict}

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.panels import curve, panels_of, unit_text
-from sysdyn.cli.sparkline import sparkline
-from sysdyn.runtime.trace import Quantity, Trace
+from sysdyn.cli.page.panels import curve, panels_of, unit_text
+from sysdyn.cli.page.sparkline import sparkline
+from sysdyn.runtime.trace.trace import Quantity, Trace
 from texts import PENDULUM, write
 
 
@@ -128,7 +128,7 @@ def test_names_and_values_that_are_hard_to_draw(tmp_path):
             ("endless", "V", lambda t: np.where(t > 0.5, np.inf, t)),
         ]
     )
-    from sysdyn.cli.picture import picture
+    from sysdyn.cli.page.picture import picture
 
     text = picture([("made", trace)], trace.names, "svg").decode()
     assert "_hidden" in text
@@ -138,14 +138,14 @@ def test_names_and_values_that_are_hard_to_draw(tmp_path):
 
 def test_an_empty_trace_can_be_drawn():
     trace = Trace("empty.h5", np.zeros(0), {"final": 0}, {}, {"x": Quantity("x", np.zeros(0), "m", 1.0, np.zeros(0))})
-    from sysdyn.cli.picture import picture
+    from sysdyn.cli.page.picture import picture
 
     assert picture([("empty", trace)], ["x"], "png").startswith(b"\x89PNG")
 
 
 def test_many_quantities():
     trace = made([(f"x{k}", f"m{k}", np.sin) for k in range(2, 19)])
-    from sysdyn.cli.picture import picture
+    from sysdyn.cli.page.picture import picture
 
     assert picture([("made", trace)], trace.names, "png").startswith(b"\x89PNG")
 

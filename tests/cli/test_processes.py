@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.trace.trace import Trace
 from texts import ENDLESS, PENDULUM, ROOT, environment, process, write
 
 

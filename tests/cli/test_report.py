@@ -14,7 +14,7 @@ from sysdyn.cli.main import run
 from sysdyn.cli.page.plots import thinned
 from sysdyn.cli.report.layout import places
 from sysdyn.cli.report.mathml import Typesetter, math, number
-from sysdyn.dsl import expression as ex
+from sysdyn.dsl.model import expression as ex
 from texts import ARRAY, BROKEN, FAILING, PENDULUM, ROOT, write
 
 SECTIONS = ("text", "network", "paynter", "energies", "equations", "unknowns", "start", "traces", "balance", "solver")

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.trace.trace import Trace
 from texts import ARRAY, BROKEN, ENDLESS, PENDULUM, process, run_json, write
 
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.runtime.failures import TraceError
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.trace import Trace
 from texts import ENDLESS, PENDULUM, write
 
 LONG = bool(os.environ.get("SYSDYN_LONG"))
@@ -25,7 +25,7 @@ DAMAGED = 1000 if LONG else 40
 
 WATCHED = """
 import sys, time
-from sysdyn.runtime import trace
+from sysdyn.runtime.trace import trace
 flush = trace.TraceWriter._turn
 def turn(self, last):
     flush(self, last)

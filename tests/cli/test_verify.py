@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from schema import EXPECT, NUMBER, STATISTICS, conforms, envelope
-from sysdyn.cli import twins
-from sysdyn.cli.agreement import gaps, horizon
 from sysdyn.cli.main import run
+from sysdyn.cli.verify import twins
+from sysdyn.cli.verify.agreement import gaps, horizon
 from sysdyn.compiler import pipeline
-from sysdyn.dsl import expression as ex
-from sysdyn.runtime.trace import Quantity, Trace
+from sysdyn.dsl.model import expression as ex
+from sysdyn.runtime.trace.trace import Quantity, Trace
 from texts import FAILING, PENDULUM, ROOT, STUCK, TWO_SCENES, run_json, write
 
 MODELS = ROOT / "models"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from corpus import BASES, MUTANTS, SPAN, mutants
-from sysdyn.cli.diffing import differences
+from sysdyn.cli.compare.diffing import differences
 from sysdyn.runtime.comparison.verdict import Event, Incomparable, Tolerance
 
 DEFAULT = Tolerance()

@@ -11,13 +11,13 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from sysdyn.cli import targets
-from sysdyn.cli.diffing import common, differences, headline
-from sysdyn.cli.running import Ran, Request, run
-from sysdyn.cli.sizes import sizes
-from sysdyn.cli.twins import free_quantities
-from sysdyn.cli.verification import METHODS, REFUSALS, TIMES
-from sysdyn.dsl.diagnostics import Report
+from sysdyn.cli.compare.diffing import common, differences, headline
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.running import Ran, Request, run
+from sysdyn.cli.run.sizes import sizes
+from sysdyn.cli.verify.twins import free_quantities
+from sysdyn.cli.verify.verification import METHODS, REFUSALS, TIMES
+from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import Tolerance
 

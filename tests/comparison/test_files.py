@@ -9,7 +9,7 @@ from sysdyn.runtime.comparison import quantities
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
-from sysdyn.runtime.failures import TraceError
+from sysdyn.runtime.model.failures import TraceError
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sysdyn.cli.running import Request, run
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.trace.trace import Trace
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 

@@ -5,10 +5,10 @@ import importlib.util
 import itertools
 
 import numpy as np
-from sysdyn.compiler.build import build
-from sysdyn.compiler.emit_c import emit_c
-from sysdyn.compiler.emit_numpy import emit_numpy
-from sysdyn.compiler.places import starts
+from sysdyn.compiler.binding.places import starts
+from sysdyn.compiler.program.build import build
+from sysdyn.compiler.program.emit_c import emit_c
+from sysdyn.compiler.program.emit_numpy import emit_numpy
 
 _serial = itertools.count()
 

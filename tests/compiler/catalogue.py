@@ -5,9 +5,8 @@ import json
 import os
 from pathlib import Path
 
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.diagnostics import SourceText
-from sysdyn.dsl.network import (
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import (
     Constraint,
     Coordinate,
     Dynamic,
@@ -19,7 +18,8 @@ from sysdyn.dsl.network import (
     Unknown,
     Work,
 )
-from sysdyn.dsl.units import Unit
+from sysdyn.dsl.model.units import Unit
+from sysdyn.dsl.text.diagnostics import SourceText
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = Path(os.environ.get("SYSDYN_SHARED", ROOT.parent / "shared"))

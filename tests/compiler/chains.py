@@ -2,8 +2,8 @@
 
 import numpy as np
 from catalogue import ONE, PLACE
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import (
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import (
     Constraint,
     Coordinate,
     Energy,

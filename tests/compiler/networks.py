@@ -6,10 +6,10 @@ import types
 import numpy as np
 from catalogue import ONE, PLACE
 from chains import blank, parameter
-from sysdyn.compiler.oracle import Oracle
+from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import (
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import (
     Branch,
     Coupling,
     Domain,
@@ -353,10 +353,10 @@ def null_vector(a, e, s):
 
 def solve(network, end, path, formulation="lagrangian", accuracy=1e-6, **more):
     """The trace of a network from 0 to `end`, and the outcome."""
-    from sysdyn.runtime.carrier import load
-    from sysdyn.runtime.options import Options
+    from sysdyn.runtime.integrate.options import Options
+    from sysdyn.runtime.model.carrier import load
     from sysdyn.runtime.simulate import simulate
-    from sysdyn.runtime.trace import Trace
+    from sysdyn.runtime.trace.trace import Trace
 
     with x.fresh():
         model = compiled(network(), formulation)

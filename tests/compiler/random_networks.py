@@ -2,7 +2,7 @@
 
 import numpy as np
 from networks import ELECTRICAL, ROTATION, TRANSLATION, Net, Tableau, unrolled
-from sysdyn.dsl import expression as x
+from sysdyn.dsl.model import expression as x
 
 
 class Sketch:

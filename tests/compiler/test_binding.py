@@ -9,9 +9,9 @@ from carriers import NumpyCarrier
 from catalogue import ONE, PLACE
 from chains import blank, chain, coordinate, parameter
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.diagnostics import ModelError
-from sysdyn.dsl.network import Constraint, ElementSetting, Energy, Initial, Loop
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Constraint, ElementSetting, Energy, Initial, Loop
+from sysdyn.dsl.text.diagnostics import ModelError
 
 
 @pytest.fixture(autouse=True)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from carriers import CCarrier, NumpyCarrier
 from catalogue import BLOCKS, convert, load, network, state
-from sysdyn.compiler.descriptor import BLOCKS as ALL_BLOCKS
-from sysdyn.compiler.descriptor import WITHOUT_ENTRIES
-from sysdyn.compiler.oracle import Oracle
+from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.forms.descriptor import BLOCKS as ALL_BLOCKS
+from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
+from sysdyn.dsl.model import expression as x
 
 CATALOGUE, VALUES = load("catalogue.json"), load("descriptor_values.json")
 WITHOUT_VALUES = "redundant_pendulum|lagrangian|0"  # its multipliers are not determined

@@ -8,12 +8,12 @@ import pytest
 from carriers import CCarrier, NumpyCarrier
 from catalogue import ONE, PLACE
 from chains import blank, chain, coordinate, parameter, reference
-from sysdyn.compiler.descriptor import BLOCKS, WITHOUT_ENTRIES
-from sysdyn.compiler.manifest import structure
-from sysdyn.compiler.oracle import Oracle
+from sysdyn.compiler.binding.manifest import structure
+from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.forms.descriptor import BLOCKS, WITHOUT_ENTRIES
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import Energy, Loop, Observation
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Energy, Loop, Observation
 
 
 def compiled(n, formulation="lagrangian", backend="c"):

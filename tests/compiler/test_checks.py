@@ -6,9 +6,9 @@ import pytest
 from catalogue import ONE, PLACE
 from chains import blank, coordinate, parameter
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.diagnostics import ModelError
-from sysdyn.dsl.network import Constraint, Energy, Loop, Observation, Scene, Unknown, Work
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Constraint, Energy, Loop, Observation, Scene, Unknown, Work
+from sysdyn.dsl.text.diagnostics import ModelError
 
 
 @pytest.fixture(autouse=True)

@@ -10,11 +10,11 @@ import pytest
 from carriers import CCarrier
 from catalogue import PLACE, load, network
 from chains import chain
-from sysdyn.compiler import build as build_
-from sysdyn.compiler.emit_c import emit_c
-from sysdyn.compiler.emit_numpy import emit_numpy
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
+from sysdyn.compiler.program import build as build_
+from sysdyn.compiler.program.emit_c import emit_c
+from sysdyn.compiler.program.emit_numpy import emit_numpy
+from sysdyn.dsl.model import expression as x
 
 HERE = Path(__file__).parent
 HOSTILE = ('x; system("ls")', "*/ #include </etc/passwd>", "größe_ß", "a" * 10_000, "int", "\\", "% s", "x\ny")
@@ -25,8 +25,8 @@ sys.path.insert(0, sys.argv[1])
 from catalogue import load, network
 from chains import chain
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.compiler.manifest import structure
-from sysdyn.dsl import expression as x
+from sysdyn.compiler.binding.manifest import structure
+from sysdyn.dsl.model import expression as x
 entries = load("catalogue.json")
 total = hashlib.sha256()
 for backend in ("c", "numpy"):
@@ -162,7 +162,7 @@ def test_a_folder_that_others_write_is_not_used(tmp_path, monkeypatch):
 
 
 def test_many_processes_build_one_text(tmp_path):
-    run = "from sysdyn.compiler.build import build; import ctypes; ctypes.CDLL(str(build('int sd_x = 7;')))"
+    run = "from sysdyn.compiler.program.build import build; import ctypes; ctypes.CDLL(str(build('int sd_x = 7;')))"
     env = {**os.environ, "SYSDYN_CACHE": str(tmp_path / "cache")}
     children = [subprocess.Popen([sys.executable, "-c", run], env=env) for _ in range(8)]
     assert [child.wait() for child in children] == [0] * 8

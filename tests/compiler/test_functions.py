@@ -7,11 +7,11 @@ import pytest
 from carriers import CCarrier, NumpyCarrier
 from catalogue import ONE, PLACE
 from chains import blank, coordinate
-from sysdyn.compiler.descriptor import BLOCKS, WITHOUT_ENTRIES
-from sysdyn.compiler.oracle import Oracle
+from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.forms.descriptor import BLOCKS, WITHOUT_ENTRIES
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import Constraint, Dynamic, Energy, Observation, State, Unknown, Work
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Constraint, Dynamic, Energy, Observation, State, Unknown, Work
 from test_verifiers import random_expression
 
 POINTS = (-2.5, -1.0, -0.3, 0.0, 0.3, 1.0, 2.5, 700.0, 720.0)

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from sysdyn.compiler import instants as module
-from sysdyn.compiler.instants import instants
+from sysdyn.compiler.binding import instants as module
+from sysdyn.compiler.binding.instants import instants
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as ex
 from sysdyn.dsl import load
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.dsl.source import SourceText
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.source import SourceText
 
 HEAD = "model m {{ param n = 4; param T = 0.1 s; coord x[1..n]: translation = 0 m; "
 BODY = "energy T* = sum(i in 1..n: 1/2*(1 kg)*x[i]'^2); {} }}\nscene s of m {{ time 0 s to 2 s; trace x[1] }}\n"

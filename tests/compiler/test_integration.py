@@ -7,10 +7,10 @@ import pytest
 from carriers import NumpyCarrier
 from catalogue import ONE, PLACE, load, network
 from chains import blank, coordinate, parameter
-from sysdyn.compiler.oracle import Oracle
+from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import Constraint, Energy, Initial, Loop, Observation, Work
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Constraint, Energy, Initial, Loop, Observation, Work
 
 
 @pytest.fixture(autouse=True)

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from sysdyn.compiler.interpret import evaluate
-from sysdyn.compiler.primal.integrals import antiderivative
-from sysdyn.compiler.primal.inverses import inverse
-from sysdyn.compiler.primal.signs import ALL, NEGATIVE, NOT_NEGATIVE, POSITIVE, Reals, reals
-from sysdyn.compiler.tables import evaluate as evaluate_table
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import Table
+from sysdyn.compiler.model.interpret import evaluate
+from sysdyn.compiler.model.tables import evaluate as evaluate_table
+from sysdyn.compiler.network.primal.integrals import antiderivative
+from sysdyn.compiler.network.primal.inverses import inverse
+from sysdyn.compiler.network.primal.signs import ALL, NEGATIVE, NOT_NEGATIVE, POSITIVE, Reals, reals
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Table
 
 VALUES = {"a": 2.0, "b": 0.025, "k": 3.0, "n": -1.5, "z": 0.0}
 A, B, K, N, Z = (x.param(name) for name in VALUES)

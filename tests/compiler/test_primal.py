@@ -17,11 +17,11 @@ from networks import (
     solve,
 )
 from scipy.integrate import solve_ivp
-from sysdyn.compiler.oracle import Oracle
-from sysdyn.compiler.primal import primal
-from sysdyn.compiler.primal.integrals import antiderivative, line
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.diagnostics import ModelError
+from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.network.primal import primal
+from sysdyn.compiler.network.primal.integrals import antiderivative, line
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.text.diagnostics import ModelError
 
 
 @pytest.fixture(autouse=True)
@@ -437,7 +437,7 @@ def test_efforts_of_field_branches_are_those_of_their_nodes():
     net.branch("F", "field", None, None, "b", of=ELECTRICAL)
     work = x.mul(x.const(2.0), of("F", "bf"), of("F", "bf"))
     from catalogue import PLACE
-    from sysdyn.dsl.network import Energy
+    from sysdyn.dsl.model.network import Energy
 
     model = compiled(net.network(observe={"e": of("F", "be")}, energies=(Energy("D", work, (), PLACE),)))
     near(poles(model), [-(1 / 2 + 1 / 3 + 1 / 4) / 0.5])

@@ -18,12 +18,12 @@ from networks import (
     unrolled,
     vectors_agree,
 )
-from sysdyn.compiler.manifest import structure
-from sysdyn.compiler.oracle import Oracle
-from sysdyn.compiler.primal import primal
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.diagnostics import ModelError
-from sysdyn.dsl.network import Constraint, Loop, Unknown
+from sysdyn.compiler.binding.manifest import structure
+from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.network.primal import primal
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Constraint, Loop, Unknown
+from sysdyn.dsl.text.diagnostics import ModelError
 
 
 @pytest.fixture(autouse=True)

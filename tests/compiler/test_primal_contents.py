@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from networks import ELECTRICAL, HYDRAULIC, TRANSLATION, Net, compiled, solve
-from sysdyn.compiler.primal import primal
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import Loop
+from sysdyn.compiler.network.primal import primal
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Loop
 
 
 @pytest.fixture(autouse=True)

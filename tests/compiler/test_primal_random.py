@@ -8,8 +8,8 @@ import os
 import pytest
 from networks import compiled, constraint_rank, matched, poles, read_all, unrolled, vectors_agree
 from random_networks import arrays, sketch
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.diagnostics import ModelError
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.text.diagnostics import ModelError
 
 LONG = 12 if os.environ.get("SYSDYN_LONG") else 1
 POLES = 1e-8  # relative: seen are 2e-11 over 1200 scalar networks, 3e-13 over 1500 of arrays

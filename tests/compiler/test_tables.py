@@ -6,11 +6,11 @@ from carriers import CCarrier, NumpyCarrier
 from catalogue import ONE, PLACE
 from chains import blank, coordinate
 from scipy.interpolate import CubicSpline, PchipInterpolator, RegularGridInterpolator
-from sysdyn.compiler.oracle import Oracle
+from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.model.tables import evaluate
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.compiler.tables import evaluate
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.network import Energy, Observation, Table
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.network import Energy, Observation, Table
 
 X = (0.0, 0.3, 1.0, 1.2, 2.5, 3.0)
 Z = (1.0, 2.0, 2.5, 0.5, 0.25, 4.0)

@@ -7,14 +7,16 @@ import pytest
 import sympy
 from catalogue import load, network
 from chains import chain
-from sysdyn.compiler import descriptor, energies, program_text
-from sysdyn.compiler.descriptor import verify_descriptor
-from sysdyn.compiler.energies import verify_energies
-from sysdyn.compiler.interpret import evaluate
+from sysdyn.compiler.forms import descriptor
+from sysdyn.compiler.forms.descriptor import verify_descriptor
+from sysdyn.compiler.model import energies
+from sysdyn.compiler.model.energies import verify_energies
+from sysdyn.compiler.model.interpret import evaluate
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.compiler.program import Assign, Store
-from sysdyn.compiler.program_text import verify_program
-from sysdyn.dsl import expression as x
+from sysdyn.compiler.program import program_text
+from sysdyn.compiler.program.program import Assign, Store
+from sysdyn.compiler.program.program_text import verify_program
+from sysdyn.dsl.model import expression as x
 
 
 @pytest.fixture
@@ -157,9 +159,9 @@ def test_derivatives_are_sympy_s(seed):
 def test_energy_model_can_be_written_directly():
     """The constructor is plain: families and terms, no network."""
     from catalogue import PLACE
-    from sysdyn.compiler.energies import EnergyModel, Family
-    from sysdyn.compiler.lagrangian import lagrangian
-    from sysdyn.compiler.terms import Term
+    from sysdyn.compiler.forms.lagrangian import lagrangian
+    from sysdyn.compiler.model.energies import EnergyModel, Family
+    from sysdyn.compiler.model.terms import Term
 
     with x.fresh():
         units = dict.fromkeys("qfpe", "1")

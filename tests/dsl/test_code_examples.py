@@ -1,12 +1,13 @@
 """Each code's page in `explain` tells the truth: its bad text raises the code, its good text does not."""
 
 import pytest
-from sysdyn.cli.check_command import _target
+from sysdyn.cli.commands.check_command import _target
 from sysdyn.cli.console import Console
-from sysdyn.cli.targets import all_targets
-from sysdyn.dsl import codes, load
-from sysdyn.dsl import expression as ex
-from sysdyn.dsl.diagnostics import ModelError, SourceText
+from sysdyn.cli.run.targets import all_targets
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text import codes
+from sysdyn.dsl.text.diagnostics import ModelError, SourceText
 
 ELSEWHERE = {
     "E901": "a scene that is not there is named on the command line",

@@ -6,9 +6,9 @@ import pickle
 import re
 
 import pytest
-from sysdyn.dsl.codes import codes, explain
-from sysdyn.dsl.diagnostics import Diagnostic, ModelError, Related, Report
-from sysdyn.dsl.source import SourceText
+from sysdyn.dsl.text.codes import codes, explain
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Related, Report
+from sysdyn.dsl.text.source import SourceText
 
 SOURCE = SourceText("m.sd", "first line\nsecond \U0001f600 line\n")
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sysdyn.dsl import syntax as s
-from sysdyn.dsl.diagnostics import ModelError
-from sysdyn.dsl.format import format_expression, format_text, format_unit
-from sysdyn.dsl.parse import parse
-from sysdyn.dsl.sameness import first_difference
-from sysdyn.dsl.source import SourceText, Span
+from sysdyn.dsl.format.format import format_expression, format_text, format_unit
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.diagnostics import ModelError
+from sysdyn.dsl.text.source import SourceText, Span
+from sysdyn.dsl.tree import syntax as s
+from sysdyn.dsl.tree.sameness import first_difference
 
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.sd"))
 SHARED = sorted(Path("/work/shared/language").glob("*/*.sd"))

@@ -11,12 +11,12 @@ import time
 from pathlib import Path
 
 import pytest
-from sysdyn.dsl.codes import codes
-from sysdyn.dsl.format import format_text
-from sysdyn.dsl.parse import parse
-from sysdyn.dsl.render import render
-from sysdyn.dsl.sameness import same_tree
-from sysdyn.dsl.source import SourceText
+from sysdyn.dsl.format.format import format_text
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.codes import codes
+from sysdyn.dsl.text.render import render
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.dsl.tree.sameness import same_tree
 
 CASES = int(os.environ.get("SYSDYN_FUZZ", "400"))
 CORPUS = [path.read_bytes().decode() for path in sorted((Path(__file__).parent / "corpus").glob("*.sd"))]

@@ -2,7 +2,7 @@
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.diagnostics import Report, SourceText
+from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 TEXT = """from std.transduce import dc_motor
 from std.electrical import voltage

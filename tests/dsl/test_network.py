@@ -1,9 +1,9 @@
 """From text to the checked network: scopes, instances, units, signs, families."""
 
 import pytest
-from sysdyn.dsl import expression as ex
 from sysdyn.dsl import load
-from sysdyn.dsl.diagnostics import Report, SourceText
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 
 def network(text, scene=None, settings=()):

@@ -10,11 +10,11 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
-from sysdyn.dsl import syntax
-from sysdyn.dsl.diagnostics import ModelError
-from sysdyn.dsl.parse import parse
-from sysdyn.dsl.sameness import same_tree
-from sysdyn.dsl.source import SourceText, Span
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.diagnostics import ModelError
+from sysdyn.dsl.text.source import SourceText, Span
+from sysdyn.dsl.tree import syntax
+from sysdyn.dsl.tree.sameness import same_tree
 
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.sd"))
 SHARED = sorted(Path("/work/shared/language").glob("*/*.sd"))
@@ -287,6 +287,6 @@ def test_positions():
 
 def test_parsing_needs_neither_lark_nor_time():
     """Start-up of check: the tables come with the package."""
-    program = "import sys; from sysdyn.dsl.parse import parse; print('lark' in sys.modules, 'numpy' in sys.modules)"
+    program = "import sys, sysdyn.dsl.parser.parse; print('lark' in sys.modules, 'numpy' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["False", "False"]

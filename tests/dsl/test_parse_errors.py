@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 
 import pytest
-from sysdyn.dsl import complaints
-from sysdyn.dsl.codes import codes
-from sysdyn.dsl.parse import parse
-from sysdyn.dsl.source import SourceText
-from sysdyn.dsl.syntax import Broken
+from sysdyn.dsl.parser import complaints
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.codes import codes
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.dsl.tree.syntax import Broken
 
 SYNTAX = [f"E{number}" for number in range(107, 119)] + ["E308"]
 
@@ -209,7 +209,7 @@ def test_a_second_sign_is_no_comment():
 
 
 def test_every_word_of_a_body_is_known_to_the_messages():
-    from sysdyn.dsl.table import GOTOS, LOOKAHEADS, ROWS
+    from sysdyn.dsl.parser.table import GOTOS, LOOKAHEADS, ROWS
 
     sets = [line.split() for line in LOOKAHEADS.splitlines()]
     bodies = {

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from sysdyn.dsl import table
-from sysdyn.dsl.grammar import build_lark, table_text
-from sysdyn.dsl.lexing import CONTINUES
-from sysdyn.dsl.parse import parse
-from sysdyn.dsl.source import SourceText
+from sysdyn.dsl.parser import table
+from sysdyn.dsl.parser.grammar import build_lark, table_text
+from sysdyn.dsl.parser.lexing import CONTINUES
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.source import SourceText
 
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.sd"))
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from sysdyn.dsl.diagnostics import Diagnostic, Related
-from sysdyn.dsl.render import render
-from sysdyn.dsl.source import SourceText
+from sysdyn.dsl.text.diagnostics import Diagnostic, Related
+from sysdyn.dsl.text.render import render
+from sysdyn.dsl.text.source import SourceText
 
 
 def shown(text, start, end, **more):

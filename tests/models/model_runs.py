@@ -1,8 +1,8 @@
 """Texts and models under a scene, run to their traces."""
 
-from sysdyn.cli.running import Request, run
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.trace.trace import Trace
 
 FOUR = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian")
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from sysdyn.cli.running import Request, run
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.trace.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[2]
 

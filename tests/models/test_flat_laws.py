@@ -3,8 +3,8 @@
 import pytest
 from model_runs import FOUR, attempt, trace_of
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl.diagnostics import ModelError, Report, SourceText
 from sysdyn.dsl.load import document, network
+from sysdyn.dsl.text.diagnostics import ModelError, Report, SourceText
 
 MODEL = """
 model machine {

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
 from scipy.integrate import solve_ivp
+from sysdyn.compiler.network.primal import choices
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.compiler.primal import choices
-from sysdyn.dsl.diagnostics import ModelError, Report, SourceText
 from sysdyn.dsl.load import document, network
+from sysdyn.dsl.text.diagnostics import ModelError, Report, SourceText
 
 
 def _text(parameters, nodes, elements, trace, end="1.5 s", declared=""):

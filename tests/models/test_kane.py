@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from reduced import ROOT, load
-from sysdyn.cli.running import Request, run
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.trace.trace import Trace
 
 REFERENCES = load("references.json")
 SKATES = """

@@ -8,7 +8,7 @@ import pytest
 from model_runs import FOUR, attempt, trace_of
 from reduced import ROOT
 from sysdyn.compiler import pipeline
-from sysdyn.dsl.expression import const, substitute, variables
+from sysdyn.dsl.model.expression import const, substitute, variables
 
 BODIES = """
 model two {

@@ -10,7 +10,7 @@ import pytest
 from model_runs import trace_of
 from reduced import ROOT
 from sysdyn.cli.main import run
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.trace.trace import Trace
 
 MODELS = ROOT / "models"
 FILES = sorted(path.relative_to(MODELS).with_suffix("").as_posix() for path in MODELS.glob("*/*.sd"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from model_runs import attempt, trace_of
-from sysdyn.dsl.format import format_text
+from sysdyn.dsl.format.format import format_text
 
 PRIMAL = ("lagrangian", "hamiltonian", "kane")
 SKATE = """

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from model_runs import trace_of
-from sysdyn.cli.running import Request, run
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.runtime import start
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.start import start
 from test_seed import SEED, settings_of
 
 

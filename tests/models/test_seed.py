@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from changed import CHANGED, EXTREME, STIFF
 from reduced import ROOT, load, solution
-from sysdyn.cli.running import Request, run
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.trace.trace import Trace
 
 ALLOWED = 1e-5
 """Of each variable's largest magnitude, at an accuracy of 1e-6."""

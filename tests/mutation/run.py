@@ -42,9 +42,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 ROOMS = ("dsl", "compiler", "runtime", "cli", "api", "models")
 LOWERING = (
-    "lowering.py", "kane.py", "momenta.py", "integration.py", "audit.py", "mirror.py", "reflection.py", "positions.py",
-    "primal/balances.py", "primal/choices.py", "primal/laws.py", "primal/series.py",
-    "primal/potentials.py", "primal/reading.py", "primal/contents.py", "primal/overlaps.py", "primal/unsaid.py",
+    "forms/lowering.py", "forms/kane.py", "forms/momenta.py", "forms/integration.py", "forms/audit.py",
+    "model/mirror.py", "network/reflection.py", "network/positions.py",
+    "network/primal/balances.py", "network/primal/choices.py", "network/primal/laws.py", "network/primal/series.py",
+    "network/primal/potentials.py", "network/primal/reading.py", "network/primal/contents.py",
+    "network/primal/overlaps.py", "network/primal/unsaid.py",
 )  # fmt: skip
 SEEDS = (
     "dc_motor", "knife_edge", "pendulum", "lead_filter", "two_link_arm", "bead_rod", "electrical_transformer",
@@ -60,28 +62,28 @@ _TEXT = "the text of a message, or the unit of a row in one"
 _CARRIERS = "which coordinates carry p as an unknown: it is dT*/df elsewhere, another form of the same equations"
 _INTEGRATED = "whether psi is integrated: B f + b = 0 and its primitive from the same start have the same solutions"
 EQUIVALENT = (
-    ("kane.py", "_pivot", "uses.get(column, 0) + 1", "prefers one pivot; every regular one spans the same motions"),
-    ("momenta.py", "inertial", "rates = ", _CARRIERS),
-    ("momenta.py", "inertial", "found.add(", _CARRIERS),
-    ("lowering.py", "_massless", "for function, kind in", "the start leaves out the rows that have inertia"),
-    ("lowering.py", "_massless", "moved.add(", "the start leaves out the rows that have inertia"),
-    ("positions.py", "read", "over_ground(", "a quadrature takes its place"),
-    ("momenta.py", "undefined", "yield ", _TEXT),
-    ("integration.py", "_touches", "", _INTEGRATED),
-    ("integration.py", "_exact", "flows = ", _INTEGRATED),
-    ("mirror.py", "", "COMPLEMENTARY = ", "nothing reads it"),
-    ("integration.py", "_note", "", _TEXT),
-    ("integration.py", "_at_start", "", _TEXT),
-    ("primal/contents.py", "store", "places[", _TEXT),
-    ("primal/choices.py", "law", "outer = ", _FORMS),
-    ("primal/choices.py", "", "OWN = ", _FORMS),
-    ("primal/choices.py", "_inside_out", "OWN[", _FORMS),
-    ("primal/choices.py", "_kept", "", _TEXT),
-    ("primal/choices.py", "_said", "", _TEXT),
-    ("primal/laws.py", "_implicit", 'b.side == "p"', _TEXT),
-    ("primal/laws.py", "_stem", "", "labels of constraints"),
-    ("primal/unsaid.py", "_owners", "", "a store alone in its coordinate is measured by its content either way"),
-    ("reflection.py", "_moduli", "rpartition(", _TEXT),
+    ("forms/kane.py", "_pivot", "uses.get(column, 0) + 1", "one pivot; every regular one spans the same motions"),
+    ("forms/momenta.py", "inertial", "rates = ", _CARRIERS),
+    ("forms/momenta.py", "inertial", "found.add(", _CARRIERS),
+    ("forms/lowering.py", "_massless", "for function, kind in", "the start leaves out the rows that have inertia"),
+    ("forms/lowering.py", "_massless", "moved.add(", "the start leaves out the rows that have inertia"),
+    ("network/positions.py", "read", "over_ground(", "a quadrature takes its place"),
+    ("forms/momenta.py", "undefined", "yield ", _TEXT),
+    ("forms/integration.py", "_touches", "", _INTEGRATED),
+    ("forms/integration.py", "_exact", "flows = ", _INTEGRATED),
+    ("model/mirror.py", "", "COMPLEMENTARY = ", "nothing reads it"),
+    ("forms/integration.py", "_note", "", _TEXT),
+    ("forms/integration.py", "_at_start", "", _TEXT),
+    ("network/primal/contents.py", "store", "places[", _TEXT),
+    ("network/primal/choices.py", "law", "outer = ", _FORMS),
+    ("network/primal/choices.py", "", "OWN = ", _FORMS),
+    ("network/primal/choices.py", "_inside_out", "OWN[", _FORMS),
+    ("network/primal/choices.py", "_kept", "", _TEXT),
+    ("network/primal/choices.py", "_said", "", _TEXT),
+    ("network/primal/laws.py", "_implicit", 'b.side == "p"', _TEXT),
+    ("network/primal/laws.py", "_stem", "", "labels of constraints"),
+    ("network/primal/unsaid.py", "_owners", "", "a store alone in its coordinate has one measure either way"),
+    ("network/reflection.py", "_moduli", "rpartition(", _TEXT),
 )
 """Mutants that cannot change a result: file, function, what the line holds, and the reason."""
 TARGET = 0.95
@@ -173,7 +175,7 @@ class _Mutated(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 def changed(text: str) -> str:
     """A mutant's text with the import that its changes need."""
     head, mark, rest = text.partition("from __future__ import annotations\n")
-    line = "import sysdyn.dsl.expression as ex_\n"
+    line = "import sysdyn.dsl.model.expression as ex_\n"
     return head + mark + line + rest if mark else line + text
 
 
@@ -209,9 +211,10 @@ def verified(model: str) -> tuple[int | str, set[str]]:
 def print_of(model: str) -> str:
     """A digest of all that verify makes runs of: lowered network, energies, form and program in every formulation."""
     get = importlib.import_module
-    ex, running, targets = get("sysdyn.dsl.expression"), get("sysdyn.cli.running"), get("sysdyn.cli.targets")
+    running, targets = get("sysdyn.cli.run.running"), get("sysdyn.cli.run.targets")
+    ex = get("sysdyn.dsl.model.expression")
     load, pipeline = get("sysdyn.dsl.load"), get("sysdyn.compiler.pipeline")
-    choose, said = get("sysdyn.compiler.formulations").choose, get("sysdyn.dsl.diagnostics")
+    choose, said = get("sysdyn.compiler.formulations").choose, get("sysdyn.dsl.text.diagnostics")
     wrong, report = said.ModelError, said.Report
     whole = hashlib.sha256()
     try:

@@ -5,14 +5,14 @@ import sys
 import chain_model as chain
 import numpy as np
 import pytest
-from sysdyn.runtime import ordering
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.core_library import ROW_HEAD
-from sysdyn.runtime.failures import ContractError
-from sysdyn.runtime.integrate import Integration, Request
-from sysdyn.runtime.start import consistent_start
-from sysdyn.runtime.structure import structure
-from sysdyn.runtime.system import System
+from sysdyn.runtime.integrate.integrate import Integration, Request
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.core_library import ROW_HEAD
+from sysdyn.runtime.model.failures import ContractError
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics import ordering
+from sysdyn.runtime.start.start import consistent_start
+from sysdyn.runtime.structure.structure import structure
 
 MANIFEST = {"structure": chain.structure()}
 
@@ -107,7 +107,7 @@ def test_two_carriers_give_the_same_run(library):
 def test_patterns_of_a_large_array_need_no_loop():
     code = (
         "import sys, time; sys.path.insert(0, sys.argv[1]); import chain_model as chain\n"
-        "from sysdyn.runtime.carrier import load; from sysdyn.runtime.system import System\n"
+        "from sysdyn.runtime.model.carrier import load; from sysdyn.runtime.model.system import System\n"
         "b = time.process_time()\n"
         "s = System({'structure': chain.structure()}, chain.binding(100000), load(chain.Chain), '2')\n"
         "assert s.unknowns == 600000 and time.process_time() - b < 5, time.process_time() - b\n"
@@ -120,8 +120,9 @@ def test_patterns_of_a_large_array_need_no_loop():
 def test_start_of_small_models_imports_no_scipy():
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import chain_model as chain\n"
-        "from sysdyn.runtime.carrier import load; from sysdyn.runtime.system import System\n"
-        "from sysdyn.runtime.start import consistent_start; from sysdyn.runtime.structure import structure\n"
+        "from sysdyn.runtime.model.carrier import load; from sysdyn.runtime.model.system import System\n"
+        "from sysdyn.runtime.start.start import consistent_start\n"
+        "from sysdyn.runtime.structure.structure import structure\n"
         "s = System({'structure': chain.structure()}, chain.binding(40), load(chain.Chain)); assert s.unknowns == 200\n"
         "structure(s, consistent_start(s, 0.0)); assert 'scipy' not in sys.modules and 'h5py' not in sys.modules\n"
     )

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.core_library import ROW_HEAD
-from sysdyn.runtime.failures import SolverFailure
-from sysdyn.runtime.integrate import Integration, Request, integrate
-from sysdyn.runtime.start import consistent_start
-from sysdyn.runtime.system import System
+from sysdyn.runtime.integrate.integrate import Integration, Request, integrate
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.core_library import ROW_HEAD
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import consistent_start
 
 
 def run(made, t_end, form="3", index=0, instants=(), **request):

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 from scipy.sparse import csc_array, random_array
-from sysdyn.runtime import core_library as lib
-from sysdyn.runtime.ordering import column_order
-from sysdyn.runtime.patterns import Pattern
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.numerics.ordering import column_order
 
 
 class Solver:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.integrate import Integration
-from sysdyn.runtime.metric import own_inertia
-from sysdyn.runtime.request import Request
-from sysdyn.runtime.start import consistent_start
-from sysdyn.runtime.system import System
+from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.integrate.metric import own_inertia
+from sysdyn.runtime.integrate.request import Request
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import consistent_start
 
 
 def bar(length, form="lagrangian"):

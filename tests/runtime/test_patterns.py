@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from sysdyn.runtime.description import _kernel
-from sysdyn.runtime.failures import ContractError
-from sysdyn.runtime.patterns import places
+from sysdyn.runtime.model.description import _kernel
+from sysdyn.runtime.model.failures import ContractError
+from sysdyn.runtime.model.patterns import places
 
 # x[i] in rows i, columns j; loops i = 1..n, j = 1..i (ix = 1, n)
 LOOPS = [[0, 1], [0, [0, -1, 0]]]

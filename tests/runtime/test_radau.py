@@ -4,17 +4,17 @@ import chain_model as chain
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime import ordering
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.core_library import ROW_HEAD
-from sysdyn.runtime.failures import SolverFailure
-from sysdyn.runtime.integrate import Integration
-from sysdyn.runtime.options import Options
-from sysdyn.runtime.request import Request
+from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.integrate.request import Request
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.core_library import ROW_HEAD
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics import ordering
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.start import consistent_start
-from sysdyn.runtime.system import System
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.start.start import consistent_start
+from sysdyn.runtime.trace.trace import Trace
 from test_bdf import run
 
 # seed/references.json, pendulum, t = 0.4, 1, 4

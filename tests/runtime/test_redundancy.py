@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.options import Options
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.system import System
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.start import consistent_start
-from sysdyn.runtime.structure import structure
-from sysdyn.runtime.system import System
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.start.start import consistent_start
+from sysdyn.runtime.structure.structure import structure
+from sysdyn.runtime.trace.trace import Trace
 
 # seed/references.json, redundant_pendulum (m = l = 1, from th = 1 at rest)
 T = [0.0, 0.4, 1.0, 1.6, 2.4, 3.2, 4.0]

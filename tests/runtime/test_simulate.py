@@ -3,11 +3,11 @@ import json
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.failures import SolverFailure
-from sysdyn.runtime.options import Options, choose_index
+from sysdyn.runtime.integrate.options import Options, choose_index
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.trace import Parameter, Trace
+from sysdyn.runtime.trace.trace import Parameter, Trace
 
 # /work/shared/seed/references.json: values at the last instant of each system
 END = {

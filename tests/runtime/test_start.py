@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.failures import InconsistentStart
-from sysdyn.runtime.start import consistent_start
-from sysdyn.runtime.system import System
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.failures import InconsistentStart
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import consistent_start
 
 # rows 0 of /work/shared/seed/descriptor_values.json as printed in seed/README.md, section 5
 REFERENCES = {

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from sysdyn.cli.prepare import prepare
-from sysdyn.compiler.instants import instants
-from sysdyn.dsl import expression as ex
+from sysdyn.cli.run.prepare import prepare
+from sysdyn.compiler.binding.instants import instants
 from sysdyn.dsl import load
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.dsl.source import SourceText
-from sysdyn.runtime.failures import SolverFailure
-from sysdyn.runtime.options import Options
-from sysdyn.runtime.segments import segments
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.integrate.segments import segments
+from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.trace import Trace
+from sysdyn.runtime.trace.trace import Trace
 
 LEAD = """
 from std.electrical import resistor, capacitor, voltage

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.start import consistent_start
-from sysdyn.runtime.structure import _growth_index, pencil_index, structure
-from sysdyn.runtime.system import System
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import consistent_start
+from sysdyn.runtime.structure.structure import _growth_index, pencil_index, structure
 
 # differential index of the seed's catalogue (seed/README.md, sections 3 and 4)
 CASES = {

@@ -4,7 +4,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from sysdyn.runtime import core_library as lib
+from sysdyn.runtime.model import core_library as lib
 
 CORE = Path(__file__).parents[2] / "runtime" / "core"
 

@@ -11,11 +11,11 @@ import h5py
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.failures import TraceError
-from sysdyn.runtime.options import Options
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.trace import Column, Parameter, Trace, TraceWriter
+from sysdyn.runtime.trace.trace import Column, Parameter, Trace, TraceWriter
 
 HERE = Path(__file__).parent
 
@@ -79,8 +79,8 @@ def test_unwritable_paths_and_foreign_files(tmp_path):
 LIMITED = """
 import resource, signal, sys
 import numpy as np
-from sysdyn.runtime.failures import TraceError
-from sysdyn.runtime.trace import Column, TraceWriter
+from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.trace import Column, TraceWriter
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 writer = TraceWriter(sys.argv[1], [Column("x", 0, "m", "x", False)], 1, {"model": "m"})
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
@@ -121,9 +121,9 @@ ENDLESS = """
 import sys
 sys.path.insert(0, {here!r})
 import small_models as models
-from sysdyn.runtime import trace
-from sysdyn.runtime.carrier import load
-from sysdyn.runtime.options import Options
+from sysdyn.runtime.trace import trace
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.simulate import simulate
 trace.FLUSH_SECONDS = {flush}
 manifest, binding, module = models.mass_spring()

@@ -9,20 +9,20 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 
 from catalogue import load, network, state
-from sysdyn.cli.prepare import Prepared, module_of
-from sysdyn.cli.running import Request as Simulation
-from sysdyn.cli.running import run
+from sysdyn.cli.run.prepare import Prepared, module_of
+from sysdyn.cli.run.running import Request as Simulation
+from sysdyn.cli.run.running import run
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.dsl import expression as x
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.runtime import carrier
-from sysdyn.runtime.description import describe
-from sysdyn.runtime.integrate import Integration
-from sysdyn.runtime.request import Request
-from sysdyn.runtime.start import ConsistentState
-from sysdyn.runtime.system import System
-from sysdyn.runtime.trace import Trace
-from sysdyn.runtime.underlying import Underlying
+from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.integrate.request import Request
+from sysdyn.runtime.integrate.underlying import Underlying
+from sysdyn.runtime.model import carrier
+from sysdyn.runtime.model.description import describe
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.trace.trace import Trace
 
 ROOT = Path(__file__).parents[2]
 CATALOGUE, VALUES = load("catalogue.json"), load("descriptor_values.json")

@@ -6,12 +6,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.running import Request, run
-from sysdyn.dsl import files, syntax
-from sysdyn.dsl.diagnostics import Report
-from sysdyn.dsl.parse import parse
-from sysdyn.dsl.source import SourceText
-from sysdyn.runtime.trace import Trace
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.elaborate import files
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.dsl.tree import syntax
+from sysdyn.runtime.trace.trace import Trace
 
 ACCURACY = 1e-6
 """Asked for and met, of each quantity's largest magnitude."""

@@ -9,7 +9,8 @@ import pytest
 import thermal_table
 import transduce_table
 from runs import library, names
-from sysdyn.dsl import files, syntax
+from sysdyn.dsl.elaborate import files
+from sysdyn.dsl.tree import syntax
 
 TABLES = {
     "electrical": electrical_table.ROWS,

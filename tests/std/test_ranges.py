@@ -2,7 +2,7 @@
 
 import pytest
 from runs import library, names, network, traced, walk
-from sysdyn.dsl import syntax
+from sysdyn.dsl.tree import syntax
 
 NODES = """
   node a: electrical

@@ -1,0 +1,93 @@
+"""`sysdyn check`: everything that needs no time integration, for every model and scene of a file."""
+
+from __future__ import annotations
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import INPUT_OUTPUT, classify
+from sysdyn.cli.run import targets
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Report
+
+
+@with_console("check")
+@click.argument("files", nargs=-1, required=True)
+@click.option("--strict", is_flag=True, help="Warnings count as errors.")
+def command(console: Console, files: tuple[str, ...], strict: bool) -> int:
+    """Check every model and scene of FILES, the consistent start included; no C compiler is needed."""
+    results, unread = [], False
+    for path in files:
+        try:
+            results.append(_file(console, path))
+        except OSError as error:
+            unread = True
+            console.complain(classify(error)[1], INPUT_OUTPUT)
+    console.result = {"files": results}
+    warned = any(d.severity == "warning" for d in console.report)
+    return console.finish(INPUT_OUTPUT if unread else 1 if strict and warned else 0)
+
+
+def _file(console: Console, path: str) -> dict[str, object]:
+    document = targets.read(path, console.report)
+    found = []
+    for target in targets.all_targets(document, console.report):
+        with ex.fresh():
+            summary = _target(console, target)
+        found.append(summary)
+        if summary["ok"]:
+            console.say(f"{path}: {target.name}: {_line(summary)}")
+    if not document.models and not document.scenes and not console.report.failed:
+        console.say(f"{path}: no model")
+    return {"file": path, "models": list(document.models), "targets": found}
+
+
+def _line(summary: dict[str, object]) -> str:
+    if "index" not in summary:
+        return "ok"
+    counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}, index {index}".format(**summary)
+    moved = summary["moved"]
+    assert isinstance(moved, list)
+    from sysdyn.cli.run.starting import shortened
+
+    return "; ".join([f"ok: {counts}", *shortened(moved)])
+
+
+def _target(console: Console, target: targets.Target) -> dict[str, object]:
+    """Findings go to the report of the console; the counts come back."""
+    names = {"scene": target.scene.name.name if target.scene else None, "model": target.model.name.name}
+    inner = Report()
+    network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
+    summary: dict[str, object] = {**names, "ok": network is not None}
+    if network is not None and all(p.values for p in network.parameters):
+        summary |= _started(network, inner)
+    console.report.extend(inner)
+    return summary
+
+
+def _started(network: Network, report: Report) -> dict[str, object]:
+    from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
+    from sysdyn.cli.run.starting import described, start
+
+    prepared = prepare(network, report, backend="numpy")
+    if prepared is None:
+        return {"ok": False}
+    scene = network.scene
+    t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
+    started = start(prepared, t0, report)
+    if started is None:
+        return {"ok": False}
+    facts = started.facts
+    return {
+        "ok": not report.failed,
+        "formulation": prepared.formulation,
+        "coordinates": facts.coordinates,
+        "m1": facts.m1,
+        "m2": facts.m2,
+        "dof": facts.dof,
+        "configuration_dof": facts.configuration_dof,
+        "redundant": facts.redundant,
+        "index": facts.index,
+        "moved": described(started.state),
+    }

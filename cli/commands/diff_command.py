@@ -1,0 +1,95 @@
+"""`sysdyn diff`: are two traces equal within a tube?"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from pathlib import Path
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import SOLVER, UsageError
+
+
+@with_console("diff")
+@click.argument("ref")
+@click.argument("test")
+@click.option("--rtol", type=float, default=1e-3, show_default=True, metavar="R", help="Times the nominal magnitude.")
+@click.option("--atol", type=float, default=0.0, show_default=True, metavar="A", help="In each quantity's own unit.")
+@click.option("--tau", metavar="T", help="Time tolerance; a bare number in s. Default: 1e-9 of the span.")
+@click.option("--junit", "junit_file", metavar="FILE", help="Write the verdict as JUnit XML.")
+@click.option("--html", "html_file", metavar="FILE", help="Write one page with pictures of what differs.")
+def command(
+    console: Console,
+    ref: str,
+    test: str,
+    rtol: float,
+    atol: float,
+    tau: str | None,
+    junit_file: str | None,
+    html_file: str | None,
+) -> int:
+    """Compare the trace TEST with the trace REF.
+
+    Equal where abs(test - ref) <= atol + rtol * nominal within the time tolerance, in both directions, at all
+    instants of both and between them. Exit 0 equal, 1 different, 3 not comparable.
+    """
+    for name, value in (("--rtol", rtol), ("--atol", atol)):
+        if not 0.0 <= value < math.inf:
+            raise UsageError(f"{name} {value:g}: it must be a number that is not negative")
+    wide = None if tau is None else _seconds(tau)
+    if ref == "-" and test == "-":
+        raise UsageError("only one of the traces can be standard input")
+    pages = [f for f in (junit_file, html_file) if f == "-"]
+    if pages and (console.as_json or len(pages) > 1):
+        raise UsageError("only one thing can go to standard output")
+    from sysdyn.cli.compare.diffing import as_json, cases, differences, headline, junit, opened, table
+    from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
+
+    began = time.monotonic()
+    try:
+        with opened(ref) as one, opened(test) as two:
+            verdict = differences(one, two, Tolerance(rtol, atol, wide))
+            if html_file:
+                from sysdyn.cli.compare.comparison_page import page
+
+                write(html_file, page(f"{test} against {ref}", [(one, two, verdict)]))
+            unfinished = [t.path for t in (one, two) if not t.final]
+    except Incomparable as error:
+        console.complain(f"the traces cannot be compared: {error}", SOLVER)
+        if junit_file:
+            write(junit_file, junit([(f"{test} against {ref}", 0.0, [("comparable", str(error))])]))
+        return console.finish(SOLVER)
+    if junit_file:
+        write(junit_file, junit([(f"{test} against {ref}", time.monotonic() - began, cases(verdict))]))
+    console.result = as_json(verdict)
+    for path in unfinished:
+        console.say(f"{path} is of a run that did not end as asked")
+    if not (console.quiet or pages):
+        console.data(headline(verdict) + "\n" + table(verdict))
+    return console.finish(0 if verdict.equal else 1)
+
+
+def write(file: str, text: str) -> None:
+    """A text to a file, or to standard output where it is '-'."""
+    if file == "-":
+        sys.stdout.write(text)
+    else:
+        Path(file).write_text(text, encoding="utf-8")
+
+
+def _seconds(text: str) -> float:
+    """A time tolerance: a number in s, or a number with a unit of time."""
+    from sysdyn.cli.page.unit_text import conversion
+
+    number, _, unit = text.strip().partition(" ")
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    scale = conversion(unit.strip(), "s") if unit.strip() else (1.0, 0.0)
+    found = value * scale[0] if scale else math.nan
+    if not 0.0 <= found < math.inf:
+        raise UsageError(f"--tau {text}: a time that is not negative is wanted, a bare number in s")
+    return found

@@ -1,0 +1,120 @@
+"""`sysdyn plot`: quantities of traces over time, as a picture."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import UsageError
+
+if TYPE_CHECKING:
+    from sysdyn.runtime.trace.trace import Trace
+
+KINDS = (".png", ".svg", ".html")
+WIDTH = 100
+"""Columns of a summary that goes to no terminal."""
+
+
+@with_console("plot")
+@click.argument("trace")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("-o", "output", metavar="FILE.png|.svg|.html", help="Default: the trace's name with .png, here.")
+def command(console: Console, trace: str, names: tuple[str, ...], output: str | None) -> int:
+    """Draw quantities of TRACE over time: those named, or all of them.
+
+    Further traces may follow TRACE (names of existing .h5 files): they are drawn over the first.
+    audit/energy and audit/constraints are the meters of the run. An .html zooms: wheel, drag, double click. Without -o
+    a summary goes to standard output too: one line a quantity.
+    """
+    files = [trace, *(name for name in names if _is_trace(name))]
+    wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
+    traces = [(_label(file), _open(file)) for file in files]
+    target = _target(trace, output, console)
+    drawn = _quantities([t for _, t in traces], wanted)
+    data = _drawn(traces, drawn, target.suffix.lower())
+    if output is None and not console.quiet:
+        from sysdyn.cli.page.sparkline import summary
+
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
+        console.data(summary(traces, drawn, width))
+    if output == "-":
+        sys.stdout.buffer.write(data)
+    else:
+        target.write_bytes(data)
+        console.say(f"{target}: {', '.join(drawn)}")
+    console.result = {"picture": output if output == "-" else str(target), "traces": files, "quantities": drawn}
+    return console.finish()
+
+
+def _drawn(traces: list[tuple[str, Trace]], names: list[str], kind: str) -> bytes:
+    if kind == ".html":
+        from sysdyn.cli.page.plots import page
+
+        titles = dict.fromkeys(str(t.attributes.get("title", label)) for label, t in traces)
+        return page(" and ".join(titles), traces, names).encode()
+    from sysdyn.cli.page.picture import picture  # matplotlib: half a second that a wrong name need not wait for
+
+    return picture(traces, names, kind.removeprefix("."))
+
+
+def _is_trace(name: str) -> bool:
+    return name.endswith(".h5") and Path(name).is_file()
+
+
+def _label(file: str) -> str:
+    return "stdin" if file == "-" else Path(file).stem
+
+
+def _target(trace: str, output: str | None, console: Console) -> Path:
+    """Where the picture goes; wrong usage where its kind is none that is drawn."""
+    if output == "-":
+        if console.as_json:
+            raise UsageError("-o - and --json both want standard output")
+        return Path("-.png")
+    target = Path(output) if output is not None else Path(f"{_label(trace)}.png")
+    kind = target.suffix.lower()
+    if kind not in KINDS:
+        raise UsageError(f"'{target}': a picture is one of {', '.join(KINDS)}")
+    return target
+
+
+def _open(file: str) -> Trace:
+    from sysdyn.runtime.trace.trace import Trace
+
+    if file != "-":
+        Path(file).open("rb").close()  # a plainer message than HDF5's where there is none
+        return Trace.open(file)
+    with tempfile.NamedTemporaryFile(suffix=".h5") as copy:
+        copy.write(sys.stdin.buffer.read())
+        copy.flush()
+        return Trace.open(copy.name)
+
+
+def _quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
+    """Names that are drawn, as the trace spells them."""
+    known = list(dict.fromkeys(name for trace in traces for name in trace.names))
+    if not wanted:
+        if not known:
+            raise UsageError(f"{traces[0].path} has no quantities: name a meter, audit/energy or audit/constraints")
+        return known
+    from sysdyn.dsl.names.symbols import nearest
+
+    spelled = {name: name for name in known}
+    for trace in traces:
+        for meter in ("audit.energy", "audit.constraints"):
+            if meter in trace:
+                spelled |= {meter: meter, meter.replace(".", "/"): meter, "/" + meter.replace(".", "/"): meter}
+    drawn = []
+    for name in wanted:
+        found = spelled.get(name) or spelled.get(name.replace("/", "\u2215"))
+        if found is None:
+            near = nearest(name, spelled)
+            hint = f"nearest: '{near}'" if near else f"there are: {', '.join(known)}"
+            raise UsageError(f"{traces[0].path} has no quantity '{name}'; {hint}")
+        drawn.append(found)
+    return list(dict.fromkeys(drawn))

@@ -1,0 +1,99 @@
+"""`sysdyn simulate`: text in, trace out."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import SOLVER, UsageError
+from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.run.running import Ran, Request, run
+from sysdyn.cli.run.starting import described, shortened
+
+
+@with_console("simulate")
+@click.argument("file")
+@chosen
+@solved
+@click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
+@click.option("--at", metavar="T1,T2,...", help="Instants that the trace holds too.")
+@click.option("-o", "output", metavar="TRACE.h5", help="Default: <stem>-<scene>.h5 here.")
+@click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
+def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
+    """Simulate a scene of FILE and write its trace."""
+    line = ProgressLine("never" if console.quiet else progress)
+    request = Request(timings=not no_timings, **options)
+    if request.output == "-" and console.as_json:
+        raise UsageError("-o - and --json both want standard output")
+    try:
+        ran = (
+            _to_standard_output(request, console, line) if request.output == "-" else run(request, console.report, line)
+        )
+    finally:
+        line.clear()
+    if ran is None:
+        return console.finish(1)
+    console.result = _result(ran)
+    for text in (*shortened(described(ran.started.state)), *ran.outcome.warnings):
+        console.say(text)
+    if ran.failure:
+        console.complain(ran.failure, SOLVER)
+    console.say(_summary(ran))
+    return console.finish(ran.exit)
+
+
+def _to_standard_output(request: Request, console: Console, line: ProgressLine) -> Ran | None:
+    """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
+    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        path = Path(folder) / "trace.h5"
+        try:
+            return run(replace(request, output=str(path)), console.report, line)
+        finally:  # what was computed before an interruption, too
+            if path.is_file():
+                sys.stdout.buffer.write(path.read_bytes())
+                sys.stdout.buffer.flush()
+
+
+def _summary(ran: Ran) -> str:
+    o = ran.outcome
+    s, t = o.statistics, o.timings
+    estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
+    form = {"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {}
+    how = (ran.prepared.formulation, o.method, f"index {form.get(o.index, o.index)}", ran.prepared.backend)
+    lines = [
+        f"{ran.target.name}: {', '.join(how)}",
+        f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
+        f"  energy balance {_last(o.samples.energy):.2e} J, constraints {_last(o.samples.constraints):.1e}",
+        f"  {o.trace}{'' if o.final else ' (not final)'}",
+    ]
+    return "\n".join(lines)
+
+
+def _last(values: Any) -> float:
+    return float(values[-1]) if np.size(values) else float("nan")
+
+
+def _result(ran: Ran) -> dict[str, Any]:
+    o = ran.outcome
+    return {
+        "trace": str(o.trace),
+        "final": o.final,
+        "reached": o.reached,
+        "formulation": ran.prepared.formulation,
+        "method": o.method,
+        "index": o.index,
+        "statistics": o.statistics,
+        "timings": o.timings,
+        "error_estimate": o.error_estimate,
+        "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
+        "moved": described(ran.started.state),
+        "warnings": list(o.warnings),
+        "failure": ran.failure,
+    }

@@ -1,0 +1,230 @@
+"""`sysdyn verify`: one scene in every formulation that can express it and by two methods, in one table."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import SOLVER
+from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.sizes import sizes
+from sysdyn.cli.run.starting import shortened
+from sysdyn.cli.verify.agreement import Gap
+from sysdyn.cli.verify.verification import TIMES, verify
+from sysdyn.cli.verify.verified import Run, Verified
+
+
+@with_console("verify")
+@click.argument("file")
+@chosen
+@solved
+@click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
+@click.option("--at", metavar="T1,T2,...", help="Instants that are compared too.")
+@click.option("-o", "output", metavar="DIR", help="Keep the traces there, as FORMULATION-METHOD.h5.")
+@click.option("--full", is_flag=True, help="Do not take reduced sizes from the ci.toml above FILE's folder.")
+@click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
+def command(console: Console, progress: str, no_timings: bool, full: bool, output: str | None, **options: Any) -> int:
+    """Run a scene of FILE in every formulation that can express it, by bdf and by radau, and compare the traces.
+
+    Two runs agree where every traced quantity differs by less than 10 x accuracy x its nominal magnitude, up to the
+    horizon: the instant at which the reference differs by that much from its own run at a tenth of the accuracy.
+    --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree.
+    """
+    line = ProgressLine("never" if console.quiet else progress)
+    request = Request(timings=not no_timings, **options)
+    path, reduced = (Path(), ()) if full else sizes(request.file)
+    given = {name for name, _ in request.settings}
+    reduced = tuple((name, value) for name, value in reduced if name not in given)
+    if reduced:
+        console.say(f"sizes of {path.parent.name}/{path.name}: {', '.join(f'{n} = {v}' for n, v in reduced)}")
+    request = replace(request, settings=(*reduced, *request.settings))
+    with ExitStack() as stack:
+        if output is None:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sysdyn-")))
+        else:
+            folder = Path(output)
+            folder.mkdir(parents=True, exist_ok=True)
+        stack.callback(line.clear)
+        found = verify(request, console.report, folder, line)
+    if found is None:
+        return console.finish(1)
+    console.result = _result(found, keep=output is not None, timings=not no_timings)
+    console.data(_table(found, timings=not no_timings))
+    return console.finish(_judged(found, console))
+
+
+def _judged(found: Verified, console: Console) -> int:
+    """Says what is wrong; the exit code."""
+    code = 0
+    for text in _complaints(found):
+        console.complain(text, 1)
+        code = 1
+    for text in _warnings(found):
+        console.say(text)
+    for text in found.failures:
+        console.complain(text, SOLVER)
+        code = SOLVER
+    if not found.compared:
+        why = "; ".join(f"{name}: {reason}" for name, reason in found.left_out) or "the scene traces nothing"
+        console.complain(f"there is nothing to compare ({why}); 'trace NAME, ...' in the scene", SOLVER)
+        return SOLVER
+    if found.beyond is not None and not found.horizon > found.span[0]:
+        text = f"{found.beyond.variable} of {found.by} differs at two accuracies from the start on"
+        console.complain(f"the traces cannot be compared: {text}; a smaller --accuracy", SOLVER)
+        return SOLVER
+    return code
+
+
+def _complaints(found: Verified) -> list[str]:
+    pairs = []
+    for d in found.disagreements:
+        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d.gap)}")
+    carriers = [
+        f"{' and '.join(t.backends)} disagree in {t.formulation}: row {t.row} by {t.difference:.1e} of itself"
+        for t in found.twins
+        if not t.agree
+    ]
+    books = [
+        f"{run.name}: the energy balance is off by {run.energy:.2g} J of {run.turnover:.2g} J, "
+        f"{run.books:.3g} times what is allowed"
+        for run in found.runs
+        if run.books > 1.0 and not run.failure
+    ]
+    return [*shortened(pairs), *shortened(books), *carriers]
+
+
+def _apart(gap: Gap) -> str:
+    a, b = gap.values
+    worst = f"{gap.variable} is {a:.6g} and {b:.6g} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
+    return worst if gap.first in (None, gap.time) else f"{worst} (first at {gap.first:.6g} s)"
+
+
+def _warnings(found: Verified) -> list[str]:
+    """Warnings of the runs, each once with the runs that have it."""
+    names: dict[str, list[str]] = {}
+    for run in (*found.runs, found.finer):
+        for text in run.outcome.warnings:
+            names.setdefault(text, []).append(run.name)
+    return [f"{', '.join(dict.fromkeys(runs))}: {text}" for text, runs in names.items()]
+
+
+def _table(found: Verified, *, timings: bool) -> str:
+    """The table, with what stands above and below it."""
+    head = ["formulation", "method", "index", "accuracy", "steps", "CPU ms", "estimate", "energy J", "constraints"]
+    rows = [[*head, "apart", "worst", "at s"]]
+    for run, gap in zip((*found.runs, found.finer), found.worst, strict=True):
+        rows.append([*_cells(run), *_gap_cells(run, gap, found)])
+    if not timings:
+        rows = [[cell for k, cell in enumerate(row) if k != 5] for row in rows]
+    accuracy, (t0, t1) = found.runs[0].accuracy, found.span
+    lines = [f"{found.name}: {t0:g} s to {t1:g} s, apart in units of {TIMES:g} x {accuracy:g} x nominal"]
+    columns = len(rows[0])
+    lines.append(aligned(rows, right={*range(2, columns)} - {columns - 2}))
+    lines += _refused(found)
+    lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
+    if found.twins:
+        worst = max(found.twins, key=lambda t: t.difference)
+        lines.append(f"residuals of {' and '.join(worst.backends)}: {worst.difference:.1e} apart")
+    return "\n".join([*lines, _horizon(found), _verdict(found)])
+
+
+def _refused(found: Verified) -> list[str]:
+    """Formulations left out, those with one reason together."""
+    reasons: dict[str, list[str]] = {}
+    for r in found.refusals:
+        reason = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
+        text = "not supported yet" if r.code == "N608" else f"{r.code} {reason}"
+        reasons.setdefault(text, []).append(r.formulation)
+    return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+
+
+def _cells(run: Run) -> list[str]:
+    o = run.outcome
+    estimate = "-" if o.error_estimate is None else f"{o.error_estimate:.1e}"
+    effort = [str(o.statistics["steps"]), f"{1e3 * o.timings['cpu_integrate_s']:.3g}"]
+    meters = [f"{run.energy:.1e}", f"{run.constraints:.1e}"]
+    return [run.formulation, run.method, o.index, f"{run.accuracy:.0e}", *effort, estimate, *meters]
+
+
+def _gap_cells(run: Run, gap: Gap | None, found: Verified) -> list[str]:
+    if run is found.runs[0]:
+        return ["-", "the reference", "-"]
+    return ["-", "-", "-"] if gap is None else [f"{gap.ratio:.2g}", gap.variable, f"{gap.time:.4g}"]
+
+
+def _horizon(found: Verified) -> str:
+    if found.beyond is None:
+        return f"horizon: {found.horizon:g} s"
+    what = f"then {found.beyond.variable} of {found.by} differs at two accuracies"
+    return f"horizon: {max(found.horizon, found.span[0]):g} s of {found.span[1]:g} s, {what}"
+
+
+def _verdict(found: Verified) -> str:
+    number = len(found.runs)
+    if found.disagreements or not all(t.agree for t in found.twins):
+        return f"{number} runs: they disagree"
+    return f"{number} runs agree on {len(found.compared)} quantities"
+
+
+def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
+    runs = [
+        _run_object(run, gap, keep=keep, timings=timings)
+        for run, gap in zip((*found.runs, found.finer), found.worst, strict=True)
+    ]
+    return {
+        "runs": runs,
+        "disagreements": [
+            {
+                "runs": [{"formulation": r.formulation, "method": r.method} for r in (d.one, d.other)],
+                **_gap_object(d.gap),
+            }
+            for d in found.disagreements
+        ],
+        "horizon": found.horizon,
+        "compared": list(found.compared),
+        "not_compared": [{"variable": name, "reason": reason} for name, reason in found.left_out],
+        "not_expressible": [{"formulation": r.formulation, "code": r.code, "reason": r.reason} for r in found.refusals],
+        "backends": [
+            {"formulation": t.formulation, "difference": t.difference, "row": t.row, "ok": t.agree} for t in found.twins
+        ],
+    }
+
+
+def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict[str, Any]:
+    o = run.outcome
+    return {
+        "formulation": run.formulation,
+        "method": run.method,
+        "index": o.index,
+        "accuracy": run.accuracy,
+        "final": o.final,
+        "reached": o.reached,
+        "statistics": o.statistics,
+        "timings": o.timings if timings else {},
+        "error_estimate": o.error_estimate,
+        "energy": run.energy,
+        "constraints": run.constraints,
+        "worst": None if gap is None else _gap_object(gap),
+        "expects": [{"text": text, "ok": ok} for text, ok in run.expects],
+        "warnings": list(o.warnings),
+        "failure": run.failure,
+        "trace": str(o.trace) if keep else None,
+    }
+
+
+def _gap_object(gap: Gap) -> dict[str, Any]:
+    return {
+        "variable": gap.variable,
+        "time": gap.time,
+        "first": gap.first,
+        "ratio": gap.ratio,
+        "values": list(gap.values),
+    }

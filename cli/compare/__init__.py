@@ -1,0 +1,1 @@
+"""Traces compared, and the page that shows it."""

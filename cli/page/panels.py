@@ -1,0 +1,117 @@
+"""How quantities of traces are laid out over time: panels by unit, curves, names of units.
+
+Quantities of one unit share a panel where none is drowned by the others; where a trace holds derivatives and few
+instants, curves are its cubic Hermite interpolant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.trace.trace import Trace
+
+Floats = NDArray[np.float64]
+
+DROWNED = 12.0
+"""A curve whose span is this many times smaller than its panel's is a line to the eye: it gets its own panel."""
+SMOOTH = 600
+"""Traces of fewer instants are interpolated: about one point a pixel."""
+COLOURS = ("#1f5fa8", "#d1495b", "#2f8f6b", "#e09f3e", "#7a4fa3", "#4aa5c4", "#8c5a3c", "#6b7280")
+
+
+@dataclass(slots=True)
+class Panel:
+    """Quantities that share an axis: all of one unit."""
+
+    unit: str
+    low: float = float("inf")
+    high: float = float("-inf")
+    least: float = float("inf")
+    names: list[str] = field(default_factory=list)
+
+    def takes(self, unit: str, low: float, high: float) -> bool:
+        """Whether a curve of that unit and range can be read here, and those already here still can."""
+        if unit != self.unit:
+            return False
+        union = max(self.high, high) - min(self.low, low)
+        smallest = min(self.least, high - low)
+        return union <= DROWNED * smallest or union <= self.high - self.low == high - low
+
+    def add(self, name: str, low: float, high: float) -> None:
+        """One more curve."""
+        self.names.append(name)
+        self.low, self.high = min(self.low, low), max(self.high, high)
+        self.least = min(self.least, high - low)
+
+
+def panels_of(traces: Sequence[Trace], names: Sequence[str]) -> list[Panel]:
+    """The layout: each quantity joins the first panel that takes it."""
+    panels: list[Panel] = []
+    for name in names:
+        found = [trace[name] for trace in traces if name in trace]
+        values = np.concatenate([q.values[np.isfinite(q.values)] for q in found])
+        low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+        unit = found[0].units
+        panel = next((p for p in panels if p.takes(unit, low, high)), None)
+        if panel is None:
+            panel = Panel(unit)
+            panels.append(panel)
+        panel.add(name, low, high)
+    return panels
+
+
+def curve(trace: Trace, name: str) -> tuple[Floats, Floats]:
+    """Instants and values of a curve: those of the trace, or of its Hermite interpolant where it holds few."""
+    quantity = trace[name]
+    time, values, rate = trace.time, quantity.values, quantity.derivative
+    if rate is None or not 2 <= time.size < SMOOTH or not np.all(np.diff(time) > 0.0):
+        return time, values
+    parts = SMOOTH // time.size + 1
+    s = np.arange(parts) / parts
+    h = np.diff(time)[:, None]
+    left, right = values[:-1, None], values[1:, None]
+    inner = (
+        left * (1.0 + 2.0 * s) * (1.0 - s) ** 2
+        + right * s**2 * (3.0 - 2.0 * s)
+        + h * (rate[:-1, None] * s * (1.0 - s) ** 2 + rate[1:, None] * s**2 * (s - 1.0))
+    )
+    # beside a kink the derivative may be no number: a straight line there
+    inner = np.where(np.isfinite(inner), inner, left + (right - left) * s)
+    fine = time[:-1, None] + h * s
+    return np.append(fine.ravel(), time[-1]), np.append(inner.ravel(), values[-1])
+
+
+def styled(panel: Panel, traces: Sequence[tuple[str, Trace]]) -> Iterator[tuple[str, Trace, str, str, int]]:
+    """Curves of a panel: name, trace, label, colour and the number of the trace."""
+    single = len(panel.names) == 1
+    for j, name in enumerate(panel.names):
+        for k, (label, trace) in enumerate(traces):
+            if name in trace:
+                shown = name if len(traces) == 1 else label if single else f"{name}, {label}"
+                yield name, trace, shown, COLOURS[(k if single else j) % len(COLOURS)], k
+
+
+def time_unit(traces: Sequence[Trace]) -> tuple[float, str]:
+    """The unit in which the longest run has a handy length."""
+    span = max((float(t.time[-1] - t.time[0]) for t in traces if t.time.size), default=1.0)
+    for scale, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
+        if span * scale >= 0.3:
+            return scale, unit
+    return 1e9, "ns"
+
+
+def unit_text(unit: str) -> str:
+    """A unit as it is printed: 'kg.m2.s-2' is 'kg·m²·s⁻²'."""
+    if unit in ("1", ""):
+        return ""
+    found = []
+    for before, character in zip(" " + unit, unit, strict=False):
+        raised = (character in "0123456789-" and before not in " .(/*") or (character.isdigit() and before == "-")
+        found.append(character.translate(_RAISED) if raised else "·" if character == "." else character)
+    return "".join(c for c in found if c != "^")
+
+
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")

@@ -1,0 +1,111 @@
+"""Curves over time as PNG or SVG: panels by unit, one picture of the same data always the same bytes."""
+
+from __future__ import annotations
+
+import io
+import logging
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+from sysdyn.cli.page.panels import Panel, curve, panels_of, styled, time_unit, unit_text
+from sysdyn.runtime.trace.trace import Trace
+
+STYLES = ("-", "--", ":", "-.")
+STYLE: dict[str, Any] = {
+    "axes.edgecolor": "#9aa0a6",
+    "axes.grid": True,
+    "axes.labelcolor": "#30343b",
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "figure.dpi": 120,
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "grid.color": "#e4e7eb",
+    "grid.linewidth": 0.8,
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "path.simplify": True,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "sysdyn",
+    "text.color": "#30343b",
+    "text.parse_math": False,
+    "xtick.color": "#5f6670",
+    "ytick.color": "#5f6670",
+}
+
+
+def picture(traces: Sequence[tuple[str, Trace]], names: Sequence[str], kind: str) -> bytes:
+    """The picture of the named quantities of (label, trace) pairs; kind is png or svg."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    panels = panels_of([t for _, t in traces], names)
+    columns = 1 if len(panels) <= 6 else 2
+    rows = -(-len(panels) // columns)
+    with warnings.catch_warnings(), mpl.rc_context(_style(mpl.rcParamsDefault)):
+        warnings.simplefilter("ignore")  # names in scripts that the font lacks
+        height = 1.0 + rows * max(1.9 if rows > 1 else 3.2, 2.6 - 0.2 * rows)
+        figure = Figure(figsize=(7.2 * columns if columns == 1 else 11.0, height), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
+        scale, unit = time_unit([t for _, t in traces])
+        for position, axis in enumerate(axes.T.flat):
+            if position < len(panels):
+                _draw(axis, panels[position], traces, scale)
+            else:
+                axis.set_visible(False)
+        for column in range(columns):
+            last = axes[min(rows, len(panels) - column * rows) - 1, column]
+            last.set_xlabel(f"time, {unit}")
+            last.tick_params(labelbottom=True)
+        _head(axes[0], traces)
+        figure.align_ylabels()
+        data = io.BytesIO()
+        none = {"Date": None} if kind == "svg" else {"Software": None}
+        figure.savefig(data, format=kind, metadata=none)
+    return data.getvalue()
+
+
+def _style(defaults: Any) -> Any:
+    """Matplotlib's own settings under ours: a person's configuration does not change a picture."""
+    return {**defaults, **STYLE, "backend": "agg"}
+
+
+def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:
+    """Titles: what was run on the left, how on the right."""
+    titles = dict.fromkeys(str(t.attributes.get("title", label)) for label, t in traces)
+    axes[0].set_title(" and ".join(titles), fontweight="bold", fontsize=11, pad=10)
+    if len(traces) > 1:
+        return
+    trace = traces[0][1]
+    how = [str(trace.attributes[a]) for a in ("formulation", "method") if trace.attributes.get(a)]
+    if not trace.final:
+        how.append("not final")
+    axes[-1].set_title(", ".join(how), loc="right", fontsize=8.5, color="#7b828c", pad=10)
+
+
+def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float) -> None:
+    curves = []
+    for name, trace, label, colour, k in styled(panel, traces):
+        time, values = curve(trace, name)
+        (line,) = axis.plot(time * scale, values, STYLES[k % len(STYLES)], color=colour)
+        curves.append((line, _legible(label)))
+    unit = unit_text(panel.unit)
+    if len(panel.names) == 1:
+        axis.set_ylabel(", ".join(filter(None, [_legible(panel.names[0]), unit])))
+    else:
+        axis.set_ylabel(unit)
+    if len(curves) > 1:
+        lines, labels = zip(*curves, strict=True)
+        axis.legend(lines, labels, loc="upper left", bbox_to_anchor=(1.0, 1.03), fontsize=8.5)
+    axis.margins(x=0.0, y=0.08)
+    axis.ticklabel_format(axis="y", scilimits=(-3, 4), useOffset=panel.high - panel.low < 1e-5 * abs(panel.high))
+
+
+def _legible(label: str) -> str:
+    """Matplotlib leaves labels that begin with '_' out of a legend."""
+    return f"\u2009{label}" if label.startswith("_") else label

@@ -1,0 +1,108 @@
+"""Units as traces spell them (UDUNITS: `m/s`, `kg.m^2/s^2`, `N.m-1`, `(m/s)/s`), and how to convert between two."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from functools import lru_cache
+
+from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Unit, known, multiply, raised
+
+_TOKEN = re.compile(r"\s*(?:(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)|([^\W\d_]+|%)|(\*\*|[./*^()+-]))")
+_LONGEST = 200
+_ALIASES = {
+    "%": "percent",
+    "degree": "deg",
+    "degrees": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "second": "s",
+    "seconds": "s",
+    "sec": "s",
+    "meter": "m",
+    "meters": "m",
+    "hour": "h",
+    "hours": "h",
+}
+
+
+def conversion(of: str, to: str) -> tuple[float, float] | None:
+    """(scale, offset) with value in `to` = scale*value in `of` + offset; None where the dimensions differ."""
+    if of == to:
+        return 1.0, 0.0
+    one, two = read_unit(of), read_unit(to)
+    if one is None or two is None or one.dimension != two.dimension:
+        return None
+    return float(one.scale / two.scale), float((one.offset - two.offset) / two.scale)
+
+
+@lru_cache(maxsize=1024)
+def read_unit(text: str) -> Unit | None:
+    """The unit of a text; names that are no units of ours are bases of their own; None where it is no unit."""
+    if text.strip() == "degC":
+        return DEGREE_CELSIUS
+    tokens, place = [], 0
+    while place < len(text.rstrip()):
+        found = _TOKEN.match(text, place)
+        if found is None or len(text) > _LONGEST:
+            return None
+        tokens.append(found)
+        place = found.end()
+    try:
+        unit, rest = _product(tokens, 0) if tokens else (Unit(NONE, Fraction(1), ""), 0)
+    except (ValueError, IndexError, OverflowError, ZeroDivisionError):
+        return None
+    return unit if rest == len(tokens) else None
+
+
+def _product(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
+    total, k = _factor(tokens, k)
+    while k < len(tokens) and tokens[k].group(3) != ")":
+        operator = tokens[k].group(3)
+        power = -1 if operator == "/" else 1
+        if operator in (".", "*", "/"):
+            k += 1
+        factor, k = _factor(tokens, k)
+        dimension = multiply(total.dimension, factor.dimension, power)
+        total = Unit(dimension, total.scale * factor.scale**power, "")
+    return total, k
+
+
+def _factor(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
+    number, name, operator = tokens[k].groups()
+    if operator == "(":
+        unit, k = _product(tokens, k + 1)
+        if tokens[k].group(3) != ")":
+            raise ValueError(")")
+    elif number:
+        unit = Unit(NONE, Fraction(number), "")
+    elif name:
+        name = _ALIASES.get(name, name)
+        found = known(name)
+        unit = Unit(*found, name) if found else Unit(((name, Fraction(1)),), Fraction(1), name)
+    else:
+        raise ValueError(operator)
+    power, k = _power(tokens, k + 1)
+    if abs(power) > 30:
+        raise ValueError("power")
+    return Unit(raised(unit.dimension, power), unit.scale**power, ""), k
+
+
+def _power(tokens: list[re.Match[str]], k: int) -> tuple[int, int]:
+    """`^2`, `**-1`, or a number that follows at once: `m2`, `s-1`."""
+    if k < len(tokens) and tokens[k].group(3) in ("^", "**"):
+        k += 1
+        bracket = tokens[k].group(3) == "("
+        k += bracket
+        sign = -1 if tokens[k].group(3) == "-" else 1
+        k += tokens[k].group(3) in ("+", "-")
+        power = sign * int(tokens[k].group(1) or "x")
+        if bracket and tokens[k + 1].group(3) != ")":
+            raise ValueError(")")
+        return power, k + 1 + bracket
+    close = k < len(tokens) and tokens[k].start() == tokens[k - 1].end() and bool(tokens[k - 1].group(2))
+    if close and tokens[k].group(1) and tokens[k].group(1).isdigit():
+        return int(tokens[k].group(1)), k + 1
+    if close and tokens[k].group(3) in ("-", "+") and k + 1 < len(tokens):
+        return int(tokens[k].group(3) + (tokens[k + 1].group(1) or "x")), k + 2
+    return 1, k

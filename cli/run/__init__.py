@@ -1,0 +1,1 @@
+"""What every command that simulates shares: preparing, starting, running."""

@@ -1,0 +1,118 @@
+"""`expect` statements judged on the samples of a run (E907, E909)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.starting import holds
+from sysdyn.dsl.model.network import Expectation, Golden
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.simulate import Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One expectation: ok None where it could not be judged; value and time where it was judged (worst or first)."""
+
+    text: str
+    ok: bool | None
+    value: float | None
+    time: float | None
+
+
+def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: bool) -> tuple[Claim, ...]:
+    """All expectations of the scene; those that fail are reported as E909."""
+    claims = [_claim(prepared, outcome, k, e, report, finished) for k, e in enumerate(prepared.network.expectations)]
+    claims += [_golden(prepared, outcome, g, report, finished) for g in prepared.network.goldens]
+    return tuple(claims)
+
+
+def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report: Report, finished: bool) -> Claim:
+    text = e.text.removeprefix("expect ")
+    time, left, right, within = _sides(prepared, outcome, k, e)
+    if e.moment == "finally":
+        if not finished:
+            return Claim(text, None, None, None)
+        time, left, right, within = time[-1:], left[-1:], right[-1:], within[-1:]
+    elif e.at is not None:
+        at = prepared.binding.evaluate(e.at)
+        here = np.flatnonzero(np.abs(time - at) <= 1e-12 * max(abs(at), 1.0))
+        if not here.size and not finished:
+            return Claim(text, None, None, None)
+        if not here.size:
+            report.error("E909", f"expect failed: the run does not reach {at:g} s", e.place)
+            return Claim(text, False, None, at)
+        time, left, right, within = time[here[:1]], left[here[:1]], right[here[:1]], within[here[:1]]
+    for t, a, b, w in zip(time, left, right, within, strict=True):
+        if not holds(e.operator, a, b, w):
+            _report(outcome, e, (t, a, b, w), report)
+            return Claim(text, False, float(a), float(t))
+    if not time.size:
+        return Claim(text, None, None, None)
+    return Claim(text, True, float(left[-1]), float(time[-1]))
+
+
+def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report, finished: bool) -> Claim:
+    """`expect golden "F" within r`: the quantities that F also has, by the comparison of `sysdyn diff`."""
+    text = f'golden "{golden.file}"'
+    path = Path(golden.place.file).parent / golden.file
+    if not path.is_file():
+        message = f"the golden file '{golden.file}' is missing"
+        report.error("E907", message, golden.place, help="sysdyn golden record")
+        return Claim(text, None, None, None)
+    if not finished:
+        return Claim(text, None, None, None)
+    from sysdyn.cli.compare.diffing import common, differences, sentence
+    from sysdyn.runtime.comparison.recorded import Recorded
+    from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
+
+    within = prepared.binding.evaluate(golden.within)
+    try:
+        with Recorded(path) as reference, Recorded(outcome.trace) as trace:
+            names = set(reference.quantities) & set(trace.quantities)
+            tube = Tolerance(rtol=within, tau=reference.tau)
+            verdict = differences(common(reference, names), common(trace, names), tube)
+    except (Incomparable, TraceError) as error:
+        report.error("E909", f"expect failed: {text} cannot be compared: {error}", golden.place)
+        return Claim(text, False, None, None)
+    worst = verdict.worst
+    found = (worst.worst.test, worst.worst.time) if worst else (None, None)
+    if worst is not None and not verdict.equal:
+        report.error("E909", f"expect failed: {text} within {within:g}: {sentence(worst)}", golden.place)
+    return Claim(text, verdict.equal, *found)
+
+
+def _sides(
+    prepared: Prepared, outcome: Outcome, k: int, e: Expectation
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    samples = outcome.samples
+    column = {name: j for j, name in enumerate(samples.names)}
+
+    def side(name: str, missing: bool = False) -> np.ndarray:
+        if missing:
+            return np.zeros(samples.time.size)
+        return np.asarray(samples.values[:, column[f"expect {k} {name}"]])
+
+    return samples.time, side("left"), side("right"), side("within", e.within is None)
+
+
+def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, float], report: Report) -> None:
+    t, a, b, w = worst
+    unit = "" if e.unit.text == "1" else f" {e.unit.text}"
+    off = abs(a - b)
+    sign = "" if e.operator == "==" else f" {e.operator}"
+    message = f"expect failed: {a:.9g}{unit} at {t:.9g} s, expected{sign} {b:.9g}{unit}"
+    if w:
+        message += f" within {w:g}{unit} (off by {off / w:.3g} times)"
+    estimate = outcome.error_estimate
+    help_ = None
+    size = max(abs(a), abs(b))
+    if estimate and size > 0.0 and off - w < estimate * size:
+        wanted = max((off - w) / size / 10.0, 1e-13)
+        less = f"this is less than the estimated error of the run ({estimate:.1g})"
+        help_ = f"{less}: --accuracy {wanted:.0e} would decide it"
+    report.error("E909", message, e.place, help=help_)

@@ -1,0 +1,131 @@
+"""From a target to a model that can be evaluated: front end, lowering, binding, carrier.
+
+The one place where what the compiler makes is handed to the runtime.
+"""
+
+from __future__ import annotations
+
+import importlib.abc
+import importlib.util
+import time
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+from sysdyn.compiler.binding.binding import Binding
+from sysdyn.compiler.formulations import choose
+from sysdyn.compiler.pipeline import CompiledModel, compile_network
+from sysdyn.compiler.program import build
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import ModelError, Place, Report
+from sysdyn.runtime.model import carrier
+from sysdyn.runtime.model.carrier import Carrier
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A compiled model with its numbers bound; backend says which carrier it has."""
+
+    network: Network
+    compiled: CompiledModel
+    binding: Binding
+    manifest: dict[str, Any]
+    carrier: Carrier
+    formulation: str
+    backend: str
+    cpu_compile_s: float
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """The binding as the contract's plain arrays."""
+        return self.arrays_of(self.binding)
+
+    @staticmethod
+    def arrays_of(b: Binding) -> dict[str, Any]:
+        """Another binding of the same model as plain arrays."""
+        return {
+            "p": b.p,
+            "ix": b.ix,
+            "shapes": b.shapes,
+            "row_shapes": b.row_shapes,
+            "offsets": b.offsets,
+            "initial": [s.to_json() for s in b.initial],
+        }
+
+
+def prepare(network: Network, report: Report, *, formulation: str | None = None, backend: str = "c") -> Prepared | None:
+    """Compile and bind a network; None where the report says why not.
+
+    formulation None: the scene's, else auto.  A missing C compiler is reported as a note and NumPy takes over.
+    """
+    cpu = time.process_time()
+    place = None
+    if formulation is None:
+        formulation = (network.scene.formulation if network.scene else None) or "auto"
+        place = network.scene.formulation_place if network.scene else None
+    chosen, found = choose(network, formulation, place)
+    report.extend(found)
+    if found:
+        return None
+    try:
+        compiled, made, backend = _compiled(network, chosen, backend, report)
+        binding = compiled.bind()
+    except ModelError as error:
+        report.extend(error.diagnostics)
+        return None
+    report.extend(compiled.notes)
+    manifest = compiled.manifest(binding)
+    return Prepared(network, compiled, binding, manifest, made, chosen, backend, time.process_time() - cpu)
+
+
+def _compiled(network: Network, formulation: str, backend: str, report: Report) -> tuple[CompiledModel, Carrier, str]:
+    if backend == "c":
+        compiled = compile_network(network, formulation, "c")
+        try:
+            return compiled, carrier.load(compiled.library()), "c"
+        except build.BuildError as error:  # none there, or one that cannot build (no headers, no room)
+            first = error.output.strip().splitlines()[:1]
+            said = ": ".join([str(error), *first])
+            report.note("N609", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
+    compiled = compile_network(network, formulation, "numpy")
+    return compiled, carrier.load(module_of(compiled.text)), "numpy"
+
+
+class _Text(importlib.abc.InspectLoader):
+    """Loads the module that the compiler has generated."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def get_source(self, fullname: str) -> str:
+        """The generated text."""
+        return self._text
+
+
+def module_of(text: str) -> ModuleType:
+    """A generated NumPy text as a module."""
+    loader = _Text(text)
+    spec = importlib.util.spec_from_loader("sysdyn_residual", loader)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module
+
+
+def place_at(network: Network, file: str, line: int) -> Place:
+    """The statement of the network that begins on a line; the model's name where there is none."""
+    groups = (
+        network.constraints,
+        network.works,
+        network.energies,
+        network.dynamics,
+        network.initials,
+        network.unknowns,
+        network.states,
+        network.coordinates,
+    )
+    for group in groups:
+        for item in group:
+            if item.place.file == file and item.place.start[0] == line:
+                return item.place
+    return network.place

@@ -1,0 +1,328 @@
+"""One simulation from a file to a trace: what `sysdyn simulate` and `sysdyn.api.simulate` have in common."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.expectations import Claim, judge
+from sysdyn.cli.run.prepare import Prepared, place_at, prepare
+from sysdyn.cli.run.starting import Started, start
+from sysdyn.cli.run.targets import Target
+from sysdyn.compiler.binding.instants import instants
+from sysdyn.dsl import load
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Network, Scene
+from sysdyn.dsl.model.units import si_text
+from sysdyn.dsl.text.diagnostics import Place, Report
+from sysdyn.runtime.integrate.options import Options, Progress
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
+from sysdyn.runtime.simulate import Outcome, simulate
+from sysdyn.runtime.trace.trace import Parameter
+
+ACCURACY = 1e-4
+INSTANTS = 2e7
+"""Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
+LISTED = 1000
+"""Elements of a parameter array that the trace lists: each is a data set of its own, about 0.5 kB and 60 us."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """The options of `simulate` as given; None where the scene or the default decides.  Texts are expressions."""
+
+    file: str
+    scene: str | None = None
+    model: str | None = None
+    formulation: str | None = None
+    method: str | None = None
+    index: str | None = None
+    redundancy: str | None = None
+    accuracy: float | None = None
+    rtol: float | None = None
+    atol: float | None = None
+    until: str | None = None
+    at: str | None = None
+    settings: tuple[tuple[str, str], ...] = ()
+    levels: tuple[tuple[str, str], ...] = ()
+    backend: str = "c"
+    output: str | None = None
+    max_steps: int | None = None
+    max_wall: str | None = None
+    timings: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """What came of it.  exit: 0, 1 (an expectation failed), 3 (the solver stopped, `failure` says where)."""
+
+    target: Target
+    prepared: Prepared
+    started: Started
+    outcome: Outcome
+    claims: tuple[Claim, ...]
+    exit: int
+    failure: str | None = None
+
+
+def run(request: Request, report: Report, progress: Progress | None = None) -> Ran | None:
+    """Simulate; None where the report says why not.  UsageError, OSError and TraceError pass through."""
+    began = time.monotonic()
+    check_tolerances(request)
+    if request.output and request.file != "-" and _same(request.output, request.file):
+        raise UsageError(f"-o {request.output} is the model itself")
+    document = targets.read(request.file, report)
+    target = targets.one(document, request.file, request.model, request.scene, report)
+    if target is None:
+        return None
+    with ex.fresh():
+        prepared = ready(request, target, report)
+        options = None if prepared is None else options_of(request, target, prepared, report, began, progress)
+        return None if prepared is None or options is None else integrate(target, prepared, options, report)
+
+
+def check_tolerances(request: Request) -> None:
+    """UsageError where --accuracy, --rtol, --atol make no sense."""
+    if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
+        raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
+    if request.rtol is not None and not 0.0 < request.rtol < 1.0:
+        raise UsageError(f"--rtol {request.rtol:g}: it must be positive and less than 1")
+    if request.atol is not None and not 0.0 <= request.atol < math.inf:
+        raise UsageError(f"--atol {request.atol:g}: it must not be negative")
+
+
+def ready(request: Request, target: Target, report: Report) -> Prepared | None:
+    """The target under the request's settings, compiled and bound; None where the report says why not."""
+    network = load.network(target.document, target.model, target.scene, report, request.settings, levels=request.levels)
+    if network is None:
+        return None
+    return prepare(network, report, formulation=request.formulation, backend=request.backend)
+
+
+def integrate(target: Target, prepared: Prepared, options: Options, report: Report) -> Ran | None:
+    """From the consistent start to the trace; None where the report says why not."""
+    started = start(prepared, options.t_start, report, options.redundancy)
+    if started is None or report.failed:
+        return None
+    options = replace(options, stops=_stops(prepared, options, report))
+    return _ran(target, prepared, started, options, report)
+
+
+def _same(one: str, other: str) -> bool:
+    try:
+        return Path(one).samefile(other)
+    except OSError:
+        return False
+
+
+def _redundancy(request: Request, network: Network) -> str:
+    """What shall become of redundant constraints."""
+    return request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
+
+
+def options_of(
+    request: Request, target: Target, prepared: Prepared, report: Report, began: float, progress: Progress | None
+) -> Options | None:
+    """The runtime's options; None where the report says why not.  began: `time.monotonic()` of the command."""
+    scene = prepared.network.scene or Scene("", prepared.network.place)
+    value = prepared.binding.evaluate
+
+    def instant(text: str, name: str) -> float | None:
+        return load.constant(target.document, text, dim.TIME, name, report)
+
+    t0 = value(scene.start) if scene.start is not None else 0.0
+    t1 = value(scene.end) if scene.end is not None else None
+    if request.until is not None:
+        t1 = instant(request.until, "--until")
+    elif t1 is None:
+        raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
+    at = [instant(text, "--at") for text in _separate(request.at)] if request.at else []
+    wall = instant(request.max_wall, "--max-wall") if request.max_wall else None
+    if t1 is None or None in at or report.failed:
+        return None
+    if not t1 > t0:
+        raise UsageError(f"the run ends at {t1:g} s, but it begins at {t0:g} s")
+    every = value(scene.every) if scene.every is not None else None
+    if every is not None and not every > 0.0:
+        raise UsageError(f"the interval of the trace is {every:g} s: it must be positive")
+    if every is not None and (t1 - t0) / every > INSTANTS:
+        raise UsageError(f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants")
+    if wall is not None and not wall > 0.0:
+        raise UsageError(f"--max-wall {wall:g} s: it must be positive")
+    accuracy, on = _accuracy(request, scene, prepared)
+    solver = {name: value(node) for name, node in scene.solver_options}
+    method = request.method or scene.solver or "auto"
+    if method == "euler" and "step" not in solver:
+        raise UsageError("method euler needs a step: 'solver euler(step = 1 ms)' in the scene")
+    steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), None)
+    claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
+    return Options(
+        output=request.output or _default_output(request.file, scene.name),
+        t_start=t0,
+        t_end=t1,
+        every=every,
+        at=tuple(t for t in at if t is not None),
+        sampled_at=tuple(t for t in claims if t0 <= t <= t1),
+        accuracy=accuracy,
+        accuracy_on=on,
+        rtol=request.rtol,
+        atol=request.atol,
+        method=method,
+        index=request.index or (f"{solver['index']:g}" if "index" in solver else "auto"),
+        euler_step=solver.get("step"),
+        redundancy=_redundancy(request, prepared.network),
+        max_steps=steps,
+        max_wall=wall,
+        sample_steps=any(e.moment == "always" for e in prepared.network.expectations),
+        timings=request.timings,
+        cpu_compile=prepared.cpu_compile_s,
+        wall_began=began,
+        progress=progress,
+        attributes=_attributes(target, prepared),
+        parameters=tuple(_parameters(prepared)),
+    )
+
+
+def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
+    """Instants at which the text jumps or has kinks in time."""
+    tables = prepared.network.tables
+    found = instants(prepared.compiled.form, prepared.binding, options.t_start, options.t_end, tables)
+    if found.note:
+        report.note("N608", found.note, prepared.network.place)
+    return found.times
+
+
+def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:
+    """Accuracy of all traced quantities, or of those that the scene names."""
+    if request.accuracy is not None:
+        if not 0.0 < request.accuracy < 1.0:
+            raise UsageError(f"--accuracy {request.accuracy:g}: it must be positive and less than 1")
+        return request.accuracy, ()
+    if scene.accuracy is None:
+        return ACCURACY, ()
+    wanted = prepared.binding.evaluate(scene.accuracy)
+    return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
+
+
+def _separate(text: str) -> list[str]:
+    """The parts between commas outside brackets."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "([") - (character in ")]")
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
+
+
+def _default_output(file: str, scene: str) -> str:
+    stem = "model" if file == "-" else Path(file).stem
+    return f"{stem}-{scene}.h5" if scene else f"{stem}.h5"
+
+
+def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
+    text = target.document.file.source.text
+    return {
+        "Conventions": "CF-1.11",
+        "title": target.name,
+        "source": f"sysdyn {_version()}",
+        "model": prepared.network.model,
+        "scene": prepared.network.scene.name if prepared.network.scene else "",
+        "formulation": prepared.formulation,
+        "model_sha256": hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest(),
+    }
+
+
+def _version() -> str:
+    try:
+        return metadata.version("sysdyn")
+    except metadata.PackageNotFoundError:  # run from a folder that is not installed
+        return "unknown"
+
+
+def _parameters(prepared: Prepared) -> Iterator[Parameter]:
+    """Parameters in SI units, arrays element by element (`m[2]`); arrays of more than LISTED elements are left out."""
+    evaluate, values = prepared.binding.evaluate, prepared.binding.values
+    for p in prepared.network.parameters:
+        unit = si_text(p.unit.dimension)
+        if not p.shape:
+            yield Parameter(p.name, float(values[p.name]), unit)
+            continue
+        array = np.asarray(values[p.name])
+        first = [round(evaluate(low)) for low, _ in p.shape]
+        if array.size > LISTED:
+            continue
+        for at, value in np.ndenumerate(array):
+            index = ",".join(str(a + b) for a, b in zip(at, first, strict=True))
+            yield Parameter(f"{p.name}[{index}]", float(value), unit)
+
+
+def _ran(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
+    failure = None
+    try:
+        outcome = simulate(
+            prepared.manifest, prepared.arrays, prepared.carrier, options, start=started.state, facts=started.facts
+        )
+    except NoSuchForm as error:
+        report.error("E607", str(error), prepared.network.place)
+        return None
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    except SolverFailure as error:
+        failure = _failure(prepared, error)
+        if not isinstance(error.partial, Outcome):
+            raise UsageError(failure) from error
+        outcome = error.partial
+        if outcome.reached > error.time:
+            failure += "; the trace is that of a coarser run to the end, its error is not known"
+    claims = judge(prepared, outcome, report, finished=outcome.reached >= options.t_end)
+    code = 3 if failure else 1 if report.failed else 0
+    return Ran(target, prepared, started, outcome, claims, code, failure)
+
+
+_CAUSES = {
+    "newton": "Newton's iteration does not converge",
+    "error_test": "the local error cannot be brought below the tolerance",
+    "singular": "the iteration matrix is singular",
+    "nonfinite": "an equation is not a number",
+    "stiff": "the equations are stiff, an explicit method is held to tiny steps: take radau or bdf",
+    "step_too_small": "the step size fell below the resolution of time",
+    "max_steps": "the limit of steps is reached",
+    "max_wall": "the limit of wall time is reached",
+    "memory": "there is no memory left",
+}
+
+
+def _failure(prepared: Prepared, error: SolverFailure) -> str:
+    """The sentence of exit code 3: time, element, source line."""
+    cause = _CAUSES.get(error.cause, error.cause)
+    text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {cause}"
+    if error.row is not None:
+        place = place_at(prepared.network, error.row.file, error.row.line)
+        text += f", in {error.row.kind} {error.row.label}, {place.file}:{place.start[0]}"
+    if error.unknown is not None:
+        text += f", unknown {error.unknown}"
+        if error.row is None:
+            place = _declared(prepared.network, error.unknown)
+            text += f", {place.file}:{place.start[0]}"
+    return text
+
+
+def _declared(network: Network, unknown: str) -> Place:
+    """Where the family of an unknown is declared: `x[3]'`, `x.p` and `rod.multiplier` are of x and rod."""
+    name = re.split(r"[^\w]", unknown, maxsplit=1)[0]
+    families = (network.coordinates, network.states, network.unknowns)
+    places = {item.name: item.place for group in families for item in group}
+    places |= {item.name: item.place for item in network.constraints if item.name}
+    return places.get(name, network.place)

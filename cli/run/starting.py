@@ -1,0 +1,219 @@
+"""The consistent start as the author should see it: what was moved, what stands in the way (E903, E505, E510, E519)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from sysdyn.cli.run.prepare import Prepared, place_at, prepare
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Expectation
+from sysdyn.dsl.text.diagnostics import Place, Related, Report
+from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState, consistent_start
+from sysdyn.runtime.structure.implicit import undetermined
+from sysdyn.runtime.structure.inertia import negative_inertia
+from sysdyn.runtime.structure.order import order_and_manifold
+from sysdyn.runtime.structure.structure import Structure, structure
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """A model at its start."""
+
+    system: System
+    state: ConsistentState
+    facts: Structure
+
+
+def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None = None) -> Started | None:
+    """The consistent start and the structural facts there; None where the report says what is in the way.
+
+    redundancy: error, drop or minimum_norm; None: the scene's.
+    """
+    scene = prepared.network.scene
+    policy = redundancy or (scene.redundancy if scene else None) or "error"
+    system = System(prepared.manifest, prepared.arrays, prepared.carrier)
+    try:
+        state = consistent_start(system, t0)
+    except InconsistentStart as error:
+        _inconsistent(prepared, error, report)
+        return None
+    facts = structure(system, state)
+    implicit = undetermined(system, state)
+    _structural(prepared, facts if not implicit else replace(facts, undetermined=()), policy, report)
+    _inertia(prepared, system, state, report)
+    for name in implicit:
+        place = next(
+            (u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place
+        )
+        report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
+    _statics(prepared, system, state, facts, report)
+    return Started(system, state, facts)
+
+
+def described(state: ConsistentState) -> list[str]:
+    """What the start moved, a line each."""
+    return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
+
+
+def shortened(lines: list[str]) -> list[str]:
+    """The first few of many lines."""
+    return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
+
+
+def _place(prepared: Prepared, label: RowLabel) -> Place:
+    return place_at(prepared.network, label.file, label.line)
+
+
+def _inconsistent(prepared: Prepared, error: InconsistentStart, report: Report) -> None:
+    where = _place(prepared, error.rows[0]) if error.rows else prepared.network.place
+    names = ", ".join(dict.fromkeys(r.label for r in error.rows)) or ", ".join(error.names)
+    unit = f"residual {error.residual:.3g}"
+    related = tuple(Related("this value is fixed", _place(prepared, c)) for c in error.candidates)
+    free = ", ".join(f"'{c.label}'" for c in error.candidates)
+    match error.kind:
+        case "gamma":
+            message = (
+                f"gamma '{names}' has no solution at the start: the residual cannot fall below {error.residual:.3g}"
+            )
+            report.error("E519", message, where, related=related)
+        case "implicit":
+            message = f"the gammas do not determine {', '.join(error.names)} at the start"
+            report.error("E505", message, where)
+        case "nonfinite":
+            message = f"{names} is not a number at the initial values: a root or logarithm out of its range?"
+            report.error("E519", message, where, help="other guesses: init ... ~ ...")
+        case _ if error.candidates:
+            message = f"fixed initial values contradict {names}: {unit}"
+            report.error("E903", message, where, help=f"free one of {free}: '~' for '='", related=related)
+        case "fixed":
+            report.error("E510", f"the constraints contradict each other at the start: {unit} in {names}", where)
+        case _:
+            message = f"no consistent start was found: {unit} in {names}"
+            report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
+
+
+def _structural(prepared: Prepared, facts: Structure, policy: str, report: Report) -> None:
+    if facts.singular:
+        near = facts.rank
+        message = f"the initial configuration is singular: rank {near - facts.singular}, {near} nearby"
+        report.error("E512", message, prepared.network.place, help="move the guess off the dead centre")
+    if facts.redundant and policy != "error":
+        return
+    if facts.redundant:
+        first = facts.dependent[0][0] if facts.dependent else None
+        where = _place(prepared, first) if first else prepared.network.place
+        group = ", ".join(f"{label.label} ({weight:+.3g})" for label, weight in facts.dependent)
+        plural = "s" if facts.redundant > 1 else ""
+        message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
+        report.error("E509", message, where, help="delete one of them, or redundancy minimum_norm in the scene")
+    elif facts.undetermined:
+        names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
+        message = f"the equations do not determine {names}"
+        report.error(
+            "E516", message, prepared.network.place, help="inertia, stiffness, dissipation or a constraint is missing"
+        )
+
+
+def _without_primal_rows(prepared: Prepared) -> bool:
+    """Whether rows are other than the balances of the text's coordinates, with a multiplier a constraint."""
+    return prepared.formulation.startswith("co_") or prepared.formulation == "kane"
+
+
+def _inertia(prepared: Prepared, system: System, state: ConsistentState, report: Report) -> None:
+    """E321: T* without a minimum leaves the motion undetermined forward in time (springs may be unstable).
+
+    Asked of the balances of coordinates: another formulation of the text has them.
+    """
+    if _without_primal_rows(prepared):
+        return
+    found = negative_inertia(system, state)
+    if found is None:
+        return
+    name, value = found
+    family = name.partition("[")[0].rstrip("'").removesuffix(".f")
+    places = {c.name: c.place for c in prepared.network.coordinates} | {
+        b.name: b.place for b in prepared.network.branches
+    }
+    places |= {n.name: n.place for n in prepared.network.nodes}
+    energies = [e.place for e in prepared.network.energies if e.function in ("T*", "T")]
+    where = energies[0] if len(energies) == 1 else places.get(family, prepared.network.place)
+    message = f"the inertia along {name} is negative ({value:g}): T* has no minimum"
+    report.error("E321", message, where, help="a positive mass, inertia or inductance")
+
+
+def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: Structure, report: Report) -> None:
+    """`expect static`: claims about counts (E909).
+
+    Claims of a model hold in each of its scenes: where there is a Lagrangian formulation, that is counted.
+    """
+    if _without_primal_rows(prepared) and prepared.network.statics:
+        facts = replace(_primal(prepared, state.t) or facts, index=facts.index)
+    known = {
+        "coordinates": facts.coordinates,
+        "m1": facts.m1,
+        "m2": facts.m2,
+        "dof": facts.dof,
+        "configuration_dof": facts.configuration_dof,
+        "redundant": facts.redundant,
+        "index": facts.index,
+    }
+    if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
+        tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
+        counted = order_and_manifold(system, state, tangible)
+        known |= {"order": counted[0], "manifold": counted[1]} if counted else {}
+    for claim in prepared.network.statics:
+        _static(prepared, claim, known, report)
+
+
+def _primal(prepared: Prepared, t0: float) -> Structure | None:
+    """The facts of the Lagrangian formulation; None where there is none."""
+    silent = Report()
+    primal = prepare(prepared.network, silent, formulation="lagrangian", backend=prepared.backend)
+    if primal is None:
+        return None
+    system = System(primal.manifest, primal.arrays, primal.carrier)
+    try:
+        return structure(system, consistent_start(system, t0))
+    except InconsistentStart:
+        return None
+
+
+def _names(claim: Expectation) -> list[ex.Node]:
+    return [n for n in ex.topological([claim.left, claim.right]) if n.op == "param"]
+
+
+def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None], report: Report) -> None:
+    missing = []
+
+    def lookup(node: ex.Node) -> float:
+        name = node.data if node.op == "param" and not node.args else ""
+        if name.startswith("static "):
+            value = known.get(name.removeprefix("static "))
+            if value is None:
+                missing.append(name.removeprefix("static "))
+            return float("nan") if value is None else float(value)
+        return prepared.binding.evaluate(node)
+
+    left, right = ex.evaluate([claim.left, claim.right], lookup)
+    if missing:
+        message = f"static quantity '{missing[0]}' is not known for this model (too large, or undetermined)"
+        report.note("N608", message, claim.place)
+    elif not holds(claim.operator, left, right, 0.0):
+        report.error(
+            "E909", f"expect failed: {claim.text.removeprefix('expect ')}, found {left:g} and {right:g}", claim.place
+        )
+
+
+def holds(operator: str, left: float, right: float, within: float) -> bool:
+    """Whether left op right, a tolerance granted to the author's side."""
+    match operator:
+        case "==":
+            return abs(left - right) <= within
+        case "!=":
+            return abs(left - right) > within
+        case "<" | "<=":
+            return left <= right + within if operator == "<=" or within else left < right
+        case _:
+            return left >= right - within if operator == ">=" or within else left > right

@@ -1,0 +1,90 @@
+"""Which model and scene of a file a command means."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+from sysdyn.cli.failures import UsageError
+from sysdyn.dsl import load
+from sysdyn.dsl.load import Document
+from sysdyn.dsl.names.symbols import nearest
+from sysdyn.dsl.text.decoding import decode
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.tree import syntax
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A model under a scene, or by itself."""
+
+    document: Document
+    model: syntax.Model
+    scene: syntax.Scene | None
+
+    @property
+    def name(self) -> str:
+        """For messages: 'swing of pendulum'."""
+        model = self.model.name.name
+        return f"{self.scene.name.name} of {model}" if self.scene else model
+
+
+def read(path: str, report: Report) -> Document:
+    """Parse a file, or standard input where path is '-'."""
+    if path == "-":
+        return load.document(decode("<stdin>", sys.stdin.buffer), report)
+    return load.read(path, report)
+
+
+def all_targets(document: Document, report: Report) -> list[Target]:
+    """Every scene, and every model without one."""
+    found = []
+    for scene in document.scenes.values():
+        model = load.model_of(document, scene, report)
+        if model is not None:
+            found.append(Target(document, model, scene))
+    used = {t.model.name.name for t in found}
+    return found + [Target(document, m, None) for n, m in document.models.items() if n not in used]
+
+
+def one(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
+    """The target that the options name, or the only one there is; None where its text has errors.
+
+    UsageError with the list where there are several and none is named.
+    """
+    if scene is not None:
+        found = document.scenes.get(scene)
+        if found is None:
+            raise _nothing(document, path, "scene", scene, list(document.scenes), report)
+        owner = load.model_of(document, found, report)
+        if owner is None:
+            return None
+        if model is not None and owner.name.name != model:
+            raise UsageError(f"scene '{scene}' is of model '{owner.name.name}', not of '{model}'")
+        return Target(document, owner, found)
+    if model is not None and model not in document.models:
+        raise _nothing(document, path, "model", model, list(document.models), report)
+    scenes = [s for s in document.scenes.values() if model is None or s.model.names == (model,)]
+    if len(scenes) == 1:
+        return one(document, path, model, scenes[0].name.name, report)
+    if scenes:
+        raise UsageError(f"{path} has several scenes: --scene {' | '.join(s.name.name for s in scenes)}")
+    names = [model] if model is not None else list(document.models)
+    if len(names) == 1:
+        return Target(document, document.models[names[0]], None)
+    if names:
+        raise UsageError(f"{path} has several models: --model {' | '.join(names)}")
+    if report.failed:
+        return None
+    raise UsageError(f"{path} has no model")
+
+
+def _nothing(document: Document, path: str, what: str, name: str, names: list[str], report: Report) -> Exception:
+    if report.failed and not names:
+        from sysdyn.dsl.text.diagnostics import ModelError
+
+        return ModelError(report.diagnostics)
+    near = nearest(name, names)
+    listed = f"nearest: '{near}'" if near else f"there are: {', '.join(names) or 'none'}"
+    code = "E901" if what == "scene" else "E902"
+    return UsageError(f"{code}: {path} has no {what} '{name}'; {listed}")

@@ -1,0 +1,1 @@
+"""One scene in every formulation and by two methods."""

@@ -1,0 +1,277 @@
+"""One scene in every formulation that can express it and by two methods: what `sysdyn verify` compares.
+
+The reference is the scene's formulation and method (or those that the options name).  Its run at a tenth of the
+accuracy gives the horizon: the instant up to which two runs of one formulation agree, so that a chaotic model is
+compared as far as its own runs justify (where it is chaotic, those of the runs that differ count too).  Up to there
+every two runs shall agree within TIMES x accuracy x nominal on every traced quantity; quantities that read multipliers
+of redundant constraints are left out.
+Received: a request and a folder for the traces; handed back: `Verified`.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import FORMULATIONS
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import ACCURACY, Ran, Request, check_tolerances, integrate, options_of, ready
+from sysdyn.cli.run.targets import Target
+from sysdyn.cli.verify.agreement import Bounds, Gap, horizon
+from sysdyn.cli.verify.twins import Twins, free_quantities, twins
+from sysdyn.cli.verify.verified import Refusal, Run, Verified, disagreements, worst
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.trace.trace import Trace
+
+METHODS = ("bdf", "radau")
+TIMES = 10.0
+"""Of the accuracy asked: what two runs may differ by (CONTRACT)."""
+FINER = 0.1
+"""Of the accuracy asked: that of the run which gives the horizon (CONTRACT)."""
+GRID = 200
+"""Intervals of the common instants where the scene leaves them to the solver."""
+REFUSALS = ("E601", "E602", "E603", "E604", "E605", "E606", "E607", "N608")
+"""Codes by which a formulation says that it cannot express a model."""
+
+
+def verify(
+    request: Request, report: Report, folder: Path, progress: Callable[[float, float | None], None] | None = None
+) -> Verified | None:
+    """Run and compare; None where the report says why the reference cannot run.  Errors pass as those of `run`."""
+    check_tolerances(request)
+    if request.method not in (None, "auto", *METHODS):
+        raise UsageError(f"--method {request.method}: verify compares {' and '.join(METHODS)}")
+    document = targets.read(request.file, report)
+    target = targets.one(document, request.file, request.model, request.scene, report)
+    return None if target is None else _Verification(request, target, report, folder, progress).all()
+
+
+class _Verification:
+    """The runs of one scene, collected."""
+
+    def __init__(
+        self,
+        request: Request,
+        target: Target,
+        report: Report,
+        folder: Path,
+        progress: Callable[[float, float | None], None] | None,
+    ) -> None:
+        self.request, self.target, self.report, self.folder, self._progress = request, target, report, folder, progress
+        self.began = time.monotonic()
+        self.done, self.planned = 0, 2 * (len(FORMULATIONS) - 1) + 1
+        self.runs: list[Run] = []
+        self.refusals: list[Refusal] = []
+        self.twins: list[Twins] = []
+        self.left_out: dict[str, str] = {}
+        self.found: dict[tuple[str, object], tuple[Diagnostic, list[str]]] = {}
+        self.bounds: dict[str, float] = {}
+        self.span = (0.0, 0.0)
+        self.finer: Run | None = None
+
+    def all(self) -> Verified | None:
+        """Every formulation, then the comparison."""
+        self._formulation(None)
+        if not self.runs or self.finer is None:
+            self._tell()
+            return None
+        first = self.runs[0].formulation
+        for name in FORMULATIONS:
+            if name not in ("auto", first):
+                self._formulation(name)
+        self._tell()
+        return self._compared(self.finer)
+
+    # --- runs ---------------------------------------------------------------------------------------------------
+
+    def _formulation(self, name: str | None) -> None:
+        """Both methods in one formulation; None: that of the request, of the scene, or auto (the reference)."""
+        report = Report(self.report if name is None else ())
+        request = self.request if name is None else replace(self.request, formulation=name)
+        label = name or "reference"
+        before = self.done
+        with ex.fresh():
+            prepared = ready(request, self.target, report)
+            if prepared is not None:
+                label = prepared.formulation
+                options = options_of(request, self.target, prepared, report, self.began, None)
+                if options is not None and not report.failed:
+                    self._methods(prepared, _gridded(options), report, reference=name is None)
+            elif name is not None and (refusal := _refusal(name, report)):
+                self.refusals.append(refusal)
+                report = Report()
+        self.done = before + len(METHODS) + (name is None)
+        self._collect(report, label)
+        if name is None:
+            self.report.extend(d for d in report if d.severity != "error")
+
+    def _methods(self, prepared: Prepared, options: Options, report: Report, *, reference: bool) -> None:
+        first = _method(options)
+        for method in (first, *(m for m in METHODS if m != first)):
+            inner = Report()
+            ran = self._run(prepared, options, method, inner, "")
+            name = f"{prepared.formulation} {method}"
+            self._collect(inner, name)
+            if reference and method == first:
+                report.extend(d for d in inner if d.severity != "error")
+            if ran is None:
+                return
+            self.runs.append(_read(ran, options))
+            self.done += 1
+            if method != first:
+                continue
+            self._facts(ran, options.t_end)
+            if reference:
+                self.span = options.t_start, options.t_end
+                self.bounds = _bounds(options, self.runs[0].trace)
+                self.finer = self._other(prepared, options, self.runs[0])
+                self.done += 1
+
+    def _other(self, prepared: Prepared, options: Options, reference: Run) -> Run | None:
+        """The reference at a tenth of the accuracy; at a coarser tolerance where it has the finest there is already."""
+        finer = _finer(options)
+        ran = self._run(prepared, finer, reference.method, Report(), "-finer")
+        if ran is None:
+            return None
+        run = _read(ran, finer)
+        used = float(reference.trace.attributes["rtol"])
+        if float(run.trace.attributes["rtol"]) <= 0.5 * used:
+            return run
+        coarser = replace(finer, rtol=used / FINER)
+        ran = self._run(prepared, coarser, reference.method, Report(), "-coarser")
+        return None if ran is None else _read(ran, coarser)
+
+    def _run(self, prepared: Prepared, options: Options, method: str, report: Report, suffix: str) -> Ran | None:
+        path = self.folder / f"{prepared.formulation}-{method}{suffix}.h5"
+        options = replace(options, output=path, method=method, progress=self._advance)
+        return integrate(self.target, prepared, options, report)
+
+    def _facts(self, ran: Ran, until: float) -> None:
+        """What the formulation says beside its traces: its other carrier, multipliers that are not unique."""
+        pair = twins(ran.prepared, ran.started, until)
+        if pair is not None:
+            self.twins.append(pair)
+        for name in free_quantities(ran.prepared, ran.started):
+            self.left_out[name] = "multiplier of a redundant constraint"
+
+    def _advance(self, fraction: float, _left: float | None) -> None:
+        """Progress over all runs."""
+        if self._progress is not None:
+            whole = (self.done + fraction) / self.planned
+            spent = time.monotonic() - self.began
+            self._progress(whole, spent * (1.0 - whole) / whole if whole > 0.05 else None)
+
+    # --- findings -----------------------------------------------------------------------------------------------
+
+    def _collect(self, report: Report, name: str) -> None:
+        """Errors by code and place, with the runs that have them."""
+        for item in report:
+            if item.severity == "error":
+                self.found.setdefault((item.code, item.place), (item, []))[1].append(name)
+
+    def _tell(self) -> None:
+        """Errors into the report; those of some runs alone name the runs."""
+        everywhere = max(len(self.runs), 1)
+        for item, names in self.found.values():
+            some = f" (in {', '.join(names)})" if len(names) < everywhere else ""
+            self.report.add(replace(item, message=item.message + some))
+
+    # --- comparison ---------------------------------------------------------------------------------------------
+
+    def _compared(self, finer: Run) -> Verified:
+        reference = self.runs[0]
+        for name in reference.trace.names:
+            if not math.isfinite(self.bounds.get(name, math.inf)):
+                self.left_out.setdefault(name, "no accuracy is asked of it")
+        for run in self.runs:
+            for name in set(reference.trace.names) ^ set(run.trace.names):
+                self.left_out.setdefault(name, f"not in every formulation: {run.formulation}")
+        bounds = {name: bound for name, bound in self.bounds.items() if name not in self.left_out}
+        until, beyond = horizon(reference.trace, finer.trace, bounds)
+        by, found = reference.name, disagreements(self.runs, bounds, until)
+        if found and beyond is not None:
+            # chaotic: a run that differs may have lost its accuracy earlier than the reference
+            for name in dict.fromkeys(r.name for d in found for r in (d.one, d.other) if r is not reference):
+                own, differs = self._own_horizon(name, bounds)
+                if own < until:
+                    until, beyond, by = own, differs, name
+            found = disagreements(self.runs, bounds, until)
+        return Verified(
+            self.target.name,
+            self.span,
+            tuple(self.runs),
+            finer,
+            tuple(worst(reference, run, bounds, until) for run in (*self.runs, finer)),
+            tuple(self.refusals),
+            tuple(self.twins),
+            until,
+            beyond,
+            by,
+            tuple(bounds),
+            tuple(sorted(self.left_out.items())),
+            found,
+        )
+
+    def _own_horizon(self, name: str, bounds: Bounds) -> tuple[float, Gap | None]:
+        """The horizon [s] of a run from its own finer one, and what differs beyond it."""
+        run = next(run for run in self.runs if run.name == name)
+        request, report = replace(self.request, formulation=run.formulation), Report()
+        with ex.fresh():
+            prepared = ready(request, self.target, report)
+            options = prepared and options_of(request, self.target, prepared, report, self.began, None)
+            other = self._other(prepared, _gridded(options), run) if prepared and options else None
+        return (math.inf, None) if other is None else horizon(run.trace, other.trace, bounds)
+
+
+def _refusal(formulation: str, report: Report) -> Refusal | None:
+    """Why a formulation cannot express the model; None where something else is wrong."""
+    if any(d.severity == "error" and d.code not in REFUSALS for d in report):
+        return None
+    reasons = [d for d in report if d.code in REFUSALS]
+    reasons.sort(key=lambda d: d.severity != "error")
+    return Refusal(formulation, reasons[0].code, reasons[0].message) if reasons else None
+
+
+def _gridded(options: Options) -> Options:
+    """Options whose trace holds the same instants whatever the method."""
+    if options.every is not None:
+        return options
+    return replace(options, every=(options.t_end - options.t_start) / GRID)
+
+
+def _method(options: Options) -> str:
+    """The method of the reference: the one asked for, or the first where neither is."""
+    return options.method if options.method in METHODS else METHODS[0]
+
+
+def _finer(options: Options) -> Options:
+    """Options at a tenth of the accuracy (and of the solver's own tolerances)."""
+    return replace(
+        options,
+        accuracy=None if options.accuracy is None else FINER * options.accuracy,
+        accuracy_on=tuple((name, FINER * wanted) for name, wanted in options.accuracy_on),
+        rtol=None if options.rtol is None else FINER * options.rtol,
+        atol=None if options.atol is None else FINER * options.atol,
+    )
+
+
+def _bounds(options: Options, trace: Trace) -> dict[str, float]:
+    """Relative difference allowed of each traced quantity; infinite where no accuracy is asked of it."""
+    wanted = dict(options.accuracy_on)
+    rest = math.inf if options.accuracy is None else options.accuracy
+    return {name: TIMES * wanted.get(name, rest) for name in trace.names}
+
+
+def _read(ran: Ran, options: Options) -> Run:
+    accuracy = min([options.accuracy or ACCURACY, *(wanted for _, wanted in options.accuracy_on)])
+    claims = tuple((claim.text, claim.ok) for claim in ran.claims)
+    trace = Trace.open(ran.outcome.trace)
+    stores = any(ran.prepared.compiled.energies.functions.values())
+    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure, stores)

@@ -1,0 +1,136 @@
+"""What `sysdyn verify` hands back, and which of its runs disagree.
+
+Received: runs with their traces, bounds by name, the horizon; handed back: disagreements with their worst place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from sysdyn.cli.verify.agreement import Bounds, Gap, gaps
+from sysdyn.cli.verify.twins import Twins
+from sysdyn.runtime.model.scales import ROUND_OFF
+from sysdyn.runtime.simulate import Outcome
+from sysdyn.runtime.trace.trace import Trace
+
+BOOKS = 10.0
+"""Energy balance allowed: times the accuracy asked, of the largest energy stored, dissipated or supplied."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run of the scene.
+
+    accuracy: as asked; expects: text, and whether it held; failure: where it stopped; stores: the model has an energy
+    or a content, so that its balance is more than works that cancel.
+    """
+
+    formulation: str
+    method: str
+    accuracy: float
+    outcome: Outcome
+    expects: tuple[tuple[str, bool | None], ...]
+    trace: Trace
+    failure: str | None
+    stores: bool
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+        return f"{self.formulation} {self.method}"
+
+    @property
+    def energy(self) -> float:
+        """Largest |energy balance| (J)."""
+        return float(np.max(np.abs(self.trace["audit.energy"].values), initial=0.0))
+
+    @property
+    def turnover(self) -> float:
+        """Largest energy that was stored, dissipated or supplied (J)."""
+        return self.trace["audit.energy"].nominal or 0.0
+
+    @property
+    def books(self) -> float:
+        """Energy balance in units of what is allowed: BOOKS x accuracy of the turnover."""
+        allowed = max(BOOKS * self.accuracy, ROUND_OFF) * self.turnover
+        if not self.stores:
+            return 0.0
+        return self.energy / allowed if allowed > 0.0 else (np.inf if self.energy > 0.0 else 0.0)
+
+    @property
+    def constraints(self) -> float:
+        """Largest norm of the constraints."""
+        return float(np.max(self.trace["audit.constraints"].values, initial=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A formulation that cannot express the model: the code and its reason."""
+
+    formulation: str
+    code: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """Two runs that differ, and where most."""
+
+    one: Run
+    other: Run
+    gap: Gap
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """What came of it.
+
+    runs: the reference first; finer: the reference at a tenth of the accuracy; worst: gap of each run to the reference;
+    horizon [s], beyond: what differs after it (None: compared to the end), by: the run that gives it; compared: names;
+    left_out: names and why.
+    """
+
+    name: str
+    span: tuple[float, float]
+    runs: tuple[Run, ...]
+    finer: Run
+    worst: tuple[Gap | None, ...]
+    refusals: tuple[Refusal, ...]
+    twins: tuple[Twins, ...]
+    horizon: float
+    beyond: Gap | None
+    by: str
+    compared: tuple[str, ...]
+    left_out: tuple[tuple[str, str], ...]
+    disagreements: tuple[Disagreement, ...]
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Runs that the solver could not finish."""
+        return tuple(f"{run.name}: {run.failure}" for run in (*self.runs, self.finer) if run.failure)
+
+
+def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
+    """The worst gap of a run to the reference; None of the reference itself and where nothing is compared."""
+    if run is reference:
+        return None
+    return next(iter(gaps(reference.trace, run.trace, bounds, until)), None)
+
+
+def disagreements(runs: Sequence[Run], bounds: Bounds, until: float) -> tuple[Disagreement, ...]:
+    """Runs that differ from the first up to `until` [s], then pairs among those that do not."""
+    found, agreeing = [], []
+    for run in runs[1:]:
+        gap = worst(runs[0], run, bounds, until)
+        if gap is not None and gap.ratio > 1.0:
+            found.append(Disagreement(runs[0], run, gap))
+        else:
+            agreeing.append(run)
+    for k, one in enumerate(agreeing):
+        for other in agreeing[k + 1 :]:
+            gap = worst(one, other, bounds, until)
+            if gap is not None and gap.ratio > 1.0:
+                found.append(Disagreement(one, other, gap))
+    return tuple(found)

@@ -1,0 +1,319 @@
+"""Instants at which a model's text jumps or has a kink in time alone: where a step ends and the integration restarts.
+
+Watched are the arguments of step, sign, abs, min, max, floor, ceil, mod, of comparisons and of tables, where they
+depend on time, parameters and loop variables and on no unknown (language, rule 17).  Each has a label that is constant
+on smooth pieces: the sign of its argument, the whole number below it, the piece of its table.  Where the argument is
+affine in time the candidates are computed; otherwise it is sampled ever more densely, between the instants of what
+stands inside it, until the number of changes stays.  Bisection then ends at two neighbouring doubles, evaluated by the
+operations that the generated code does, so that the instant is the very double at which the text changes.
+
+Received: a descriptor form and a binding; returned: `Instants`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.compiler.binding.binding import Binding
+from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
+from sysdyn.compiler.model.interpret import Value, evaluate, grid
+from sysdyn.compiler.model.terms import Nest
+from sysdyn.dsl.model.expression import Node, topological, topological_unbound, variables
+from sysdyn.dsl.model.network import Loop, Table
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Label = Callable[[list[Array]], Array]
+
+MOST = 10_000
+"""Instants beyond which none is given: restarts would cost more than the steps they save."""
+SAMPLES = 4096
+"""Of an argument that is not affine, at first; doubled until two countings agree."""
+BUDGET = 4_000_000
+"""Evaluations of one argument, over all iterations of its loops."""
+PER_PIECE = 8
+"""Samples at least between two instants of what stands inside an argument."""
+ROUND_OFF = 1e-14
+"""Of the span: what begins nearer to t0 began at t0."""
+_HALVINGS = 1100
+
+
+@dataclass(frozen=True, slots=True)
+class Instants:
+    """times [s], ascending; note: a sentence where the text has instants that are not among them."""
+
+    times: Array
+    note: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """An operation that changes in time alone: its arguments, its label, and where the label of an affine argument
+    changes: levels of the argument (None: at whole numbers).
+    """
+
+    node: Node
+    arguments: tuple[Node, ...]
+    label: Label
+    levels: Array | None
+    nest: Nest
+
+
+class _TooManyError(Exception):
+    """More instants than MOST."""
+
+
+def instants(form: DescriptorForm, binding: Binding, t0: float, t1: float, tables: Sequence[Table] = ()) -> Instants:
+    """All instants in (t0, t1); tables: of the network.  None of them, with a note, where they are more than MOST."""
+    search = _Search(binding, t0, t1)
+    try:
+        for watched in _watched(form, {t.name: t for t in tables}):
+            search.add(watched)
+        times = search.times()
+    except _TooManyError:
+        text = f"the text jumps or has kinks at more than {MOST} instants: they are integrated through"
+        return Instants(np.zeros(0), text)
+    return Instants(times, search.note)
+
+
+def _watched(form: DescriptorForm, tables: dict[str, Table]) -> Iterator[Watched]:
+    """Operations of all rows that are integrated, those inside others first."""
+    stack: list[tuple[Node, Nest]] = []
+    for block in form.blocks:
+        if block.name not in WITHOUT_ENTRIES and block.name != "initial":
+            stack += [(row.expression, kernel.nest) for kernel in block.kernels for row in kernel.rows]
+    seen: set[tuple[Node, Nest]] = set()
+    while stack:
+        root, nest = stack.pop()
+        for node in topological_unbound([root]):
+            if node.op == "reduce":
+                first, last, body = node.args
+                stack.append((body, (*nest, Loop(node.data[1], first, last))))
+            for watched in _of(node, tables):
+                kept = _trimmed(watched.arguments, nest)
+                if (node, kept) not in seen:
+                    yield Watched(node, watched.arguments, watched.label, watched.levels, kept)
+            seen.add((node, _trimmed(node.args, nest)))
+
+
+def _of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
+    """What is watched of a node; nothing where it does not depend on time alone."""
+    if not any(_in_time_alone(a) for a in node.args):
+        return
+    zero = np.zeros(1)
+    if node.op == "table":
+        table = tables.get(node.data[0])
+        for argument, points in zip(node.args, table.points if table else (), strict=False):
+            if table is not None and _in_time_alone(argument):
+                at = np.asarray(points, dtype=float)
+                at = at[[0, -1]] if table.method == "cubic" else at  # a spline is smooth enough inside
+                yield Watched(node, (argument,), _piece(at), at, ())
+        return
+    if not all(_in_time_alone(a) or not variables(a) for a in node.args):
+        return
+    if node.op == "cmp" or (node.op == "call" and node.data in ("min", "max")):
+        yield Watched(node, node.args, lambda v: np.sign(v[0] - v[1]), zero, ())
+    elif node.op == "call" and node.data in ("step", "abs", "sign"):
+        yield Watched(node, node.args, lambda v: np.sign(v[0]), zero, ())
+    elif node.op == "call" and node.data in ("floor", "ceil"):
+        rounded = np.floor if node.data == "floor" else np.ceil
+        yield Watched(node, node.args, lambda v: np.asarray(rounded(v[0])), None, ())
+    elif node.op == "call" and node.data == "mod":
+        yield Watched(node, node.args, lambda v: np.floor(v[0] / v[1]), None, ())
+
+
+def _piece(points: Array) -> Label:
+    return lambda v: np.searchsorted(points, v[0], side="right").astype(float)
+
+
+def _in_time_alone(node: Node) -> bool:
+    found = variables(node)
+    return bool(found) and all(leaf.op == "time" for leaf in found)
+
+
+def _trimmed(arguments: tuple[Node, ...], nest: Nest) -> Nest:
+    """The loops whose variables the arguments use, and those that these loops' bounds use."""
+    used = {n.data for n in topological(arguments) if n.op == "index"}
+    kept: list[Loop] = []
+    for loop in reversed(nest):
+        if loop.index in used:
+            kept.append(loop)
+            used |= {n.data for n in topological([loop.first, loop.last]) if n.op == "index"}
+    return tuple(reversed(kept))
+
+
+def _degree(roots: tuple[Node, ...]) -> int:
+    """Degree in time: 0, 1, or 2 for all that is not affine."""
+    found: dict[Node, int] = {}
+    for node in topological(roots):
+        inside = [found[a] for a in node.args]
+        most = max(inside, default=0)
+        if node.op == "time":
+            found[node] = 1
+        elif node.op == "sum" or most == 0:
+            found[node] = most
+        elif node.op == "mul":
+            moving = [e for e, d in zip(node.data, inside, strict=True) if d]
+            found[node] = most if moving == [1.0] else 2
+        else:
+            found[node] = 2
+    return max(found[r] for r in roots)
+
+
+class _Search:
+    """Collects instants of one binding in (t0, t1)."""
+
+    def __init__(self, binding: Binding, t0: float, t1: float) -> None:
+        self._parameters = binding.parameters
+        self.t0, self.t1 = t0, t1
+        self.note: str | None = None
+        self._found: dict[Node, Array] = {}
+
+    def times(self) -> Array:
+        """Everything found so far."""
+        every = np.unique(np.concatenate([np.zeros(0), *self._found.values()]))
+        if every.size > MOST:
+            raise _TooManyError
+        return every
+
+    def add(self, watched: Watched) -> None:
+        """The instants of one operation."""
+        columns = grid(watched.nest, self._parameters.lookup)
+        number = len(next(iter(columns.values()))) if columns else 1
+        if number == 0:
+            return
+        if 2 * number > BUDGET:
+            self.note = f"instants in the text of {number} elements are not searched for: they are integrated through"
+            return
+        labels = _Labels(watched, columns, self._parameters.lookup)
+        try:
+            brackets = self._affine(watched, labels, number) or self._sampled(watched, labels, number)
+        except KeyError:  # a constant that is known at the start only
+            return
+        found = labels.bisect(*brackets)
+        # the start lies on its own right side
+        found = np.unique(found[(found > self.t0 + ROUND_OFF * (self.t1 - self.t0)) & (found < self.t1)])
+        before = self._found.get(watched.node, found)
+        self._found[watched.node] = np.union1d(before, found)
+        self.times()
+
+    def _affine(self, watched: Watched, labels: _Labels, number: int) -> tuple[Whole, Array, Array] | None:
+        """Brackets around the computed crossings; None where the argument is not affine."""
+        arguments = watched.arguments
+        whole = watched.levels is None and watched.node.data == "mod"
+        if _degree(arguments[:1] if whole else arguments) > 1 or (whole and _degree(arguments[1:]) > 0):
+            return None
+        every = np.arange(number)
+        ends = [labels.measure(every, np.full(number, t), quotient=whole) for t in (self.t0, self.t1)]
+        slope = (ends[1] - ends[0]) / (self.t1 - self.t0)
+        low, high = np.minimum(*ends), np.maximum(*ends)
+        if not np.isfinite(low).all() or not np.isfinite(high).all():
+            return None
+        which: list[Whole] = []
+        level: list[Array] = []
+        if watched.levels is None:
+            first, count = np.floor(low), np.maximum(np.ceil(high) - np.floor(low) + 1.0, 0.0)
+            if count.sum() > 4 * MOST + 4 * number:
+                raise _TooManyError
+            for k in range(int(count.max())):
+                take = every[k < count]
+                which.append(take)
+                level.append(first[take] + k)
+        else:
+            for value in watched.levels:
+                take = every[(low <= value) & (value <= high)]
+                which.append(take)
+                level.append(np.full(take.size, value))
+        index, at = np.concatenate([every[:0], *which]), np.concatenate([np.zeros(0), *level])
+        moving = slope[index] != 0.0
+        index, at = index[moving], at[moving]
+        if index.size > 4 * MOST + 4 * number:
+            raise _TooManyError
+        t = self.t0 + (at - ends[0][index]) / slope[index]
+        around = 1e-12 * np.maximum(max(abs(self.t0), abs(self.t1)), np.abs(t))
+        return index, np.maximum(t - around, self.t0), np.minimum(t + around, self.t1)
+
+    def _sampled(self, watched: Watched, labels: _Labels, number: int) -> tuple[Whole, Array, Array]:
+        """Brackets between neighbouring samples of different labels, on pieces smooth inside."""
+        inside = [self._found[n] for n in topological(watched.arguments) if n in self._found]
+        edges = np.unique(np.concatenate([[self.t0, self.t1], *inside]))
+        left, right = np.nextafter(edges[:-1], np.inf), np.nextafter(edges[1:], -np.inf)
+        keep = right > left
+        left, right = left[keep], right[keep]
+        left[:1], right[-1:] = self.t0, self.t1
+        random = np.random.default_rng(7)
+        each = max(PER_PIECE, SAMPLES // left.size)
+        before = -1
+        while True:
+            part = (np.arange(each) + random.uniform(0.1, 0.9, (left.size, each))) / each
+            t = np.concatenate(
+                [left[:, None], left[:, None] + (right - left)[:, None] * part, right[:, None]], axis=1
+            )
+            pairs = np.repeat(np.arange(number), t.size), np.tile(t.ravel(), number)
+            value = labels.at(*pairs).reshape(number, *t.shape)
+            k, piece, place = np.nonzero(value[..., 1:] != value[..., :-1])
+            if k.size > 4 * MOST:
+                raise _TooManyError
+            if k.size == before or 2 * each * left.size * number > BUDGET:
+                return k, t[piece, place], t[piece, place + 1]
+            before, each = k.size, 2 * each
+
+
+class _Labels:
+    """The label of one operation at any iteration and time."""
+
+    def __init__(self, watched: Watched, columns: dict[str, Array], lookup: Callable[..., Value]) -> None:
+        self._watched, self._columns, self._lookup = watched, columns, lookup
+
+    def _values(self, index: Whole, t: Array) -> list[Array]:
+        def look(node: Node, args: list[Value]) -> Value:
+            if node.op == "time":
+                return t
+            if node.op == "index" and node.data in self._columns:
+                return self._columns[node.data][index]
+            return self._lookup(node, args)
+
+        found = evaluate(self._watched.arguments, look)
+        return [np.broadcast_to(np.asarray(v, dtype=float), t.shape) for v in found]
+
+    def at(self, index: Whole, t: Array) -> Array:
+        """Labels [k] in iterations index [k] at t [k]."""
+        with np.errstate(all="ignore"):
+            return np.nan_to_num(self._watched.label(self._values(index, t)))
+
+    def measure(self, index: Whole, t: Array, *, quotient: bool) -> Array:
+        """What crosses the levels: the argument, the difference or the quotient of the two."""
+        values = self._values(index, t)
+        with np.errstate(all="ignore"):
+            if len(values) == 1:
+                return values[0].copy()
+            return values[0] / values[1] if quotient else values[0] - values[1]
+
+    def bisect(self, index: Whole, low: Array, high: Array) -> Array:
+        """The first double of the new label in each bracket; where a zero lies between, the last of it too."""
+        start, end = self.at(index, low), self.at(index, high)
+        take = start != end
+        index, low, high, start, end = index[take], low[take], high[take], start[take], end[take]
+        first = self._flip(index, low, high, start)
+        middle = self.at(index, first)
+        again = middle != end
+        last = self._flip(index[again], first[again], high[again], middle[again])
+        # a zero on a single double: the far side begins behind it, which the restart knows
+        last = np.where(np.nextafter(first[again], np.inf) == last, first[again], np.nextafter(last, -np.inf))
+        return np.concatenate([first, last])
+
+    def _flip(self, index: Whole, low: Array, high: Array, start: Array) -> Array:
+        """The first double whose label is not `start` any more."""
+        low, high = low.copy(), high.copy()
+        for _ in range(_HALVINGS):
+            middle = low + 0.5 * (high - low)
+            open_ = np.flatnonzero((middle > low) & (middle < high))
+            if not open_.size:
+                break
+            same = self.at(index[open_], middle[open_]) == start[open_]
+            low[open_[same]] = middle[open_[same]]
+            high[open_[~same]] = middle[open_[~same]]
+        return high

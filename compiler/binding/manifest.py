@@ -1,0 +1,136 @@
+"""The manifest of a compiled model: CONTRACT's keys for one binding, and `structure` for the runtime (model.h).
+
+A scalar has one entry under its name.  A family has one entry for all its elements, named `x[1..1000]`, with its
+`shape` as [[first, last], ...]: the manifest of a chain of 10^5 links is as short as that of ten.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sysdyn.compiler.binding.binding import Binding
+from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.model.integers import Index, Reference
+from sysdyn.compiler.model.parameters import Extents
+from sysdyn.compiler.program.program import Pattern, Program
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Place
+
+
+def structure(form: DescriptorForm, program: Program) -> dict[str, Any]:
+    """What the runtime needs beside the code: families, rows, blocks; no numbers of a binding."""
+    return {
+        "families": [_family(f) for f in form.families],
+        "rows": [_row(r) for r in form.rows],
+        "blocks": {name: {"kernels": [_kernel(k) for k in patterns]} for name, patterns in program.patterns},
+    }
+
+
+def _family(family: Unknowns) -> dict[str, Any]:
+    plain = {"name": family.name, "kind": family.kind, "owner": family.owner, "unit": family.unit}
+    return {**plain, "nominal": None, **_where(family.place)}
+
+
+def _row(row: Equations) -> dict[str, Any]:
+    found = {"block": row.block, "label": row.label, "owner": row.owner, "kind": row.kind, **_where(row.place)}
+    found |= {"unit": row.unit, "rate": row.rate}
+    if row.block == "observe":
+        found |= {"name": row.label, "stored": row.stored}
+    if row.block == "initial":
+        found |= {"fixed": row.fixed, "written": row.written}
+    return found
+
+
+def _where(place: Place | None) -> dict[str, Any]:
+    return {"file": place.file if place else None, "line": place.start[0] if place else None}
+
+
+def _kernel(pattern: Pattern) -> dict[str, Any]:
+    return {
+        "loops": [[_bound(a), _bound(b)] for a, b in pattern.loops],
+        "rows": [_reference(r) for r in pattern.rows],
+        "dy": [[_reference(r), _reference(c)] for r, c in pattern.dy],
+        "dyd": [[_reference(r), _reference(c)] for r, c in pattern.dyd],
+    }
+
+
+def _bound(index: Index) -> int | list[int]:
+    """A slot; [loop, slot, constant] where an inner bound follows an outer loop."""
+    return [index.loop, index.slot, index.constant] if index.loop >= 0 else index.slot
+
+
+def _reference(place: Reference) -> list[Any]:
+    return [place.family, [[i.loop, i.slot, i.constant] for i in place.indices]]
+
+
+def manifest(
+    network: Network, form: DescriptorForm, program: Program, binding: Binding, index: int | None = None
+) -> dict[str, Any]:
+    """The object of manifest.json."""
+    scene = network.scene.name if network.scene is not None else None
+    return {
+        "version": 1,
+        "model": network.model,
+        "scene": scene,
+        "formulation": form.formulation,
+        "index": index,
+        "unknowns": _unknowns(form, program, binding),
+        "rows": _rows(form, binding),
+        "parameters": [
+            {"name": p.name, "unit": p.unit.text, "value": _plain(binding.values[p.name])} for p in network.parameters
+        ],
+        "structure": structure(form, program),
+    }
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, float) else value.tolist()
+
+
+def _named(name: str, box: Extents) -> dict[str, Any]:
+    """name[first..last] with its shape; the name alone for a scalar."""
+    if not box:
+        return {"name": name}
+    inside = ", ".join(f"{first}..{last}" for first, last in box)
+    head, mark, tail = (name, "", "") if name[-1] != "'" and "." not in name else _head(name)
+    return {"name": f"{head}[{inside}]{mark}{tail}", "shape": [list(pair) for pair in box]}
+
+
+def _head(name: str) -> tuple[str, str, str]:
+    """X' and x.p with the index behind x."""
+    if name.endswith("'"):
+        return name[:-1], "'", ""
+    head, _, tail = name.rpartition(".")
+    return head, ".", tail
+
+
+def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[dict[str, Any]]:
+    moving = {
+        column.family
+        for name, patterns in program.patterns
+        for pattern in (patterns if name in ("dynamics", "lambda") else ())
+        for _, column in pattern.dyd
+    }
+    found = []
+    for k, family in enumerate(form.families):
+        if family.kind != "audit":
+            plain = {"kind": family.kind, "unit": family.unit, "differential": family.kind == "q" or k in moving}
+            found.append({**_named(family.name, binding.shapes[k]), **plain})
+    return found
+
+
+def _rows(form: DescriptorForm, binding: Binding) -> list[dict[str, Any]]:
+    """Rows of the form as written: q' = f first, then the equations in their order."""
+    found = []
+    for k, family in enumerate(form.families):
+        if family.kind == "q":
+            found.append({**_label(family.name, binding.shapes[k]), "kind": "kinematic", **_where(family.place)})
+    for k, row in enumerate(form.rows):
+        if row.block in ("dynamics", "momentum", "phi", "psi", "gamma", "lambda"):
+            found.append({**_label(row.label, binding.row_shapes[k]), "kind": row.kind, **_where(row.place)})
+    return found
+
+
+def _label(name: str, box: Extents) -> dict[str, Any]:
+    named = _named(name, box)
+    return {"label": named.pop("name"), **named}

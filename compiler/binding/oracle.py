@@ -1,0 +1,119 @@
+"""Rows and Jacobian entries of a descriptor form, evaluated straight from its nodes: what both emitters must meet.
+
+No slots, no routines, no elimination of common subexpressions: every expression of every kernel is evaluated over the
+iterations of its loops and scattered by the shapes of a binding.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.compiler.binding.binding import Binding
+from sysdyn.compiler.binding.places import starts
+from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
+from sysdyn.compiler.model.interpret import Value, over
+from sysdyn.compiler.model.parameters import Extents, positions
+from sysdyn.dsl.model.expression import Node, derivative, is_const, variables
+
+Array = NDArray[np.float64]
+Point = tuple[float, Array, Array]  # t, y, yd
+
+
+class Oracle:
+    """A descriptor form under a binding."""
+
+    def __init__(self, form: DescriptorForm, binding: Binding) -> None:
+        self.form = form
+        self.binding = binding
+        self.at = starts(binding.shapes)
+        self.to = starts(binding.row_shapes)
+        self._families = {(f.owner, f.kind): k for k, f in enumerate(form.families)}
+        self._constants = {}
+        for (_, first, count), offset in zip(binding.offsets, form.offsets, strict=True):
+            self._constants[offset.name] = (offset.label, binding.p[first : first + count])
+
+    def rows(self, block: str, t: float, y: Array, yd: Array) -> Array:
+        """R of one block, every row family's place included."""
+        r, point = np.zeros(int(self.to[-1])), (t, y, yd)
+        for kernel in self._kernels(block):
+            for summand in kernel.rows:
+                roots = (*summand.at, summand.expression)
+                *at, values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, point))
+                where = self._position(self.binding.row_shapes[summand.row], at)
+                np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), values)
+        return r
+
+    def magnitudes(self, block: str, t: float, y: Array, yd: Array) -> Array:
+        """Sum of the magnitudes of the terms of each row of one block."""
+        r, point = np.zeros(int(self.to[-1])), (t, y, yd)
+        for kernel in self._kernels(block):
+            for summand in kernel.rows:
+                node = summand.expression
+                terms = (node,) if node.op != "sum" else node.args
+                scales = (1.0,) if node.op != "sum" else node.data[1]
+                (*at,) = over(kernel.nest, (*summand.at, *terms), lambda n, a: self._leaf(n, a, point))
+                where = self._position(self.binding.row_shapes[summand.row], at[: len(summand.at)])
+                for c, values in zip(scales, at[len(summand.at) :], strict=True):
+                    np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), np.abs(c * values))
+        return r
+
+    def entries(self, block: str, order: int, t: float, y: Array, yd: Array) -> tuple[Array, Array, Array]:
+        """(v, rows, columns) of dy (order 0) or dyd (order 1) in the order of the contract."""
+        found: list[tuple[Array, Array, Array]] = []
+        for kernel in self._kernels(block):
+            parts = [self._entry(kernel, k, column, (t, y, yd)) for k, column in _columns(kernel, order)]
+            if parts:
+                found.append(tuple(np.stack(p, axis=1).ravel() for p in zip(*parts, strict=True)))  # type: ignore[arg-type]
+        if not found:
+            return np.zeros(0), np.zeros(0), np.zeros(0)
+        v, rows, columns = (np.concatenate(p) for p in zip(*found, strict=True))
+        return v, rows, columns
+
+    def _entry(self, kernel: Kernel, k: int, column: Node, point: Point) -> tuple[Array, Array, Array]:
+        summand = kernel.rows[k]
+        family = self._families[column.data[0], column.data[1]]
+        slope = derivative(summand.expression, column)
+        roots = (*summand.at, *column.args, slope)
+        *at, values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, point))
+        cut = len(summand.at)
+        row = self.to[summand.row] + self._position(self.binding.row_shapes[summand.row], at[:cut])
+        place = self.at[family] + self._position(self.binding.shapes[family], at[cut:])
+        shape = values.shape
+        return values, np.broadcast_to(row, shape).astype(float), np.broadcast_to(place, shape).astype(float)
+
+    def _kernels(self, name: str) -> tuple[Kernel, ...]:
+        block = self.form.block(name)
+        return block.kernels if block is not None else ()
+
+    def _position(self, box: Extents, at: list[Array]) -> NDArray[np.int64]:
+        if not box:
+            return np.zeros(1, dtype=np.int64)
+        return positions(box, [np.rint(a).astype(np.int64) for a in at])
+
+    def _leaf(self, node: Node, args: list[Value], point: Point) -> Value:
+        t, y, yd = point
+        if node.op == "time":
+            return t
+        if node.op == "var":
+            owner, kind, order = node.data
+            family = self._families[owner, kind]
+            box = self.binding.shapes[family]
+            whole = [np.rint(a).astype(np.int64) for a in args]
+            place = self.at[family] + (positions(box, whole) if box else 0)
+            return (yd if order else y)[place]
+        if node.op == "param" and node.data in self._constants:
+            label, values = self._constants[node.data]
+            owners = {r.owner: self.binding.row_shapes[k] for k, r in enumerate(self.form.rows) if r.block == "phi"}
+            whole = [np.rint(a).astype(np.int64) for a in args]
+            return values[positions(owners[label], whole)] if args else values[0]
+        return self.binding.parameters.lookup(node, args)
+
+
+def _columns(kernel: Kernel, order: int) -> list[tuple[int, Node]]:
+    found = []
+    for k, summand in enumerate(kernel.rows):
+        nodes = (n for n in variables(summand.expression) if n.op == "var" and n.data[2] == order)
+        for column in sorted(nodes, key=lambda n: n.number):
+            if column.data[1] != "audit" and not is_const(derivative(summand.expression, column), 0.0):
+                found.append((k, column))
+    return found

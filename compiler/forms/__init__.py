@@ -1,0 +1,1 @@
+"""Energies to the descriptor form of one formulation."""

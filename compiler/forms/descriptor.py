@@ -1,0 +1,169 @@
+"""DescriptorForm: one formulation of a model as blocks of rows over loops, before any program is made of it.
+
+    Lagrange (3.34)          q' = f;  M f' + Phi_q^T kappa + Psi_f^T mu = Upsilon;  0 = Phi;  0 = Psi;  0 = Gamma;
+                             s' = Lambda
+    Hamilton (4.14)-(4.15)   q' = f;  p' + Phi_q^T kappa + Psi_f^T mu = U;  0 = p - dT*/df;  and the rest as above
+
+Families are the unknowns, row families the equations; a kernel is a loop nest with local expressions that are added
+to rows.  Blocks and their meaning: runtime/core/model.h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysdyn.compiler.model.energies import Offset, over
+from sysdyn.compiler.model.terms import Nest
+from sysdyn.dsl.model.expression import Node, topological, variables
+from sysdyn.dsl.model.network import Shape
+from sysdyn.dsl.text.diagnostics import Place
+
+KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
+AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
+BLOCKS = (
+    "dynamics", "dynamics_rate", "phi_reaction", "phi_normal", "psi_reaction", "momentum", "momentum_rate", "phi",
+    "phi_rate", "phi_acceleration", "psi", "psi_rate", "gamma", "gamma_rate", "lambda", "observe", "observe_rate",
+    "observe_scale", "audit", "initial",
+)  # fmt: skip
+# the block whose row families a block shares
+HOME = {
+    "dynamics_rate": "dynamics", "phi_reaction": "dynamics", "psi_reaction": "dynamics",
+    "momentum_rate": "momentum", "phi_rate": "phi",
+    "phi_acceleration": "phi", "psi_rate": "psi", "gamma_rate": "gamma", "observe_rate": "observe",
+    "observe_scale": "observe",
+}  # fmt: skip
+# blocks that Newton never sees: rows without Jacobian entries
+WITHOUT_ENTRIES = frozenset(("observe", "observe_rate", "observe_scale", "audit"))
+
+
+@dataclass(frozen=True, slots=True)
+class Unknowns:
+    """A family of unknowns: kind q f p s e kappa mu audit of its owner; one shape for all kinds of an owner."""
+
+    name: str
+    kind: str
+    owner: str
+    unit: str
+    place: Place | None
+
+
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """A family of rows."""
+
+    block: str
+    label: str
+    owner: str
+    kind: str
+    unit: str
+    place: Place | None
+    rate: bool = True  # whether every row of it has its time derivative as a block
+    stored: bool = False  # a traced quantity (of block observe)
+    fixed: bool = False  # of block initial
+    written: bool = True  # of block initial: whether the text says it
+
+
+@dataclass(frozen=True, slots=True)
+class Summand:
+    """`expression` is added to the row `at` of a row family (by its number)."""
+
+    row: int
+    at: tuple[Node, ...]
+    expression: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Kernel:
+    """Local expressions under one loop nest."""
+
+    nest: Nest
+    rows: tuple[Summand, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A group of rows that the runtime places as a whole."""
+
+    name: str
+    kernels: tuple[Kernel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Pin:
+    """An initial value of an unknown: family (by its number) at indices, for all iterations of the nest."""
+
+    family: int
+    at: tuple[Node, ...]
+    value: Node
+    fixed: bool
+    nest: Nest
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptorForm:
+    """One formulation: unknowns in the order of `at`, rows in the order of `to`."""
+
+    formulation: str
+    families: tuple[Unknowns, ...]
+    rows: tuple[Equations, ...]
+    blocks: tuple[Block, ...]
+    pins: tuple[Pin, ...]
+    offsets: tuple[Offset, ...]
+    shapes: tuple[tuple[str, Shape], ...]  # of coordinates, unknowns, states and `initial` rows, by owner
+    hulls: tuple[tuple[str, tuple[tuple[tuple[Node, ...], Nest, Place], ...]], ...]  # where each label is declared
+    covers: tuple[tuple[str, tuple[tuple[Nest, Node], ...]], ...] = ()  # families that momenta cover in part
+
+    def block(self, name: str) -> Block | None:
+        """The block of that name; None where it has no rows."""
+        return next((b for b in self.blocks if b.name == name), None)
+
+
+def verify_descriptor(form: DescriptorForm) -> None:
+    """AssertionError where a kernel names an unknown, a row or a loop variable that does not exist."""
+    known = {(f.owner, f.kind) for f in form.families}
+    assert len(known) == len(form.families), "two families of one owner and kind"
+    for block in form.blocks:
+        assert block.name in BLOCKS, block.name
+        home = HOME.get(block.name, block.name)
+        for kernel in block.kernels:
+            bound = {f"#{k}" for k in range(len(kernel.nest))}
+            assert [loop.index for loop in kernel.nest] == sorted(bound), kernel.nest
+            for summand in kernel.rows:
+                assert form.rows[summand.row].block == home, (block.name, summand.row)
+                _verify_summand(block.name, summand, bound, known)
+
+
+def _verify_summand(block: str, summand: Summand, bound: set[str], known: set[tuple[str, str]]) -> None:
+    for node in topological((*summand.at, summand.expression)):
+        if node.op == "index":
+            assert node.data in bound or node.data.startswith("#r"), (block, node)
+        if node.op == "var":
+            owner, kind, order = node.data
+            assert (owner, kind) in known, (block, node)
+            assert not (kind == "q" and order), f"{block} reads the derivative of a displacement"
+            rated = ("f", "p", "s", "e", "kappa", "mu") if block == "dynamics_rate" else ("f", "p", "s", "e")
+            assert order == 0 or kind in rated, (block, node)
+    if block in ("phi", "phi_rate", "phi_reaction", "phi_normal", "psi_reaction", "psi", "gamma"):
+        late = [n for n in variables(summand.expression) if n.op == "var" and n.data[2] and n.data[1] != "s"]
+        assert not late, (block, late)
+
+
+def show(form: DescriptorForm) -> str:
+    """The form as text, for --dump descriptor."""
+    lines = [f"formulation {form.formulation}"]
+    lines += [f"unknown {k}: {f.name} ({f.kind}, {f.unit})" for k, f in enumerate(form.families)]
+    for k, r in enumerate(form.rows):
+        line = f" line {r.place.start[0]}" if r.place else ""
+        lines.append(f"row {k}: {r.kind} of {r.label}{line}")
+    for block in form.blocks:
+        lines.append(f"block {block.name}")
+        for kernel in block.kernels:
+            for s in kernel.rows:
+                at = f"[{', '.join(map(repr, s.at))}]" if s.at else ""
+                lines.append(f"  {over(kernel.nest)}{form.rows[s.row].label}{at} += {s.expression!r}")
+    for pin in form.pins:
+        sign = "=" if pin.fixed else "~"
+        at = f"[{', '.join(map(repr, pin.at))}]" if pin.at else ""
+        lines.append(f"init {over(pin.nest)}{form.families[pin.family].name}{at} {sign} {pin.value!r}")
+    return "\n".join(lines) + "\n"

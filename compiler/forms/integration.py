@@ -1,0 +1,128 @@
+"""Integration of psi rows that touch a tangible displacement (language, section 5, I1-I4; book, section 2.4).
+
+A row B f + b = 0 with B and b of parameters alone has the primitive B q + b t.  Where it touches a tangible coordinate
+it is replaced by  phi: B q + b t - c = 0,  c = B q0 + b t0  at the initial displacements, a parameter that the binding
+computes.  The label keeps its name: its multiplier becomes kappa.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sysdyn.compiler.model.energies import EnergyModel, Offset, Row
+from sysdyn.compiler.model.mirror import Mirror
+from sysdyn.compiler.model.terms import Nest, Term, local_variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    const,
+    derivative,
+    mul,
+    neg,
+    param,
+    substitute,
+    time,
+    to_text,
+    var,
+    variables,
+)
+from sysdyn.dsl.text.diagnostics import Diagnostic
+
+
+def integrate(model: EnergyModel) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
+    """The model with integrable psi rows as phi, and a note N501 for each."""
+    tangible = frozenset(c.name for c in model.coordinates if c.tangible)
+    labels: dict[str, list[Row]] = {}
+    for row in model.of_kind("psi"):
+        labels.setdefault(row.name, []).append(row)
+    chosen = {n for n, rows in labels.items() if _touches(rows, tangible, model.mirror) and _all_exact(rows, model)}
+    if not chosen:
+        return model, ()
+    offsets: list[Offset] = []
+    notes: list[Diagnostic] = []
+    rows: list[Row] = []
+    for row in model.rows:
+        if row.kind == "psi" and row.name in chosen:
+            integrated, offset = _integrated(row, model.mirror)
+            rows.append(integrated)
+            offsets.append(offset)
+            notes.append(_note(row, offset, tangible, model.mirror))
+        else:
+            rows.append(row)
+    return _renamed(replace(model, rows=tuple(rows), offsets=tuple(offsets)), chosen), tuple(notes)
+
+
+def _touches(rows: list[Row], tangible: frozenset[str], mirror: Mirror) -> bool:
+    found = (n for row in rows for term in row.terms for n in local_variables(term.expression, mirror.rate))
+    return any(n.data[0] in tangible for n in found)
+
+
+def _all_exact(rows: list[Row], model: EnergyModel) -> bool:
+    """I1: coefficients and the free part of parameters alone."""
+    return all(_exact(term, model.mirror) for row in rows for term in row.terms)
+
+
+def _exact(term: Term, mirror: Mirror) -> bool:
+    flows = local_variables(term.expression, mirror.rate)
+    if any(variables(derivative(term.expression, f)) for f in flows):
+        return False
+    return not variables(substitute(term.expression, dict.fromkeys(flows, const(0.0))))
+
+
+def _primitive(expression: Node, mirror: Mirror) -> Node:
+    """B q + b t."""
+    flows = local_variables(expression, mirror.rate)
+    free = substitute(expression, dict.fromkeys(flows, const(0.0)))
+    parts = [mul(derivative(expression, f), var(f.data[0], mirror.coordinate, *f.args)) for f in flows]
+    return add(*parts, mul(free, time()))
+
+
+def _integrated(row: Row, mirror: Mirror) -> tuple[Row, Offset]:
+    name = f"#offset {row.name}"
+    terms = tuple(Term(_primitive(t.expression, mirror), t.loops, t.place) for t in row.terms)
+    constant = Term(neg(param(name, *row.at)), row.nest, row.place)
+    return replace(row, kind="phi", terms=(*terms, constant)), Offset(name, row.name, row.at, terms, row.nest)
+
+
+def _note(row: Row, offset: Offset, tangible: frozenset[str], mirror: Mirror) -> Diagnostic:
+    flows = [n for t in row.terms for n in local_variables(t.expression, mirror.rate)]
+    touched = next((n.data[0] for n in flows if n.data[0] in tangible), flows[0].data[0])
+    text = to_text(add(*(t.expression for t in offset.terms)))
+    start = _at_start(add(*(t.expression for t in offset.terms)), mirror)
+    message = f"psi {row.name} was integrated because {touched} is tangible: phi: {text} - ({start}) = 0"
+    return Diagnostic("N501", _loops_named(message, row.nest), row.place)
+
+
+def _loops_named(text: str, nest: Nest) -> str:
+    """Canonical loop variables as i, j, k, with their ranges."""
+    ranges = []
+    for k, loop in enumerate(nest):
+        text = text.replace(loop.index, "ijklmn"[k])
+        ranges.append(f"{'ijklmn'[k]} in {to_text(loop.first)}..{to_text(loop.last)}")
+    return f"{text} for {', '.join(ranges)}" if ranges else text
+
+
+def _at_start(expression: Node, mirror: Mirror) -> str:
+    marks = {
+        n: var(f"{n.data[0]}(0)", mirror.coordinate, *n.args) for n in local_variables(expression, mirror.coordinate)
+    }
+    return to_text(substitute(expression, {**marks, time(): const(0.0)}))
+
+
+def _renamed(model: EnergyModel, labels: set[str]) -> EnergyModel:
+    """Multipliers mu of the labels written as kappa everywhere."""
+
+    def new(root: Node) -> Node:
+        found = [n for n in local_variables(root, "mu", None) if n.data[0] in labels]
+        return substitute(root, {n: var(n.data[0], "kappa", *n.args) for n in found}) if found else root
+
+    def terms(pieces: tuple[Term, ...]) -> tuple[Term, ...]:
+        return tuple(replace(t, expression=new(t.expression)) for t in pieces)
+
+    return replace(
+        model,
+        works=tuple(replace(w, effort=new(w.effort)) for w in model.works),
+        rows=tuple(replace(row, terms=terms(row.terms)) for row in model.rows),
+        initials=tuple(replace(i, target=new(i.target), value=new(i.value)) for i in model.initials),
+        quantities=tuple(replace(q, expression=new(q.expression)) for q in model.quantities),
+    )

@@ -1,0 +1,254 @@
+"""EnergyModel -> DescriptorForm of Kane: Lagrange's balances projected on the motions that Psi leaves free.
+
+    q' = f;   B^T (M f' + Phi_q^T kappa - Upsilon) = 0;   0 = Phi;   0 = Psi        where Psi_f B = 0
+
+(book, afterword; Kane, Levinson: Dynamics, 1985, 4.6).  Psi needs no multipliers: its reactions do no work along the
+columns of B.  B is found by elimination without division, so that it is regular wherever a pivot is; one that is a
+number comes first.  A reaction that something reads is kept with Psi_f Psi_f^T mu = Psi_f (Upsilon - ...) as its row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from sysdyn.compiler.forms.assembly import Assembly
+from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Equations
+from sysdyn.compiler.forms.lagrangian import lagrangian
+from sysdyn.compiler.forms.lowering import total_rate
+from sysdyn.compiler.model.energies import EnergyModel, Family, Row
+from sysdyn.compiler.model.terms import Nest, counter, local_variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    const,
+    derivative,
+    is_const,
+    mul,
+    neg,
+    signals_held,
+    substitute,
+    topological,
+    var,
+    variables,
+)
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+
+Entries = dict[str, Node]
+"""Coefficients of flows by coordinate, in the counters of the row."""
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """free: B by coordinate that keeps its balance, column by column; bound: coordinates that lose it; rows: Psi_f by
+    label.
+    """
+
+    free: Mapping[str, Entries]
+    bound: frozenset[str]
+    rows: Mapping[str, Entries]
+
+
+def kane(model: EnergyModel) -> DescriptorForm:
+    """Unknowns q f kappa e s, and mu where a reaction is read.  ModelError E607 where Psi cannot be eliminated."""
+    found = projection(model)
+    form = lagrangian(model)
+    read = _joined(found, _reactions_read(form))
+    return _Projected(form, found, read).form()
+
+
+def projection(model: EnergyModel) -> Projection:
+    """B of all flow constraints."""
+    rows: dict[str, Entries] = {}
+    families = {c.name: c for c in model.coordinates}
+    for row in model.of_kind("psi"):
+        if row.name in rows:
+            raise _impossible(row, f"psi {row.name} is declared in several pieces")
+        rows[row.name] = _entries(row, families)
+    if not rows and not model.quasis:
+        message = "formulation kane: the model has no flow constraint that it could leave out, and no quasi-velocity"
+        where = next((f.place for f in (*model.coordinates, *model.states, *model.unknowns)), None)
+        raise ModelError((Diagnostic("E607", message, where, "formulation lagrangian"),))
+    reduced = {name: dict(entries) for name, entries in rows.items()}
+    pivots: dict[str, str] = {}
+    for _ in rows:
+        name, column = _pivot(reduced, pivots, model)
+        pivots[name] = column
+        _eliminate(reduced, name, column)
+    bound = frozenset(pivots.values())
+    free = {c.name: _column(c.name, reduced, pivots) for c in model.coordinates if c.name not in bound}
+    return Projection(free, bound, rows)
+
+
+def _impossible(row: Row, why: str) -> ModelError:
+    help_ = "formulation lagrangian, hamiltonian"
+    return ModelError((Diagnostic("E607", f"formulation kane: {why}", row.place, help_),))
+
+
+def _entries(row: Row, families: Mapping[str, Family]) -> Entries:
+    """Coefficients of the flows of a row, all of the row's own element."""
+    found: Entries = {}
+    for term in row.terms:
+        held, signals = signals_held(term.expression)
+        for flow in local_variables(held, "f"):
+            name = flow.data[0]
+            whole = tuple((loop.first, loop.last) for loop in row.nest) == families[name].shape
+            if flow.args != row.at or term.loops != row.nest or not whole:
+                raise _impossible(row, f"psi {row.name} joins flows of several elements ('{flow!r}')")
+            slope = substitute(derivative(held, flow), signals)
+            found[name] = add(found[name], slope) if name in found else slope
+    return {name: value for name, value in found.items() if not is_const(value, 0.0)}
+
+
+def _pivot(reduced: Mapping[str, Entries], pivots: Mapping[str, str], model: EnergyModel) -> tuple[str, str]:
+    """The next row and column: a number rather than a function, of a column in few rows, the shorter expression."""
+    uses: dict[str, int] = {}
+    for entries in reduced.values():
+        for column in entries:
+            uses[column] = uses.get(column, 0) + 1
+    choices = [
+        (not is_const(value), len(entries) > 2, uses[column], len(topological([value])), name, column)
+        for name, entries in reduced.items()
+        if name not in pivots
+        for column, value in entries.items()
+    ]
+    if not choices:
+        row = next(r for r in model.of_kind("psi") if r.name not in pivots)
+        raise _impossible(row, f"psi {row.name} follows from the others")
+    return min(choices)[-2:]
+
+
+def _eliminate(reduced: dict[str, Entries], pivot_row: str, column: str) -> None:
+    """Rows without the column: p * row - a * pivot row; by division where p is a number."""
+    entries = reduced[pivot_row]
+    pivot = entries[column]
+    for name, other in reduced.items():
+        if name == pivot_row or column not in other:
+            continue
+        factor = other[column]
+        keep, take = (const(1.0), mul(factor, const(1.0 / pivot.data))) if is_const(pivot) else (pivot, factor)
+        mixed = {
+            c: add(mul(keep, other.get(c, const(0.0))), neg(mul(take, entries.get(c, const(0.0)))))
+            for c in dict.fromkeys((*other, *entries))
+            if c != column
+        }
+        reduced[name] = {c: value for c, value in mixed.items() if not is_const(value, 0.0)}
+
+
+def _column(name: str, reduced: Mapping[str, Entries], pivots: Mapping[str, str]) -> Entries:
+    """The motion with this flow: Prod p on it, - c Prod' p on each bound flow that follows."""
+    touched = [row for row, entries in reduced.items() if name in entries]
+    column = {name: mul(*(reduced[row][pivots[row]] for row in touched))} if touched else {name: const(1.0)}
+    for row in touched:
+        others = [reduced[r][pivots[r]] for r in touched if r != row]
+        column[pivots[row]] = neg(mul(reduced[row][name], *others))
+    return column
+
+
+def _reactions_read(form: DescriptorForm) -> frozenset[str]:
+    """Labels whose mu stands elsewhere than in the balances."""
+    nodes = (
+        node
+        for block in form.blocks
+        if block.name not in ("psi_reaction", "dynamics_rate")
+        for kernel in block.kernels
+        for summand in kernel.rows
+        for node in variables(summand.expression)
+    )
+    read = {node.data[0] for node in nodes if node.op == "var" and node.data[1] == "mu"}
+    pinned = {form.families[pin.family] for pin in form.pins}
+    return frozenset(read | {f.owner for f in pinned if f.kind == "mu"})
+
+
+def _joined(found: Projection, read: frozenset[str]) -> frozenset[str]:
+    """These labels, and all whose rows share flows with them."""
+    columns = {c for label in read for c in found.rows[label]}
+    more = frozenset(label for label, entries in found.rows.items() if columns & set(entries))
+    return read if more <= read else _joined(found, read | more)
+
+
+class _Projected:
+    """The Lagrangian form with its balances mixed."""
+
+    def __init__(self, lagrange: DescriptorForm, found: Projection, read: frozenset[str]) -> None:
+        self.lagrange, self.found, self.read = lagrange, found, read
+        self.assembly = Assembly()
+        self.rated = self._rated()
+
+    def _rated(self) -> frozenset[str]:
+        """Coordinates whose mixed balances are algebraic (see `lowering`), with their rates."""
+        block = self.lagrange.block("dynamics_rate")
+        rows = {s.row for kernel in block.kernels for s in kernel.rows} if block else set()
+        massless = {self.lagrange.rows[k].owner for k in rows}
+        return frozenset(name for name, column in self.found.free.items() if set(column) <= massless)
+
+    def form(self) -> DescriptorForm:
+        """The projected form."""
+        for row in self.lagrange.rows:
+            if row.block != "dynamics" or row.owner not in self.found.bound:
+                self.assembly.family(row)
+        if self.lagrange.block("phi_reaction") is not None:
+            for row in self.lagrange.rows:
+                if row.block == "dynamics":
+                    self.assembly.family(replace(row, block="phi_normal", kind="phi_normal"))
+        multipliers = {f.owner: f for f in self.lagrange.families if f.kind == "mu"}
+        for label in sorted(self.read):
+            family = multipliers[label]
+            self.assembly.family(Equations("dynamics", family.name, label, "dynamics", family.unit, family.place))
+        self._copy()
+        for label in sorted(self.read):
+            self._reaction(label)
+        kept = [k for k, f in enumerate(self.lagrange.families) if f.kind != "mu" or f.owner in self.read]
+        number = {old: new for new, old in enumerate(kept)}
+        return replace(
+            self.lagrange,
+            formulation="kane",
+            families=tuple(self.lagrange.families[k] for k in kept),
+            rows=tuple(self.assembly.rows),
+            blocks=self.assembly.blocks(),
+            pins=tuple(replace(p, family=number[p.family]) for p in self.lagrange.pins if p.family in number),
+        )
+
+    def _copy(self) -> None:
+        for block in self.lagrange.blocks:
+            if block.name in ("psi_reaction", "dynamics_rate"):
+                continue
+            for kernel in block.kernels:
+                for summand in kernel.rows:
+                    row = self.lagrange.rows[summand.row]
+                    if HOME.get(block.name, block.name) != "dynamics":
+                        self.assembly.add(block.name, row.owner, summand.at, kernel.nest, summand.expression)
+                        continue
+                    if block.name == "phi_reaction":
+                        self.assembly.add("phi_normal", row.owner, summand.at, kernel.nest, summand.expression)
+                    self._balance(block.name, row.owner, summand.at, kernel.nest, summand.expression)
+
+    def _balance(self, block: str, owner: str, at: tuple[Node, ...], nest: Nest, value: Node) -> None:
+        """A summand of the balance of one coordinate, in the mixed balances and the rows of reactions."""
+        for name, column in self.found.free.items():
+            if owner in column:
+                mixed = mul(_here(column[owner], at), value)
+                self.assembly.add(block, name, at, nest, mixed)
+                if name in self.rated and not any(n.op == "var" and n.data[2] for n in variables(mixed)):
+                    self.assembly.add("dynamics_rate", name, at, nest, total_rate(mixed))
+        for label in self.read:
+            if owner in self.found.rows[label]:
+                self.assembly.add(block, label, at, nest, mul(_here(self.found.rows[label][owner], at), value))
+
+    def _reaction(self, label: str) -> None:
+        """Psi_f Psi_f^T mu, in the row of the label."""
+        own = self.found.rows[label]
+        for other, entries in self.found.rows.items():
+            common = [mul(own[c], entries[c]) for c in own if c in entries]
+            if not common:
+                continue
+            _, nests = next(item for item in self.lagrange.hulls if item[0] == label)
+            at, nest, _ = nests[0]
+            value = mul(add(*common), var(other, "mu", *at))
+            self.assembly.add("dynamics", label, at, nest, value)
+
+
+def _here(value: Node, at: tuple[Node, ...]) -> Node:
+    """A coefficient at an element."""
+    change = {counter(k): node for k, node in enumerate(at)}
+    return substitute(value, {old: new for old, new in change.items() if old is not new})

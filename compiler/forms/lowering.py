@@ -1,0 +1,291 @@
+"""EnergyModel -> DescriptorForm: what both primal formulations (and their mirrors) share.
+
+With u the loop-local unknowns of a term, every gradient is taken once per term and scattered:
+
+    carrier of a momentum      p' - dT*/dq + dT/dq + dV/dq + dD/df - Q          (4.14)
+    any other coordinate       d/dt(dT*/df) - dT*/dq + dV/dq + dD/df - Q        (3.34); d/dt brings M f' in
+    momentum                   p - dT*/df,  or dT/dp - f where T is given
+    reactions                  Phi_q^T kappa, Psi_f^T mu                         the multiplier rule
+    phi rate, acceleration     Phi_q f + Phi_t;  Phi_q f' + Z1                   total derivatives (6.32)
+"""
+
+from __future__ import annotations
+
+from sysdyn.compiler.forms.assembly import Assembly
+from sysdyn.compiler.forms.audit import add_audit
+from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
+from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.forms.momenta import given, inertial, resolved
+from sysdyn.compiler.forms.observing import add_initials, add_observations, observed, pins_and_equations
+from sysdyn.compiler.model.energies import EnergyModel, Family, Row
+from sysdyn.compiler.model.terms import Nest, counter, local_variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    derivative,
+    differential,
+    mul,
+    neg,
+    signals_held,
+    substitute,
+    time_derivative,
+    to_text,
+    var,
+    variables,
+)
+from sysdyn.dsl.model.expression import rate as rate_of
+from sysdyn.dsl.model.network import Loop
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+
+
+def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> DescriptorForm:
+    """The descriptor form; `legendre`: every inertial coordinate carries its momentum as an unknown."""
+    stores = given(model)
+    carriers = stores | inertial(model) if legendre else stores
+    model = resolved(model, frozenset(carriers))
+    form = _Lowering(model, stores, frozenset(carriers))
+    form.declare()
+    form.kinetic()
+    form.gradients()
+    form.works()
+    form.constraints()
+    add_observations(form.assembly, model, form.carriers)
+    add_audit(form.assembly, model)
+    pins, equations = pins_and_equations(model, form.carriers, form.families)
+    add_initials(form.assembly, model, form.carriers, equations)
+    owners = (*model.coordinates, *model.unknowns, *model.states)
+    shapes = [(f.name, f.shape) for f in owners]
+    shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
+    hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
+    for row in model.rows:
+        if row.kind != "lambda":
+            hulls.setdefault(row.name, []).append((row.at, row.nest, row.place))
+    return DescriptorForm(
+        formulation,
+        tuple(form.families),
+        tuple(form.assembly.rows),
+        form.assembly.blocks(),
+        pins,
+        model.offsets,
+        tuple(shapes),
+        tuple((name, tuple(places)) for name, places in hulls.items()),
+        tuple(form.covers),
+    )
+
+
+def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
+    """The loop nest over all elements of a family, and the indices of its element there."""
+    nest = tuple(Loop(f"#{k}", first, last) for k, (first, last) in enumerate(family.shape))
+    return nest, tuple(counter(k) for k in range(len(nest)))
+
+
+def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
+    """Coordinates whose balances of efforts are algebraic and have a rate, but for elements that a store moves with.
+
+    Of a family only part of which a store moves with, the start leaves the rows with inertia out.
+    """
+    m = model.mirror
+    shapes = {c.name: c.shape for c in model.coordinates}
+    moved = {name for name in carriers if not shapes[name]}
+    for function, kind in ((m.coenergy, m.rate), (m.energy, m.conjugate)):
+        for term in model.function(function):
+            bounds = tuple((loop.first, loop.last) for loop in term.loops)
+            at = tuple(counter(k) for k in range(len(bounds)))
+            for n in local_variables(term.expression, kind):
+                if not n.args or (n.args == at and bounds == shapes[n.data[0]]):
+                    moved.add(n.data[0])
+    return frozenset(shapes) - moved
+
+
+def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:
+    """Indices and rate of each dynamic variable whose dynamic is one expression over its whole range."""
+    rows: dict[str, list[Row]] = {}
+    for row in model.of_kind("lambda"):
+        rows.setdefault(row.name, []).append(row)
+    single = {name: found[0] for name, found in rows.items() if len(found) == 1}
+    return {
+        name: (row.at, add(*(t.expression for t in row.terms)))
+        for name, row in single.items()
+        if all(t.loops == row.nest for t in row.terms) and all(a.op == "index" for a in row.at)
+    }
+
+
+def total_rate(root: Node) -> Node:
+    """Total derivative by t, the derivatives of multipliers among its variables."""
+    seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in variables(root)}
+    return differential(root, seeds)
+
+
+class _Lowering:
+    """One lowering under way: the families decided, rows collected in `assembly`."""
+
+    def __init__(self, model: EnergyModel, stores: frozenset[str], carriers: frozenset[str]) -> None:
+        self.model = model
+        self.stores = stores
+        self.carriers = carriers
+        self.massless = _massless(model, carriers)
+        self.speeds = _speeds(model)
+        self.assembly = Assembly()
+        self.covers: list[Cover] = []
+        self.families = self._families()
+
+    def _families(self) -> list[Unknowns]:
+        m = self.model
+        # an integrated psi makes nothing tangible, but its displacements are variables
+        pieces = [t.expression for row in m.of_kind("phi") for t in row.terms]
+        held = {n.data[0] for piece in pieces for n in local_variables(piece, m.mirror.coordinate)}
+        seen = observed(m, self.carriers) | held
+        found = [
+            Unknowns(c.name, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.tangible or c.name in seen
+        ]
+        found += [Unknowns(f"{c.name}'", "f", c.name, c.units["f"], c.place) for c in m.coordinates]
+        found += [
+            Unknowns(f"{c.name}.p", "p", c.name, c.units["p"], c.place)
+            for c in m.coordinates
+            if c.name in self.carriers
+        ]
+        found += [Unknowns(s.name, "s", s.name, s.units["s"], s.place) for s in m.states]
+        found += [Unknowns(u.name, "e", u.name, u.units["e"], u.place) for u in m.unknowns]
+        for kind, row_kind in (("kappa", "phi"), ("mu", "psi")):
+            names = dict.fromkeys(row.name for row in m.of_kind(row_kind))
+            places = {row.name: row.place for row in reversed(m.rows)}
+            found += [Unknowns(f"{n}.multiplier", kind, n, f"J/({m.labels[n]})", places[n]) for n in names]
+        found += [Unknowns(f"audit.{n}", "audit", n, "J", None) for n in AUDIT]
+        return found
+
+    def declare(self) -> None:
+        """All row families, in the order of the contract."""
+        declare = self.assembly.family
+        for c in self.model.coordinates:
+            declare(Equations("dynamics", c.name, c.name, "dynamics", c.units["e"], c.place))
+        for c in self.model.coordinates:
+            if c.name in self.carriers:
+                declare(Equations("momentum", c.name, c.name, "momentum", c.units["p"], c.place))
+        for kind in ("phi", "psi", "gamma"):
+            names = dict.fromkeys(row.name for row in self.model.of_kind(kind))
+            for name in names:
+                rows = [row for row in self.model.of_kind(kind) if row.name == name]
+                rate = all(self._has_rate(row) for row in rows)
+                unit = self.model.labels[name]
+                declare(Equations(kind, name, name, kind, unit, rows[0].place, rate))
+        for s in self.model.states:
+            rows = [row for row in self.model.of_kind("lambda") if row.name == s.name]
+            place = rows[0].place if rows else s.place
+            declare(Equations("lambda", s.name, s.name, "lambda", f"{s.units['s']}/s", place))
+
+    def _has_rate(self, row: Row) -> bool:
+        """Whether the total time derivative of every row is known: multipliers have none."""
+        return not any(local_variables(t.expression, ("kappa", "mu"), None) for t in row.terms)
+
+    def kinetic(self) -> None:
+        """Momenta: M f' + ... of coordinates without, p' and the momentum row of those with one."""
+        add, mirror = self.assembly.add, self.model.mirror
+        for family in self.model.coordinates:
+            if family.name in self.carriers:
+                self._carrier(family)
+        for term in self.model.function(mirror.coenergy):
+            for rate in local_variables(term.expression, mirror.rate):
+                slope = derivative(term.expression, rate)
+                if rate.data[0] in self.carriers - self.stores:
+                    self._momentum(rate.data[0], rate.args, term.loops, neg(slope))
+                else:
+                    add("dynamics", rate.data[0], rate.args, term.loops, time_derivative(slope))
+        for term in self.model.function(mirror.energy):
+            for p in local_variables(term.expression, mirror.conjugate):
+                self._momentum(p.data[0], p.args, term.loops, derivative(term.expression, p))
+
+    def _carrier(self, family: Family) -> None:
+        """P' of the elements that a store moves with, and the momentum row of all: p, or -f where T is given."""
+        m, name = self.model.mirror, family.name
+        given = name in self.stores
+        nest, at = whole(family)
+        moved, partly = nest, cover(self.model, family, given=given)
+        if partly is not None:
+            self.covers.append(partly)
+            moved = inside(name)
+        self.assembly.add("dynamics", name, at, moved, var(name, m.conjugate, *at, order=1))
+        held = var(name, m.conjugate, *at)
+        if not given:
+            self._momentum(name, at, nest, held)
+            return
+        self._momentum(name, at, moved, neg(var(name, m.rate, *at)))
+        for rest in outside(family) if partly is not None else ():
+            self._momentum(name, at, rest, held)
+
+    def _momentum(self, owner: str, at: tuple[Node, ...], nest: Nest, expression: Node) -> None:
+        self.assembly.add("momentum", owner, at, nest, expression)
+        self.assembly.add("momentum_rate", owner, at, nest, time_derivative(expression))
+
+    def gradients(self) -> None:
+        """-dT*/dq + dT/dq + dV/dq + dD/df."""
+        m = self.model.mirror
+        functions = ((m.coenergy, -1.0, m.coordinate), (m.energy, 1.0, m.coordinate), (m.potential, 1.0, m.coordinate))
+        for name, sign, kind in (*functions, (m.content, 1.0, m.rate)):
+            for term in self.model.function(name):
+                for node in local_variables(term.expression, kind):
+                    slope = derivative(term.expression, node)
+                    self._effort("dynamics", node, term.loops, slope if sign > 0 else neg(slope))
+
+    def works(self) -> None:
+        """-Q_j = -E du/dq_j."""
+        for work in self.model.works:
+            for node in local_variables(work.on, self.model.mirror.coordinate):
+                force = mul(work.effort, derivative(work.on, node))
+                self._effort("dynamics", node, work.loops, neg(force))
+
+    def constraints(self) -> None:
+        """Phi, Psi with their reactions, Gamma, Lambda, and the total time derivatives of all."""
+        for row in self.model.rows:
+            for term in row.terms:
+                expression = term.expression
+                if row.kind == "lambda":
+                    self.assembly.add("lambda", row.name, row.at, term.loops, neg(expression))
+                    continue
+                self.assembly.add(row.kind, row.name, row.at, term.loops, expression)
+                self._rates(row, term.loops, expression)
+                if row.kind in ("phi", "psi"):
+                    self._reaction(row, term.loops, expression)
+            if row.kind == "lambda":
+                own = var(row.name, "s", *row.at, order=1)
+                self.assembly.add("lambda", row.name, row.at, row.nest, own)
+
+    def _in_states(self, root: Node, what: str, place: Place | None) -> Node:
+        """The expression with the rates of dynamic variables replaced by what they are: it has a rate of its own."""
+        for _ in range(1 + len(self.speeds)):
+            rates = [n for n in variables(root) if n.op == "var" and n.data[1:] == ("s", 1)]
+            if not rates:
+                return root
+            if any(n.data[0] not in self.speeds for n in rates):
+                break
+            root = substitute(root, {n: self._speed(n) for n in rates})
+        names = ", ".join(sorted(to_text(n) for n in rates))
+        text = f"the rate of {what} is needed, and with it that of {names}, whose dynamic is said in parts"
+        raise ModelError([Diagnostic("E518", text, place, "one dynamic over the whole range")])
+
+    def _speed(self, rate: Node) -> Node:
+        at, speed = self.speeds[rate.data[0]]
+        return substitute(speed, dict(zip(at, rate.args, strict=True)))
+
+    def _reaction(self, row: Row, nest: Nest, expression: Node) -> None:
+        m = self.model.mirror
+        kind, name = (m.coordinate, "kappa") if row.kind == "phi" else (m.rate, "mu")
+        multiplier = var(row.name, name, *row.at)
+        held, signals = signals_held(expression)
+        for node in local_variables(held, kind):
+            value = mul(substitute(derivative(held, node), signals), multiplier)
+            self._effort(f"{row.kind}_reaction", node, nest, value)
+
+    def _effort(self, block: str, on: Node, nest: Nest, value: Node) -> None:
+        """A summand of the balance of a coordinate; where that is algebraic, its rate holds too."""
+        self.assembly.add(block, on.data[0], on.args, nest, value)
+        if on.data[0] in self.massless:
+            rate = total_rate(self._in_states(value, f"the balance of {on.data[0]}", None))
+            self.assembly.add("dynamics_rate", on.data[0], on.args, nest, rate)
+
+    def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
+        if not self._has_rate(row):
+            return
+        rate = time_derivative(self._in_states(expression, f"{row.kind} {row.name}", row.place))
+        self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
+        if row.kind == "phi":
+            self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))

@@ -1,0 +1,105 @@
+"""Momenta and kinetic stores: which coordinates carry a momentum, and what `x.p` means where it is no unknown.
+
+A coordinate carries a momentum as unknown where the author gave T(p) for it, and in the Hamiltonian form where T* has a
+structurally nonzero second derivative by its flow.  Elsewhere its momentum is the expression dT*/df.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from sysdyn.compiler.model.energies import EnergyModel, Virtual
+from sysdyn.compiler.model.terms import Term, local_variables, split, without_nested
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    both,
+    compare,
+    conditional,
+    const,
+    derivative,
+    index,
+    is_const,
+    reduction,
+    substitute,
+    time_derivative,
+)
+
+
+def given(model: EnergyModel) -> frozenset[str]:
+    """Coordinates whose store the author gave by its energy T(p)."""
+    kind = model.mirror.conjugate
+    pieces = model.function(model.mirror.energy)
+    return frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, kind))
+
+
+def inertial(model: EnergyModel) -> frozenset[str]:
+    """Coordinates by whose flow T* has a second derivative that is not zero by its structure."""
+    found = set()
+    for term in model.function(model.mirror.coenergy):
+        rates = local_variables(term.expression, model.mirror.rate)
+        for a in rates:
+            slope = derivative(term.expression, a)
+            if any(not is_const(derivative(slope, b), 0.0) for b in rates):
+                found.add(a.data[0])
+    return frozenset(found)
+
+
+def momentum(model: EnergyModel, node: Node) -> Node:
+    """dT*/df of the coordinate of a momentum node, at that node's indices; 0 where no kinetic store moves with it."""
+    pieces = []
+    for term in model.function(model.mirror.coenergy):
+        for rate in local_variables(term.expression, model.mirror.rate):
+            if rate.data[0] == node.data[0]:
+                pieces.append(_at(term, rate, node.args))
+    return add(*pieces)
+
+
+def _at(term: Term, rate: Node, at: tuple[Node, ...]) -> Node:
+    """The slope of a term by `rate`, summed over the iterations in which `rate` stands at the indices `at`."""
+    change = {index(loop.index): index(f"#rm{loop.index}") for loop in term.loops}
+    slope = substitute(derivative(term.expression, rate), change)
+    pairs = [(substitute(own, change), wanted) for own, wanted in zip(rate.args, at, strict=True)]
+    tests = [compare("==", own, wanted) for own, wanted in pairs if own is not wanted]
+    result = conditional(both(*tests), slope, const(0.0)) if tests else slope
+    for loop in reversed(term.loops):
+        first, last = (substitute(bound, change) for bound in (loop.first, loop.last))
+        result = reduction("sum", f"#rm{loop.index}", first, last, result)
+    return result
+
+
+def resolve(model: EnergyModel, carriers: frozenset[str], root: Node) -> Node:
+    """The expression with every momentum that is no unknown replaced; its derivative as far as it exists."""
+    change: dict[Node, Node] = {}
+    for node in local_variables(root, model.mirror.conjugate, None):
+        if node.data[0] not in carriers:
+            value = momentum(model, node)
+            change[node] = time_derivative(value) if node.data[2] else value
+    return substitute(root, change) if change else root
+
+
+def resolved(model: EnergyModel, carriers: frozenset[str]) -> EnergyModel:
+    """The model with momenta that are no unknowns replaced in works and rows, whose terms are split again."""
+
+    def terms(found: tuple[Term, ...], what: str) -> tuple[Term, ...]:
+        result: list[Term] = []
+        for term in found:
+            expression = resolve(model, carriers, term.expression)
+            same = expression is term.expression
+            result += (term,) if same else without_nested(split(expression, term.loops, term.place), what)
+        return tuple(result)
+
+    works: list[Virtual] = []
+    for work in model.works:
+        for term in terms((Term(work.effort, work.loops, work.place),), "an effort"):
+            works.append(replace(work, effort=term.expression, loops=term.loops))
+    rows = tuple(replace(row, terms=terms(row.terms, f"{row.kind} '{row.name}'")) for row in model.rows)
+    return replace(model, works=tuple(works), rows=rows)
+
+
+def undefined(model: EnergyModel, carriers: frozenset[str], root: Node) -> Iterator[str]:
+    """Coordinates whose momentum is asked for although no kinetic store moves with them (E606)."""
+    for node in local_variables(root, model.mirror.conjugate, None):
+        if node.data[0] not in carriers and is_const(momentum(model, node), 0.0):
+            yield node.data[0]

@@ -1,0 +1,86 @@
+"""What is asked of a solution: traced quantities, sides of expectations, and initial conditions.
+
+An `init` of an unknown pins it; of an unknown that this formulation does not have (an intangible displacement) it is
+dropped; anything else is an equation on the initial state, a row of block `initial`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from sysdyn.compiler.forms.assembly import Assembly
+from sysdyn.compiler.forms.descriptor import Equations, Pin, Unknowns
+from sysdyn.compiler.forms.momenta import resolve
+from sysdyn.compiler.model.energies import EnergyModel, Target
+from sysdyn.compiler.model.terms import counter, local_variables, split, without_nested
+from sysdyn.dsl.model.expression import Node, call, sub, time_derivative, variables
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """An `init` that pins no unknown: the owner of its row family, target - value = 0."""
+
+    owner: str
+    target: Target
+
+
+def observed(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
+    """Coordinates whose displacement a trace or an expect reads."""
+    found = set()
+    for quantity in model.quantities:
+        expression = resolve(model, carriers, quantity.expression)
+        found |= {n.data[0] for n in local_variables(expression, model.mirror.coordinate)}
+    return frozenset(found)
+
+
+def add_observations(assembly: Assembly, model: EnergyModel, carriers: frozenset[str]) -> None:
+    """observe, observe_rate where the derivative exists, observe_scale: the sum of the terms' magnitudes."""
+    for quantity in model.quantities:
+        expression = resolve(model, carriers, quantity.expression)
+        try:
+            slope: Node | None = time_derivative(expression)
+        except ValueError:
+            slope = None
+        name, known = quantity.name, slope is not None
+        unit, place = quantity.unit, quantity.place
+        assembly.family(Equations("observe", name, name, "observe", unit, place, known, quantity.stored))
+        for term in split(expression, (), place, read=True):
+            assembly.add("observe", name, (), term.loops, term.expression)
+            assembly.add("observe_scale", name, (), term.loops, call("abs", term.expression))
+        for term in split(slope, (), place, read=True) if slope is not None else ():
+            assembly.add("observe_rate", name, (), term.loops, term.expression)
+
+
+def pins_and_equations(
+    model: EnergyModel, carriers: frozenset[str], families: Sequence[Unknowns]
+) -> tuple[tuple[Pin, ...], tuple[Equation, ...]]:
+    """Initial values of unknowns, and the initial conditions that are equations."""
+    numbers = {(f.owner, f.kind): k for k, f in enumerate(families)}
+    pins: list[Pin] = []
+    equations: list[Equation] = []
+    for target in model.initials:
+        node = target.target
+        if node.op == "var" and node.data[2] == 0 and not variables(target.value) and not target.store:
+            if node.data[:2] in numbers:
+                family = numbers[node.data[:2]]
+                pins.append(Pin(family, node.args, target.value, target.fixed, target.nest, target.place))
+                continue
+            if node.data[1] == model.mirror.coordinate:
+                continue
+        equations.append(Equation(f"#init {len(equations)}", target))
+    return tuple(pins), tuple(equations)
+
+
+def add_initials(
+    assembly: Assembly, model: EnergyModel, carriers: frozenset[str], equations: Sequence[Equation]
+) -> None:
+    """One row family an equation, its shape the ranges of its loops."""
+    for equation in equations:
+        target = equation.target
+        said = Equations("initial", "initial", equation.owner, "initial", target.unit, target.place, fixed=target.fixed)
+        assembly.family(replace(said, label=target.store or said.label, written=not target.store))
+        at = tuple(counter(k) for k in range(len(target.nest)))
+        residual = resolve(model, carriers, sub(target.target, target.value))
+        for term in without_nested(split(residual, target.nest, target.place), "an initial condition"):
+            assembly.add("initial", equation.owner, at, term.loops, term.expression)

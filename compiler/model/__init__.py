@@ -1,0 +1,1 @@
+"""Energies and terms: the values between network and forms, and their interpreter."""

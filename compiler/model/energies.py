@@ -1,0 +1,280 @@
+"""Network -> EnergyModel: state functions, virtual work and constraints as terms over loops.
+
+    T*(f, q, t)  T(p, q, t)  V(q, t)  D(f, q, t)      state functions, sums of terms
+    deltaW = E delta u(q, t)                          virtual work
+    Phi(q, t) = 0   Psi(f, q, t) = 0   Gamma(e, s, f, q, t) = 0   s' = Lambda(e, s, f, q, t)
+
+A coordinate is tangible where its displacement occurs undifferentiated (language, section 5); a psi row with constant
+coefficients that touches a tangible coordinate is integrated (`integration`).  Received: a checked Network.
+Returned: an EnergyModel and notes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from sysdyn.compiler.model.mirror import PRIMAL, Mirror
+from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
+from sysdyn.dsl.model.expression import Node, derivative, substitute, topological, var
+from sysdyn.dsl.model.network import Loop, Network, Shape
+from sysdyn.dsl.text.diagnostics import Place
+
+
+@dataclass(frozen=True, slots=True)
+class Virtual:
+    """Virtual work: the product effort * delta(on), one term each.  kept: of a store that the audit counts."""
+
+    effort: Node
+    on: Node
+    loops: Nest
+    place: Place
+    kept: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Rows `name[at]` for all iterations of `nest`: the sum of the terms is zero (the rate of a state)."""
+
+    kind: str  # phi psi gamma lambda
+    name: str
+    at: tuple[Node, ...]
+    terms: tuple[Term, ...]
+    nest: Nest
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """A coordinate, an implicit unknown or a state with its shape and units by kind of unknown."""
+
+    name: str
+    shape: Shape
+    units: Mapping[str, str]
+    place: Place
+    tangible: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Offset:
+    """The constants of an integrated constraint: parameter `name`[at] = sum of terms at the initial displacements."""
+
+    name: str
+    label: str
+    at: tuple[Node, ...]
+    terms: tuple[Term, ...]
+    nest: Nest
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; store: whose content, where unsaid."""
+
+    target: Node
+    value: Node
+    fixed: bool
+    nest: Nest
+    place: Place
+    store: str = ""
+    unit: str = "1"
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A traced quantity (stored) or one side of an expect."""
+
+    name: str
+    expression: Node
+    stored: bool
+    unit: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyModel:
+    """Everything a formulation is lowered from; expressions are canonical (see `terms`)."""
+
+    coordinates: tuple[Family, ...]
+    unknowns: tuple[Family, ...] = ()
+    states: tuple[Family, ...] = ()
+    functions: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
+    works: tuple[Virtual, ...] = ()
+    rows: tuple[Row, ...] = ()
+    offsets: tuple[Offset, ...] = ()
+    initials: tuple[Target, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)  # unit of each constraint label
+    mirror: Mirror = PRIMAL
+    quasis: tuple[str, ...] = ()
+
+    def function(self, name: str) -> tuple[Term, ...]:
+        """The terms of a state function."""
+        return self.functions.get(name, ())
+
+    def of_kind(self, kind: str) -> tuple[Row, ...]:
+        """The rows of one kind."""
+        return tuple(row for row in self.rows if row.kind == kind)
+
+
+def energies(network: Network) -> EnergyModel:
+    """The energy model of a network; tangibility decided, psi rows not yet integrated."""
+    model = EnergyModel(
+        coordinates=tuple(
+            Family(
+                c.name,
+                c.shape,
+                {"q": c.displacement.text, "f": c.flow.text, "p": c.momentum.text, "e": c.effort.text},
+                c.place,
+            )
+            for c in network.coordinates
+        ),
+        unknowns=tuple(Family(u.name, u.shape, {"e": u.unit.text}, u.place) for u in network.unknowns),
+        states=tuple(Family(s.name, s.shape, {"s": s.unit.text}, s.place) for s in network.states),
+        functions=_functions(network),
+        works=tuple(_works(network)),
+        rows=(*_constraints(network), *_dynamics(network)),
+        initials=tuple(_initials(network)),
+        quantities=tuple(_quantities(network)),
+        labels={c.name: c.unit.text for c in network.constraints},
+        quasis=network.quasis,
+    )
+    touched = tangible(model)
+    coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)
+    return replace(model, coordinates=coordinates)
+
+
+def flows(root: Node) -> Node:
+    """The expression with q' written as the flow f."""
+    change: dict[Node, Node] = {}
+    for node in local_variables(root, "q", 1):
+        change[node] = var(node.data[0], "f", *node.args)
+    return substitute(root, change) if change else root
+
+
+def _terms(root: Node, loops: Iterable[Loop], place: Place) -> tuple[Term, ...]:
+    nest, (expression,) = canonical(tuple(loops), flows(root))
+    return split(expression, nest, place)
+
+
+def _functions(network: Network) -> dict[str, tuple[Term, ...]]:
+    found: dict[str, list[Term]] = {}
+    for energy in network.energies:
+        pieces = _terms(energy.expression, energy.loops, energy.place)
+        pieces = without_nested(pieces, f"a state function {energy.function}")
+        found.setdefault(energy.function, []).extend(pieces)
+    return {name: tuple(pieces) for name, pieces in found.items()}
+
+
+def _works(network: Network) -> Iterator[Virtual]:
+    """One summand of the effort times one summand of the displacement each, under both nests."""
+    for work in network.works:
+        nest, (effort, on) = canonical(work.loops, flows(work.effort), flows(work.on))
+        for outer in without_nested(split(effort, nest, work.place), "an effort"):
+            for inner in without_nested(split(on, nest, work.place), "the displacement of a work"):
+                own = inner.loops[len(nest) :]
+                added, moved = _moved(own, len(nest), len(outer.loops))
+                moving, loops = substitute(inner.expression, moved), (*outer.loops, *added)
+                yield Virtual(outer.expression, moving, loops, work.place, work.kept)
+
+
+def _moved(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:
+    """Loops numbered from `start` numbered from `depth` instead."""
+    change = {counter(start + k): counter(depth + k) for k in range(len(own))}
+    nest = tuple(
+        Loop(f"#{depth + k}", substitute(loop.first, change), substitute(loop.last, change))
+        for k, loop in enumerate(own)
+    )
+    return nest, change
+
+
+def _constraints(network: Network) -> Iterator[Row]:
+    for c in network.constraints:
+        nest, (expression, *at) = canonical(c.loops, flows(c.expression), *c.at)
+        pieces = without_nested(split(expression, nest, c.place), f"{c.kind} '{c.name}'")
+        yield Row(c.kind, c.name, tuple(at), pieces, nest, c.place)
+
+
+def _dynamics(network: Network) -> Iterator[Row]:
+    for d in network.dynamics:
+        nest, (expression, state) = canonical(d.loops, flows(d.expression), d.state)
+        pieces = without_nested(split(expression, nest, d.place), f"the dynamic of '{state.data[0]}'")
+        yield Row("lambda", state.data[0], state.args, pieces, nest, d.place)
+
+
+def _initials(network: Network) -> Iterator[Target]:
+    for i in network.initials:
+        nest, (target, value) = canonical(i.loops, flows(i.target), flows(i.value))
+        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit)
+
+
+def _quantities(network: Network) -> Iterator[Quantity]:
+    """Traced quantities, each name once, then the sides of each expectation."""
+    first = {o.name: o for o in reversed(network.observations)}
+    for o in (o for o in network.observations if first[o.name] is o):
+        _, (expression,) = canonical((), flows(o.expression))
+        yield Quantity(o.name, expression, True, o.unit.text, o.place)
+    for k, e in enumerate(network.expectations):
+        for side, node in (("left", e.left), ("right", e.right), ("within", e.within)):
+            if node is not None:
+                _, (expression,) = canonical((), flows(node))
+                yield Quantity(f"expect {k} {side}", expression, False, e.unit.text, e.place)
+
+
+def _occurring(model: EnergyModel) -> Iterator[tuple[Node, Place]]:
+    """Every expression whose undifferentiated displacements make a coordinate tangible."""
+    m = model.mirror
+    for function in (m.potential, m.coenergy, m.energy, m.content):
+        for term in model.function(function):
+            yield term.expression, term.place
+    for row in model.rows:
+        for term in row.terms:
+            yield term.expression, term.place
+    for work in model.works:
+        yield work.effort, work.place
+        for node in local_variables(work.on, m.coordinate):
+            yield derivative(work.on, node), work.place
+
+
+def tangible(model: EnergyModel) -> dict[str, Place]:
+    """Coordinates whose displacement occurs undifferentiated, with the first place where it does."""
+    found: dict[str, Place] = {}
+    for expression, place in _occurring(model):
+        for node in local_variables(expression, model.mirror.coordinate):
+            found.setdefault(node.data[0], place)
+    return found
+
+
+def show(model: EnergyModel) -> str:
+    """The energy model as text, for --dump energies."""
+    lines = [f"coordinate {c.name}{_extent(c.shape)}{' tangible' if c.tangible else ''}" for c in model.coordinates]
+    lines += [f"implicit {u.name}{_extent(u.shape)}" for u in model.unknowns]
+    lines += [f"state {s.name}{_extent(s.shape)}" for s in model.states]
+    for name in model.functions:
+        lines += [f"{name} += {over(t.loops)}{t.expression!r}" for t in model.function(name)]
+    lines += [f"work {over(w.loops)}({w.effort!r}) on {w.on!r}" for w in model.works]
+    for row in model.rows:
+        at = f"[{', '.join(map(repr, row.at))}]" if row.at else ""
+        body = " + ".join(f"{over(t.loops[len(row.nest) :])}({t.expression!r})" for t in row.terms) or "0"
+        lines.append(f"{row.kind} {row.name}{at}: {over(row.nest)}{body}")
+    return "\n".join(lines) + "\n"
+
+
+def _extent(shape: Shape) -> str:
+    return f"[{', '.join(f'{a!r}..{b!r}' for a, b in shape)}]" if shape else ""
+
+
+def over(nest: Nest) -> str:
+    """The loops as text."""
+    return "".join(f"for {loop.index} in {loop.first!r}..{loop.last!r}: " for loop in nest)
+
+
+def verify_energies(model: EnergyModel) -> None:
+    """AssertionError where a term uses a loop variable that no loop of it binds."""
+    pieces = [t for name in model.functions for t in model.function(name)]
+    pieces += [t for row in model.rows for t in row.terms]
+    pieces += [Term(w.effort, w.loops, w.place) for w in model.works]
+    pieces += [Term(w.on, w.loops, w.place) for w in model.works]
+    for term in pieces:
+        bound = {loop.index for loop in term.loops}
+        for node in topological([term.expression]):
+            assert node.op != "index" or node.data in bound or node.data.startswith("#r"), (node, term.loops)

@@ -1,0 +1,1 @@
+"""Network to network: laws over the coordinates of one formulation."""

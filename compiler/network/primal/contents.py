@@ -1,0 +1,278 @@
+"""Initial conditions of a network as those of its coordinates; stores in series that start with different contents.
+
+In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + c, with c its own
+initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`; a dynamic variable
+of rate zero where not all of these are fixed and a loop of stores and efforts may ask for others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
+from sysdyn.compiler.network.primal.choices import own
+from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
+from sysdyn.compiler.network.primal.integrals import line
+from sysdyn.compiler.network.primal.overlaps import cut_off
+from sysdyn.compiler.network.primal.reading import Piece, Ranges, Reader, touches_network
+from sysdyn.compiler.network.primal.rings import closes
+from sysdyn.compiler.network.primal.series import Member
+from sysdyn.dsl.model.expression import (
+    Node,
+    both,
+    compare,
+    conditional,
+    const,
+    index,
+    is_const,
+    neg,
+    scale,
+    sub,
+    substitute,
+    var,
+    variables,
+)
+from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Loop, Network, Parameter, State
+
+
+def charge(branch: Branch, effort: Node) -> Node | None:
+    """The displacement of a potential store at an effort; None where the law does not give it."""
+    if branch.kind != "potential" or branch.law is None:
+        return None
+    if branch.side == "q":
+        e = own(branch, "be")
+        return None if variables(branch.law) - {e} else substitute(branch.law, {e: effort})
+    q = own(branch, "bq")
+    straight = None if variables(branch.law) - {q} else line(branch.law, q)
+    return None if straight is None else straight.inverse(effort)
+
+
+def at_stores(network: Network, incidence: Incidence, reader: Reader) -> Iterator[Initial]:
+    """Initial conditions; those of a node's effort as those of a linear store between that node and ground."""
+    for initial in network.initials:
+        if initial.target.op == "var" and initial.target.data[1:] == ("ne", 0):
+            yield from _at_store(initial, incidence.cells.get(initial.target.data[0], ()), reader)
+        else:
+            yield initial
+
+
+def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Reader) -> Iterator[Initial]:
+    node = initial.target
+
+    boxes: dict[Touch | None, list[Box]] = {}
+    for cell in cells:
+        touch = next((t for t in cell.touches if _between_ground(t)), None)
+        boxes.setdefault(touch, []).append(cell.box)
+    places = [(box, touch) for touch, found in boxes.items() for box in union(found)]
+
+    def store(ranges: Ranges) -> Touch | None:
+        return places[reader.locate(node.data[0], node.args, [box for box, _ in places], ranges)][1]
+
+    for loops, touch in reader.cut(initial.loops, initial.place, store):
+        if touch is None:
+            yield replace(initial, loops=loops)
+            continue
+        at = touch.loops_at(node.args)
+        target = var(touch.element.name, "be", *(a.at(at) for a in touch.element.at))
+        value = initial.value if touch.end == PLUS else neg(initial.value)
+        yield replace(initial, target=target, value=value, loops=loops)
+
+
+def _between_ground(touch: Touch) -> bool:
+    other = touch.element.ends[1 - touch.end].node
+    return not touch.free and other.startswith("#ground ") and charge(touch.element.branch, const(1.0)) is not None
+
+
+class Contents:
+    """Initial contents of potential stores: constants of followers, and the initial conditions that remain."""
+
+    def __init__(
+        self, reader: Reader, members: Sequence[Member], initials: Sequence[Initial], branches: Sequence[Branch]
+    ) -> None:
+        self.reader = reader
+        self.members = members
+        self.initials = initials
+        self.stiff = [b for b in branches if b.kind in ("potential", "effort")]
+        self.parameters: list[Parameter] = []
+        self.states: list[State] = []
+        self.dynamics: list[Dynamic] = []
+        self._given: dict[str, list[tuple[Initial, Box, Node]]] = {}
+        self._pinned: set[Node] = set()
+        for initial in initials:
+            for part, box, content in self._contents(initial):
+                self._given.setdefault(part.target.data[0], []).append((part, box, content))
+        for element in dict.fromkeys(m.element for m in members if _follows(m)):
+            self._constant(element, [m for m in members if m.element is element and _follows(m)])
+
+    def _contents(self, initial: Initial) -> Iterator[tuple[Initial, Box, Node]]:
+        """The displacements that an initial condition gives to potential stores of series classes."""
+        target = initial.target
+        if target.op != "var" or target.data[1:] not in (("be", 0), ("bq", 0)) or variables(initial.value):
+            return
+
+        def found(ranges: Ranges) -> tuple[Box, Node] | None:
+            piece = self.reader.piece(target.data[0], target.args, ranges)
+            content = None if piece.member is None else self._charge(piece, initial)
+            held = {name: r.interval for name, r in ranges.items()}
+            box = tuple(a.over(held) for a in self.reader.affine(target.args, ranges))
+            return None if content is None else (box, content)
+
+        for loops, pair in self.reader.cut(initial.loops, initial.place, found):
+            if pair is not None:
+                yield replace(initial, loops=loops), *pair
+
+    def _charge(self, piece: Piece, initial: Initial) -> Node | None:
+        branch = piece.element.branch
+        if branch.kind != "potential":
+            return None
+        if initial.target.data[1] == "bq":
+            return initial.value
+        mark = index("#v")  # the value is over the statement's own loops: put in after the law's were replaced
+        found = charge(branch, mark)
+        if found is None:
+            return None
+        return substitute(self.reader.at_piece(found, piece, initial.target.args), {mark: initial.value})
+
+    def start(self, name: str, at: tuple[Node, ...]) -> Node:
+        """The initial content of a store: what the last statement about it says (before all guesses), else 0."""
+        value: Node = const(0.0)
+        for initial, box, content in sorted(self._given.get(name, []), key=lambda g: g[0].fixed):
+            loops = [loop.index for loop in initial.loops]
+            places = [self.reader.sizes.affine(a, loops, initial.place) for a in initial.target.args]
+            pairs = zip(places, at, strict=True)
+            change = {index(a.loop): sub(node, a.offset.node) for a, node in pairs if a.loop is not None}
+            own_value = substitute(content, change)
+            if any(n.op == "index" for a in at for n in _leaves(a)):
+                value = _within(box, at, own_value, value)
+            elif all(i.holds(k) for i, k in zip(box, self._point(at, initial), strict=True)):
+                value = own_value
+        return value
+
+    def _point(self, at: tuple[Node, ...], initial: Initial) -> Box:
+        bounds = [self.reader.sizes.bound(a, initial.place) for a in at]
+        return tuple(Interval(b, b) for b in bounds)
+
+    def _constant(self, element: Element, members: Sequence[Member]) -> None:
+        """A parameter, unless it is zero by the text."""
+        counters = tuple(f"#c{k}" for k in range(len(element.at)))
+        at = tuple(index(name) for name in counters)
+        value: Node = const(0.0)
+        for m in members:
+            first = self.start(m.leader.name, m.leader_at(at))
+            value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
+        fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
+        fixed |= not closes(element.branch, self.stiff)
+        if fixed and is_const(value, 0.0):
+            return
+        taken = {p.name for p in self.parameters} | {s.name for s in self.states}
+        stem, place = f"{element.name}.content", element.branch.place
+        name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
+        unit, shape = element.branch.domain.displacement, shape_of(element.named)
+        self.reader.book.contents[element.number] = name, fixed
+        if fixed:
+            self.parameters.append(Parameter(name, shape, unit, (value,), counters, place))
+            return
+        loops = tuple(Loop(c, low, high) for c, (low, high) in zip(counters, shape, strict=True))
+        self.states.append(State(name, shape, unit, place))
+        self.dynamics.append(Dynamic(var(name, "s", *at), const(0.0), loops, place))
+
+    def _fixed(self, name: str, box: Box) -> bool:
+        """Whether the text fixes the contents of all these elements."""
+        left = [box]
+        for initial, said, _ in self._given.get(name, ()):
+            if initial.fixed:
+                left = [part for rest in left for part in cut_off(rest, said)]
+        return not left
+
+    # -- initial conditions -------------------------------------------------------------------------------------
+
+    def resolved(self) -> Iterator[Initial]:
+        """The initial conditions of coordinates and other unknowns."""
+        for initial in self.initials:
+            if not touches_network(initial.target) and not touches_network(initial.value):
+                yield initial
+                continue
+            for loops, (kind, target, value) in self.reader.cut(
+                initial.loops,
+                initial.place,
+                lambda ranges, i=initial: self._one(i, ranges),  # type: ignore[misc]
+            ):
+                if kind == "pin":
+                    yield replace(initial, target=target, value=value, loops=loops)
+                elif kind == "class" and target not in self._pinned:
+                    self._pinned.update(() if target.args else (target,))
+                    yield replace(initial, target=target, value=value, loops=self._without(loops, target))
+
+    def _led(self, coordinate: str) -> bool:
+        """Whether a statement gives the content of a leader of the coordinate's classes."""
+        leaders = [m for m in self.members if m.leads and m.coordinate == coordinate]
+        return any(_meet(m.box, box) for m in leaders for _, box, _ in self._given.get(m.element.name, []))
+
+    def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
+        """The loops that the target still follows."""
+        used = {n.data for a in target.args for n in _leaves(a) if n.op == "index"}
+        return tuple(loop for loop in loops if loop.index in used)
+
+    def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
+        """Where one piece is read: (pin | class | drop, target, value); class: the coordinate of the store's class."""
+        target = initial.target
+        piece = None
+        if target.op == "var" and target.data[1] in ("be", "bq") and not variables(initial.value):
+            piece = self.reader.piece(target.data[0], target.args, ranges)
+        content = None if piece is None else self._charge(piece, initial)
+        if piece is not None and piece.member is not None and content is not None:
+            m = piece.member
+            if not self.reader.book.contents.get(piece.element.number, ("", True))[1]:
+                return "pin", self.reader.resolve(var(target.data[0], "bq", *target.args), ranges), content
+            q = var(m.coordinate, "q", *m.indices(target.args))
+            first = self.start(m.leader.name, m.leader_at(target.args))
+            if m.leads and len(m.index) == len(target.args):
+                return "pin", q, content
+            return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
+        if piece is not None and piece.member is None and content is not None:
+            moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
+            return "pin", *_pin(moved, content)
+        new, value = (self.reader.resolve(node, ranges) for node in (target, initial.value))
+        if not variables(value):
+            return "pin", *_pin(new, value)
+        return "pin", new, value
+
+
+def _pin(target: Node, value: Node) -> tuple[Node, Node]:
+    """An equation that is linear in one unknown as that unknown's value."""
+    unknowns = [n for n in variables(target) if n.op == "var"]
+    if len(unknowns) == 1 and not variables(target) - set(unknowns):
+        straight = line(target, unknowns[0])
+        if straight is not None:
+            return unknowns[0], straight.inverse(value)
+    return target, value
+
+
+def _led_by(m: Member) -> Box:
+    """The elements of the leader that a member follows."""
+    pairs = ((None if k is None else m.box[k], c) for k, c in m.leader_index)
+    return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
+
+
+def _follows(m: Member) -> bool:
+    return m.element.branch.kind == "potential" and not m.leads
+
+
+def _meet(a: Box, b: Box) -> bool:
+    return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))
+
+
+def _within(box: Box, at: tuple[Node, ...], value: Node, other: Node) -> Node:
+    """The value at indices in the box, the other elsewhere."""
+    pairs = list(zip(box, at, strict=True))
+    low = [compare("<=", i.first.node, node) for i, node in pairs]
+    high = [compare("<=", node, i.last.node) for i, node in pairs]
+    return conditional(both(*low, *high), value, other) if pairs else value
+
+
+def _leaves(node: Node) -> Iterator[Node]:
+    if not node.args:
+        yield node
+    for a in node.args:
+        yield from _leaves(a)

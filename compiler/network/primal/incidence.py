@@ -1,0 +1,200 @@
+"""The branch graph by index classes: branches with their ranges, and common-effort nodes with what touches them.
+
+A node family is cut where the reach of a terminal begins or ends; in each box so made every node is touched by the same
+branches, so its degree is known (language, 8.5).  A domain's ground is a node without indices.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Sizes, between, box_holds, box_size
+from sysdyn.dsl.model.expression import Node, index, sub
+from sysdyn.dsl.model.network import Branch, Domain, Network, NodeFamily, Terminal
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+
+PLUS, MINUS = 0, 1
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """One end of a branch at a node: the flow leaves the node at plus and enters it at minus."""
+
+    node: str  # family, or the ground's name
+    at: tuple[Affine, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """A branch statement: ranges of its loops, indices of its name, contacts (none where it stands `on`)."""
+
+    number: int
+    branch: Branch
+    loops: tuple[str, ...]
+    box: Box
+    at: tuple[Affine, ...]
+    ends: tuple[Contact, ...]
+
+    @property
+    def name(self) -> str:
+        """The family's name."""
+        return self.branch.name
+
+    @property
+    def ranges(self) -> dict[str, Interval]:
+        """Range of each loop variable."""
+        return dict(zip(self.loops, self.box, strict=True))
+
+    @property
+    def named(self) -> Box:
+        """The box of the indices of its name."""
+        return tuple(a.over(self.ranges) for a in self.at)
+
+    def loops_at(self, at: tuple[Node, ...]) -> dict[str, Node]:
+        """Loop variables of the element whose name has these indices."""
+        pairs = zip(self.at, at, strict=True)
+        return {a.loop: sub(node, a.offset.node) for a, node in pairs if a.loop is not None}
+
+    def place_of(self, loop: str) -> int:
+        """The index of the name that a loop variable runs along."""
+        return next(k for k, a in enumerate(self.at) if a.loop == loop)
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """A branch end that touches every node of a cell; `free`: loop variables along which many branches touch it."""
+
+    element: Element
+    end: int
+    free: tuple[str, ...]
+
+    @property
+    def contact(self) -> Contact:
+        """Its terminal."""
+        return self.element.ends[self.end]
+
+    def loops_at(self, at: tuple[Node, ...]) -> dict[str, Node]:
+        """Loop variables of the branch that touches the node with these indices."""
+        pairs = zip(self.contact.at, at, strict=True)
+        return {a.loop: sub(node, a.offset.node) for a, node in pairs if a.loop is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class NodeCell:
+    """Nodes of one family that the same branches touch."""
+
+    node: str
+    domain: Domain
+    box: Box
+    touches: tuple[Touch, ...]
+    place: Place
+
+    @property
+    def degree(self) -> int:
+        """Number of branch ends at each of them."""
+        return sum(box_size(tuple(t.element.ranges[name] for name in t.free)) for t in self.touches)
+
+
+def ground(domain: Domain) -> str:
+    """The name of a domain's ground."""
+    return f"#ground {domain.name}"
+
+
+def elements(network: Network, sizes: Sizes) -> tuple[Element, ...]:
+    """All branches with at least one element, in the order of the text."""
+    return tuple(e for k, b in enumerate(network.branches) for e in _element(k, b, sizes))
+
+
+def _element(number: int, branch: Branch, sizes: Sizes) -> Iterator[Element]:
+    loops = tuple(loop.index for loop in branch.loops)
+    for loop in branch.loops:
+        for bound in (loop.first, loop.last):
+            if sizes.affine(bound, loops, branch.place).loop is not None:
+                raise unrolled(f"the range of {branch.name} along {loop.index} follows another index", branch.place)
+    box = tuple(sizes.interval(loop.first, loop.last, branch.place) for loop in branch.loops)
+    if not box_size(box):
+        return
+    at = tuple(sizes.affine(node, loops, branch.place) for node in branch.at)
+    for name in loops:
+        if sum(a.loop == name for a in at) != 1:
+            raise unrolled(f"{branch.name} is not indexed once by {name}", branch.place)
+    ends: tuple[Contact, ...] = ()
+    if branch.on is None:
+        pair = (branch.plus, branch.minus)
+        ends = tuple(_contact(t, branch, loops, sizes) for t in pair if t is not None)
+    yield Element(number, branch, loops, box, at, ends)
+
+
+def _contact(terminal: Terminal, branch: Branch, loops: tuple[str, ...], sizes: Sizes) -> Contact:
+    name = ground(branch.domain) if terminal.node is None else terminal.node
+    at = tuple(sizes.affine(node, loops, branch.place) for node in terminal.at)
+    used = [a.loop for a in at if a.loop is not None]
+    if len(used) != len(set(used)):
+        raise unrolled(f"{branch.name} meets node {name} along a diagonal", branch.place)
+    return Contact(name, at)
+
+
+def unrolled(what: str, place: Place) -> ModelError:
+    """E806: a pattern that index classes cannot hold."""
+    return ModelError([Diagnostic("E806", f"{what}: it would have to be unrolled", place)])
+
+
+class Incidence:
+    """The common-effort nodes of a network in cells."""
+
+    def __init__(self, network: Network, sizes: Sizes) -> None:
+        self.elements = elements(network, sizes)
+        self.families = {n.name: n for n in network.nodes}
+        self.boxes: dict[str, Box] = {}
+        self.cells: dict[str, tuple[NodeCell, ...]] = {}
+        self.sizes = sizes
+        for family in network.nodes:
+            if family.domain.common == "effort":
+                self._add(family.name, family, sizes.box(family.shape, family.place))
+        for domain in dict.fromkeys(e.branch.domain for e in self.elements if e.branch.domain.common == "effort"):
+            if any(c.node == ground(domain) for e in self.elements for c in e.ends):
+                self._add(ground(domain), NodeFamily(ground(domain), (), domain, domain.place), ())
+
+    def _add(self, name: str, family: NodeFamily, box: Box) -> None:
+        self.boxes[name] = box
+        contacts = [(e, k, c) for e in self.elements for k, c in enumerate(e.ends) if c.node == name]
+        reaches = [(e, k, tuple(a.over(e.ranges) for a in c.at)) for e, k, c in contacts]
+        for e, _, reach in reaches:
+            if not box_holds(box, reach):
+                at = ", ".join(f"{i.first.value}..{i.last.value}" for i in reach)
+                text = f"{e.name} meets {name}[{at}], outside its range"
+                raise ModelError([Diagnostic("E805", text, e.branch.place)])
+        sides: list[list[Interval]] = []
+        for d, whole in enumerate(box):
+            cuts: dict[int, Bound] = {}
+            for interval in (whole, *(reach[d] for _, _, reach in reaches)):
+                for cut in (interval.first, interval.last.plus(1)):
+                    cuts.setdefault(cut.value, cut)
+            sides.append(between(cuts))
+        found = []
+        for part in itertools.product(*sides):
+            touches = tuple(_touch(e, k) for e, k, reach in reaches if box_holds(reach, part))
+            if touches:
+                found.append(NodeCell(name, family.domain, part, touches, family.place))
+        self.cells[name] = tuple(found)
+
+    def all_cells(self) -> Iterator[NodeCell]:
+        """Every cell."""
+        return (cell for cells in self.cells.values() for cell in cells)
+
+
+def _touch(element: Element, end: int) -> Touch:
+    used = {a.loop for a in element.ends[end].at}
+    return Touch(element, end, tuple(name for name in element.loops if name not in used))
+
+
+def counters(box: Box) -> tuple[str, ...]:
+    """Names of loop variables over a box."""
+    return tuple(f"#k{d}" for d in range(len(box)))
+
+
+def indices(box: Box) -> tuple[Node, ...]:
+    """The loop variables over a box."""
+    return tuple(index(name) for name in counters(box))

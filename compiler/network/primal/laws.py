@@ -1,0 +1,219 @@
+"""Laws of branches as energies, works, constraints and implicit unknowns: the primal column of the language's table.
+
+    kinetic p(f)      T* += int p df          kinetic f(p)      inverted, or the momentum is a state
+    potential e(q)    V += int e dq           potential q(e)    inverted, or implicit effort; psi f without slope
+    dissipator e(f)   D += int e df           dissipator f(e)   inverted, or implicit effort; psi f - f(0) without slope
+    effort source     work -e on q            flow source       psi f - f_s, or implicit effort where it is controlled
+    transformer       psi f1 - n f2           gyrator           works -r f2 on q1, r f1 on q2
+
+A law that has no antiderivative of ours does work -e on q.  Elements of pseudo domains do works only: efforts times
+flows of a domain add up to zero over all its branches (Tellegen), so they leave no trace in the energy audit.
+Everything is still said in the branches' own variables; `reading` replaces these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
+from sysdyn.compiler.network.primal.choices import OWN, Choice, Law, own
+from sysdyn.compiler.network.primal.incidence import Element
+from sysdyn.compiler.network.primal.slopes import Slopes
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    derivative,
+    index,
+    mul,
+    neg,
+    sub,
+    substitute,
+    time_derivative,
+    var,
+    variables,
+)
+from sysdyn.dsl.model.network import (
+    Constraint,
+    Coupling,
+    Dynamic,
+    Energy,
+    Network,
+    Slope,
+    State,
+    Table,
+    Unknown,
+    Work,
+)
+from sysdyn.dsl.model.units import Unit
+from sysdyn.dsl.text.diagnostics import Diagnostic
+
+ENERGY = {"kinetic": "T*", "potential": "V", "dissipator": "D"}
+
+
+@dataclass(slots=True)
+class Laws:
+    """What all laws say, and the efforts and momenta of branches by element number (over the element's own loops)."""
+
+    energies: list[Energy] = field(default_factory=list)
+    works: list[Work] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    dynamics: list[Dynamic] = field(default_factory=list)
+    unknowns: dict[str, Unknown] = field(default_factory=dict)
+    states: dict[str, State] = field(default_factory=dict)
+    efforts: dict[int, Node] = field(default_factory=dict)
+    momenta: dict[int, Node] = field(default_factory=dict)
+    notes: list[Diagnostic] = field(default_factory=list)
+    slopes: tuple[Slope, ...] = ()
+    tables: dict[str, Table] = field(default_factory=dict)
+
+
+def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflected: bool = False) -> Laws:
+    """All laws; reflected: the network is the reflection of the author's, whose letters notes are to say."""
+    wanted = _read_efforts(network)
+    found = Laws()
+    slopes = Slopes(network)
+    letters = dict(zip("efqp", "fepq" if reflected else "efqp", strict=True))
+    chosen = [(e, Choice(e.branch, slopes, network.tables, e.name in wanted, letters).law()) for e in elements]
+    found.slopes = tuple(slopes.decided)
+    names: dict[tuple[int, str], Part] = {}
+    for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
+        kept = [e for e, law in chosen if law.how in hows]
+        for e, part in zip(kept, parts([(f"{e.name}.{suffix}", e.named) for e in kept]), strict=True):
+            names[e.number, suffix] = part
+    for element, law in chosen:
+        _Statement(element, law, names, found).say()
+    for coupling, label in _ratios(network, elements, sizes):
+        _couple(coupling, label, elements, sizes, found)
+    return found
+
+
+def _read_efforts(network: Network) -> set[str]:
+    """Families whose effort a law or statement (not a trace) reads: a kinetic store's must then be no rate."""
+    roots = [root for b in network.branches for root in (b.law, b.on) if root is not None]
+    roots += [c.ratio for c in network.couplings] + [e.expression for e in network.energies]
+    roots += [w.effort for w in network.works] + [c.expression for c in network.constraints]
+    roots += [d.expression for d in network.dynamics]
+    return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] == "be"}
+
+
+class _Statement:
+    """One element's contributions."""
+
+    def __init__(self, element: Element, law: Law, names: dict[tuple[int, str], Part], found: Laws) -> None:
+        self.element, self.branch, self.law, self.names, self.found = element, element.branch, law, names, found
+
+    def say(self) -> None:
+        """Add everything to the laws found."""
+        b, law, found = self.branch, self.law, self.found
+        found.notes += [Diagnostic(*note, b.place) for note in law.notes]
+        found.tables.update((t.name, t) for t in law.tables)
+        if law.how == "energy":
+            assert law.stated is not None
+            found.energies.append(Energy(ENERGY[b.kind], law.stated, b.loops, b.place))
+            self._explicit()
+        elif law.how == "work":
+            assert law.stated is not None
+            self._work(law.stated)
+            found.efforts[self.element.number] = law.stated
+        elif law.how == "row":
+            self._row("psi", law.stated, b.domain.flow)
+            found.efforts[self.element.number] = var(self._name("law"), "mu", *b.at)
+        elif law.how in ("implicit", "state"):
+            self._implicit()
+
+    def _name(self, suffix: str) -> str:
+        return self.names[self.element.number, suffix].name
+
+    def _explicit(self) -> None:
+        """Effort and momentum of an element whose energy is stated: its derivative."""
+        assert self.law.stated is not None
+        kind = OWN[self.branch.kind][0]
+        slope = derivative(self.law.stated, own(self.branch, kind))
+        if self.branch.kind == "kinetic":
+            self.found.momenta[self.element.number] = slope
+            slope = time_derivative(slope)
+        self.found.efforts[self.element.number] = slope
+
+    def _work(self, effort: Node) -> None:
+        b = self.branch
+        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, b.place, self.law.kept is not None))
+
+    def _row(self, kind: str, equation: Node | None, unit: Unit) -> None:
+        b = self.branch
+        assert equation is not None
+        self.found.constraints.append(Constraint(kind, self._name("law"), b.at, equation, b.loops, unit, b.place))
+
+    def _implicit(self) -> None:
+        """An implicit effort closed by a gamma; with a momentum as state, p' = e."""
+        b, number, found = self.branch, self.element.number, self.found
+        if self.law.kept is not None:
+            found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, b.place))
+        part = self.names[number, "e"]
+        found.unknowns.setdefault(part.name, Unknown(part.name, shape_of(part.box), b.domain.effort, b.place))
+        effort = var(part.name, "e", *b.at)
+        found.efforts[number] = effort
+        self._work(effort)
+        if self.law.how == "state":
+            held = self.names[number, "p"]
+            found.states.setdefault(held.name, State(held.name, shape_of(held.box), b.domain.momentum, b.place))
+            momentum = var(held.name, "s", *b.at)
+            found.momenta[number] = momentum
+            found.dynamics.append(Dynamic(momentum, effort, b.loops, b.place))
+        unit = {"potential": b.domain.displacement}.get(b.kind, b.domain.flow)
+        if b.kind == "kinetic" and b.side == "p":
+            unit = b.domain.momentum
+        self._row("gamma", self.law.stated, unit)
+
+
+def _ratios(network: Network, elements: Sequence[Element], sizes: Sizes) -> Iterator[tuple[Coupling, str]]:
+    """Couplings with the label of their constraint."""
+    live = [c for c in network.couplings if any(e.name == c.first for e in elements)]
+    stems: dict[str, set[str]] = {}
+    for c in live:
+        stems.setdefault(_stem(c.first), set()).add(c.first)
+    families = [c.first if len(stems[_stem(c.first)]) > 1 else _stem(c.first) for c in live]
+    boxes = []
+    for c in live:
+        ranges = {loop.index: sizes.interval(loop.first, loop.last, c.place) for loop in c.loops}
+        boxes.append(tuple(sizes.affine(node, ranges, c.place).over(ranges) for node in c.at))
+    labels = parts([(f"{name}.ratio", box) for name, box in zip(families, boxes, strict=True)])
+    return ((c, label.name) for c, label in zip(live, labels, strict=True))
+
+
+def _stem(name: str) -> str:
+    return name.rpartition(".")[0] or name
+
+
+def _couple(coupling: Coupling, label: str, elements: Sequence[Element], sizes: Sizes, found: Laws) -> None:
+    """Transformer f1 = n f2 or e1 = n e2; gyrator e1 = r f2.  The companion law makes e1 f1 + e2 f2 zero."""
+    c = coupling
+    first, second = (var(name, "bf", *c.at) for name in (c.first, c.second))
+    domain = next(e.branch.domain for e in elements if e.name == c.first)
+    if c.kind == "gyrator":
+        efforts = mul(c.ratio, second), neg(mul(c.ratio, first))
+        for effort, name in zip(efforts, (c.first, c.second), strict=True):
+            found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, c.place))
+    else:
+        multiplier = var(label, "mu", *c.at)
+        if c.side == "f":
+            equation = sub(first, mul(c.ratio, second))
+            efforts = multiplier, neg(mul(c.ratio, multiplier))
+        else:
+            equation = add(second, mul(c.ratio, first))
+            efforts = mul(c.ratio, multiplier), multiplier
+            domain = next(e.branch.domain for e in elements if e.name == c.second)
+        found.constraints.append(Constraint("psi", label, c.at, equation, c.loops, domain.flow, c.place))
+    ranges = {loop.index: sizes.interval(loop.first, loop.last, c.place) for loop in c.loops}
+    places = [sizes.affine(node, ranges, c.place) for node in c.at]
+    held = tuple(a.over(ranges) for a in places)
+    for name, effort in zip((c.first, c.second), efforts, strict=True):
+        for e in elements:
+            if e.name == name and box_holds(held, e.named):
+                found.efforts[e.number] = _at_element(effort, places, e)
+
+
+def _at_element(effort: Node, places: Sequence[Affine], element: Element) -> Node:
+    """An effort over the coupling's loops as one over the branch's."""
+    pairs = zip(places, element.branch.at, strict=True)
+    return substitute(effort, {index(a.loop): node for a, node in pairs if a.loop is not None})

@@ -1,0 +1,83 @@
+"""Where a statement about a family meets elements that run over loops of their own, exactly: with the network's sizes.
+
+Bounds stay symbolic; values decide which of two is the narrower (as everywhere in `primal`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, without
+from sysdyn.dsl.model.expression import Node, index, sub, substitute
+from sysdyn.dsl.model.network import Initial, Loop
+from sysdyn.dsl.text.diagnostics import ModelError, Place
+
+Ranges = dict[str, Interval]
+
+
+def ranges_of(loops: Sequence[Loop], sizes: Sizes, place: Place) -> Ranges:
+    """The values of loop variables."""
+    return {loop.index: sizes.interval(loop.first, loop.last, place) for loop in loops}
+
+
+def narrowed(loops: Sequence[Loop], within: Ranges) -> tuple[Loop, ...]:
+    """The loops over these ranges."""
+    pairs = [(loop.index, within[loop.index]) for loop in loops]
+    return tuple(Loop(name, i.first.node, i.last.node) for name, i in pairs)
+
+
+def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) -> tuple[Ranges, Node] | None:
+    """The part of the ranges in which elements `at` are those that the statement is about, and its value there.
+
+    None where there is no such part, or where indices do not tell it (no i + c).
+    """
+    found = dict(within)
+    change: dict[Node, Node] = {}
+    try:
+        own = ranges_of(initial.loops, sizes, initial.place)
+        for said, asked in zip(initial.target.args, at, strict=True):
+            a, b = sizes.affine(said, own, initial.place), sizes.affine(asked, within, initial.place)
+            reach = Interval(a.offset, a.offset) if a.loop is None else own[a.loop].plus(a.offset)
+            if a.loop is not None:
+                if index(a.loop) in change:
+                    return None
+                change[index(a.loop)] = sub(asked, a.offset.node)
+            if b.loop is None:
+                if not reach.holds(Interval(b.offset, b.offset)):
+                    return None
+                continue
+            both = common(found[b.loop], reach.minus(b.offset))
+            if not both.size:
+                return None
+            found[b.loop] = both
+    except ModelError:
+        return None
+    return found, substitute(initial.value, change)
+
+
+def common(a: Interval, b: Interval) -> Interval:
+    """What lies in both."""
+    first = a.first if a.first.value >= b.first.value else b.first
+    return Interval(first, a.last if a.last.value <= b.last.value else b.last)
+
+
+def beside(within: Ranges, holes: Sequence[Ranges]) -> Iterator[Ranges]:
+    """The ranges without the holes in them, as ranges."""
+    left: list[Box] = [tuple(within.values())]
+    for hole in holes:
+        left = [part for box in left for part in cut_off(box, tuple(hole.values()))]
+    yield from (dict(zip(within, box, strict=True)) for box in left)
+
+
+def cut_off(box: Box, hole: Box) -> Iterator[Box]:
+    """The parts of a box outside a hole that may reach beyond it."""
+    inner = tuple(common(a, b) for a, b in zip(box, hole, strict=True))
+    if all(i.size for i in inner):
+        yield from without(box, inner)
+    else:
+        yield box
+
+
+def count(ranges: Ranges) -> int:
+    """Number of iterations."""
+    return box_size(tuple(ranges.values()))

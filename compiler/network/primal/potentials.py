@@ -1,0 +1,153 @@
+"""Efforts of common-effort nodes: multipliers, zero at a reference, and walks along series classes for merged nodes.
+
+A merged node lies between two branches.  From there the walk goes through branches and merged nodes until it meets one
+whose effort is known; the way without a kinetic store is preferred (rule P3).  Where a walk comes back to nodes of the
+same cell one index further, it is a run: the steps in between are summed over the run at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sysdyn.compiler.network.primal.balances import MULTIPLIER, WALK, ZERO, Effort
+from sysdyn.compiler.network.primal.bounds import Affine, Bound, Interval
+from sysdyn.compiler.network.primal.incidence import PLUS, Touch, unrolled
+from sysdyn.compiler.network.primal.reading import Range, Ranges, Reader
+from sysdyn.dsl.model.expression import Node, add, const, index, linear, neg, reduction, sub, var
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+
+
+@dataclass(frozen=True, slots=True)
+class _Visit:
+    """A merged node on the way: where, by which branch end it is left, and how many terms lie behind."""
+
+    effort: Effort
+    at: tuple[Node, ...]
+    touch: Touch
+    behind: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """Efforts (signed) of the branches on a way, and the effort of the node at its end."""
+
+    terms: tuple[Node, ...]
+    base: Node
+    kinetic: int
+
+
+class Potentials:
+    """Reads `ne` of every node."""
+
+    def __init__(self, efforts: Sequence[Effort]) -> None:
+        self.efforts: dict[str, list[Effort]] = {}
+        for e in efforts:
+            self.efforts.setdefault(e.node, []).append(e)
+        self._serial = 0
+
+    def read(self, reader: Reader, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        """Effort of a node: against the reference, less that of the ground where this is not the reference."""
+        effort = self.known(reader, node.data[0], node.args, ranges)
+        value = self._raw(reader, effort, node.args, ranges)
+        if effort.ground is not None:
+            value = sub(value, self._raw(reader, self.efforts[effort.ground][0], (), ranges))
+        return reader.resolve(value, ranges, active)
+
+    def known(self, reader: Reader, name: str, at: tuple[Node, ...], ranges: Ranges) -> Effort:
+        """How the effort of a node is read."""
+        found = self.efforts.get(name, [])
+        if not found:
+            raise ModelError([Diagnostic("E409", f"node {name} touches no element: it has no effort", reader.place)])
+        return found[reader.locate(name, at, [e.box for e in found], ranges)]
+
+    def _raw(self, reader: Reader, effort: Effort, at: tuple[Node, ...], ranges: Ranges) -> Node:
+        """Effort against the component's reference."""
+        if effort.how == MULTIPLIER:
+            return var(effort.label, "mu", *at)
+        if effort.how == ZERO:
+            return const(0.0)
+        paths = [self._path(reader, effort, at, touch, ranges) for touch in effort.cell.touches]
+        best = min(paths, key=lambda p: (p.kinetic, len(p.terms)))
+        return add(best.base, *best.terms)
+
+    def _path(self, reader: Reader, effort: Effort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
+        terms: list[Node] = []
+        visits: list[_Visit] = []
+        kinetic = 0
+        while effort.how == WALK:
+            visits.append(_Visit(effort, at, touch, len(terms)))
+            kinetic += touch.element.branch.kind == "kinetic"
+            term, name, at = _step(touch, at)
+            terms.append(term)
+            effort = self.known(reader, name, at, ranges)
+            arrival = touch
+            if effort.how == WALK:
+                touch = _other(effort, arrival)
+                back = next((v for v in visits if v.effort == effort and v.touch == touch), None)
+                if back is not None:
+                    terms, at, effort, name = self._run(reader, visits, back, (effort, at), terms, ranges)
+                    visits = []
+                    if effort.how == WALK:
+                        touch = _other(effort, arrival)
+        return _Path(tuple(terms), self._raw(reader, effort, at, ranges), kinetic)
+
+    def _run(
+        self,
+        reader: Reader,
+        visits: list[_Visit],
+        start: _Visit,
+        now: tuple[Effort, tuple[Node, ...]],
+        terms: list[Node],
+        ranges: Ranges,
+    ) -> tuple[list[Node], tuple[Node, ...], Effort, str]:
+        """Sum the period that leads from `start` to `now`, one index further, over the rest of the run."""
+        before, behind = reader.affine(start.at, ranges), reader.affine(now[1], ranges)
+        shifts = [b.offset.value - a.offset.value for a, b in zip(before, behind, strict=True)]
+        along = [d for d, s in enumerate(shifts) if s]
+        if len(along) != 1 or abs(shifts[along[0]]) != 1:
+            place = reader.place or start.effort.cell.place
+            raise unrolled(f"the effort of node {start.effort.node} along its series class", place)
+        d, step = along[0], shifts[along[0]]
+        self._serial += 1
+        counter = f"#w{self._serial}"
+        held = {name: r.interval for name, r in ranges.items()}
+        own = {**ranges, counter: Range(before[d].over(held))}
+        at: tuple[Node, ...] = (*start.at[:d], index(counter), *start.at[d + 1 :])
+        period: list[Node] = []
+        limits: list[Bound] = []
+        effort, touch = start.effort, start.touch
+        for _ in visits[visits.index(start) :]:
+            limits += _limits(effort, reader.affine(at, own), counter, step)
+            term, name, at = _step(touch, at)
+            period.append(term)
+            effort = self.known(reader, name, at, own)
+            touch = _other(effort, touch) if effort.how == WALK else touch
+        end = (max if step < 0 else min)(limits, key=lambda b: b.value)
+        first, last = (end.node, start.at[d]) if step < 0 else (start.at[d], end.node)
+        total = reduction("sum", counter, first, last, add(*period))
+        beyond = linear(float(step), ((1.0, end.node),))
+        at = (*start.at[:d], beyond, *start.at[d + 1 :])
+        name = start.effort.node
+        return [*terms[: start.behind], total], at, self.known(reader, name, at, ranges), name
+
+
+def _step(touch: Touch, at: tuple[Node, ...]) -> tuple[Node, str, tuple[Node, ...]]:
+    """Through a branch: its effort with the sign of e(here) = e(there) +- e_branch, and the node there."""
+    loops = touch.loops_at(at)
+    element = touch.element
+    effort = var(element.name, "be", *(a.at(loops) for a in element.at))
+    other = element.ends[1 - touch.end]
+    return effort if touch.end == PLUS else neg(effort), other.node, tuple(a.at(loops) for a in other.at)
+
+
+def _other(effort: Effort, arrival: Touch) -> Touch:
+    """The end by which a merged node is left when it was reached through `arrival`."""
+    by = (arrival.element.number, 1 - arrival.end)
+    return next(t for t in effort.cell.touches if (t.element.number, t.end) != by)
+
+
+def _limits(effort: Effort, at: tuple[Affine, ...], counter: str, step: int) -> list[Bound]:
+    """How far the counter may run before this node leaves the box in which it is merged."""
+    boxes: list[tuple[Interval, Affine]] = list(zip(effort.box, at, strict=True))
+    return [(i.first if step < 0 else i.last).minus(a.offset) for i, a in boxes if a.loop == counter]

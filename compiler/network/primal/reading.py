@@ -1,0 +1,300 @@
+"""Quantities of branches and nodes replaced by coordinates, multipliers and implicit unknowns.
+
+A family may be cut into pieces that read differently.  Where an index runs over several pieces, `resolve` raises
+`_StraddleError` with the cut, and whoever owns the loop (a statement or a sum) cuts it there and begins again.  Bounds
+stay symbolic, so a statement becomes as many loops as there are pieces, whatever their size.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Sizes, box_holds
+from sysdyn.compiler.network.primal.incidence import Contact, Element
+from sysdyn.compiler.network.primal.series import Member
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    call,
+    const,
+    index,
+    linear,
+    mul,
+    param,
+    rebuild,
+    reduction,
+    scale,
+    sub,
+    substitute,
+    time_derivative,
+    to_text,
+    topological,
+    topological_unbound,
+    var,
+    variables,
+)
+from sysdyn.dsl.model.network import Loop
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+
+Result = TypeVar("Result")
+KINDS = frozenset(("be", "bf", "bq", "bp", "ne", "nf", "nq", "np"))
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """The values of a loop variable; one whose bounds follow another index cannot be cut."""
+
+    interval: Interval
+    cuttable: bool = True
+
+
+Ranges = Mapping[str, Range]
+
+
+class _StraddleError(Exception):
+    """An index runs over two pieces: its loop is to be cut before `at`."""
+
+    def __init__(self, loop: str, at: Bound, name: str) -> None:
+        super().__init__(loop)
+        self.loop, self.at, self.name = loop, at, name
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Branches of a family that read alike."""
+
+    box: Box
+    element: Element
+    member: Member | None = None
+
+
+@dataclass(slots=True)
+class Book:
+    """All that is needed to read: pieces by family, efforts and momenta by element, contents by element.
+
+    A content is the name of a constant, and whether that is a parameter.
+    """
+
+    pieces: dict[str, list[Piece]]
+    efforts: dict[int, Node]
+    momenta: dict[int, Node]
+    nodes: Callable[[Reader, Node, Ranges, tuple[Node, ...]], Node]
+    contents: dict[int, tuple[str, bool]] = field(default_factory=dict)
+
+
+def touches_network(root: Node) -> bool:
+    """Whether a quantity of a branch or node occurs."""
+    return any(n.op == "var" and n.data[1] in KINDS for n in variables(root))
+
+
+class Reader:
+    """Resolves expressions of one network."""
+
+    def __init__(self, sizes: Sizes, book: Book) -> None:
+        self.sizes = sizes
+        self.book = book
+        self.place: Place | None = None
+        self._serial = itertools.count()
+
+    # -- statements ---------------------------------------------------------------------------------------------
+
+    def statement(
+        self, loops: tuple[Loop, ...], roots: Sequence[Node], place: Place
+    ) -> Iterator[tuple[tuple[Loop, ...], tuple[Node, ...]]]:
+        """The statement's loops and expressions, cut where what they read changes."""
+        if not any(touches_network(root) for root in roots):
+            yield loops, tuple(roots)
+            return
+        yield from self.cut(loops, place, lambda ranges: tuple(self.resolve(root, ranges) for root in roots))
+
+    def cut(
+        self, loops: tuple[Loop, ...], place: Place, work: Callable[[Ranges], Result]
+    ) -> Iterator[tuple[tuple[Loop, ...], Result]]:
+        """What `work` finds for the ranges of the loops, which are cut until it finds one thing only."""
+        self.place = place
+        ranges: dict[str, Range] = {}
+        for loop in loops:
+            ranges[loop.index] = self.range_of(loop.first, loop.last, ranges)
+            if not ranges[loop.index].interval.size:
+                return
+        try:
+            result = work(ranges)
+        except _StraddleError as found:
+            self._check(found, ranges)
+            k = next(k for k, loop in enumerate(loops) if loop.index == found.loop)
+            for part in _halves(loops[k], found.at):
+                yield from self.cut((*loops[:k], part, *loops[k + 1 :]), place, work)
+            return
+        yield loops, result
+
+    def scalar(self, root: Node, place: Place) -> Node:
+        """An expression outside all loops."""
+        ((_, (resolved,)),) = self.statement((), (root,), place)
+        return resolved
+
+    def _check(self, found: _StraddleError, ranges: Ranges) -> None:
+        if found.loop not in ranges or not ranges[found.loop].cuttable:
+            text = f"{found.name} changes its meaning along {found.loop}, whose range follows another index"
+            raise ModelError([Diagnostic("E806", f"{text}: it would have to be unrolled", self.place)])
+
+    def range_of(self, first: Node, last: Node, outer: Ranges) -> Range:
+        """The range of a loop inside others."""
+        held = {name: r.interval for name, r in outer.items()}
+        ends = [self.sizes.affine(node, held, self.place) for node in (first, last)]
+        low, high = (a.over(held) for a in ends)
+        return Range(Interval(low.first, high.last), all(a.loop is None for a in ends))
+
+    # -- expressions --------------------------------------------------------------------------------------------
+
+    def resolve(self, root: Node, ranges: Ranges, active: tuple[Node, ...] = ()) -> Node:
+        """The expression without quantities of branches and nodes."""
+        if not touches_network(root):
+            return root
+        done: dict[Node, Node] = {}
+        for node in topological_unbound([root]):
+            if node.op == "var" and node.data[1] in KINDS:
+                done[node] = self._read(node, ranges, active)
+            elif node.op == "reduce":
+                done[node] = self._reduced(node, (done[node.args[0]], done[node.args[1]]), ranges, active)
+            else:
+                done[node] = rebuild(node, tuple(done[a] for a in node.args))
+        return done[root]
+
+    def _reduced(self, node: Node, ends: tuple[Node, Node], ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        operator, name = node.data
+        body = node.args[2]
+        if not touches_network(body):
+            return reduction(operator, name, *ends, body)
+        own = self.range_of(*ends, ranges)
+        if not own.interval.size and operator in ("sum", "prod"):
+            return const(0.0 if operator == "sum" else 1.0)
+        try:
+            return reduction(operator, name, *ends, self.resolve(body, {**ranges, name: own}, active))
+        except _StraddleError as found:
+            if found.loop != name:
+                raise
+            self._check(found, {name: own})
+            halves = _halves(Loop(name, *ends), found.at)
+            parts = [self._reduced(node, (h.first, h.last), ranges, active) for h in halves]
+        match operator:
+            case "sum":
+                return add(*parts)
+            case "prod":
+                return mul(*parts)
+            case _:
+                return call(operator, *parts)
+
+    def _read(self, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        if node in active:
+            text = f"{node.data[0]} is defined in a circle: {to_text(node)}"
+            raise ModelError([Diagnostic("E105", text, self.place)])
+        name, kind, order = node.data
+        inside = (*active, node)
+        if kind in ("nq", "nf", "np"):
+            return var(name, kind[1], *node.args, order=order)
+        if kind == "ne":
+            return self.book.nodes(self, node, ranges, inside)
+        if order:
+            plain = self.resolve(var(name, kind, *node.args), ranges, active)
+            return self._derivative(plain, node)
+        piece = self.piece(name, node.args, ranges)
+        if kind in ("bq", "bf"):
+            return self._moving(node, piece, ranges, inside)
+        known = self.book.efforts if kind == "be" else self.book.momenta
+        if piece.element.number in known:
+            return self.resolve(self.at_piece(known[piece.element.number], piece, node.args), ranges, inside)
+        plain_ends = piece.element.ends
+        if kind == "be" and len(plain_ends) == 2 and piece.element.branch.domain.common == "effort":
+            plus, minus = (self._end(c, "ne", piece, node.args) for c in plain_ends)
+            return self.resolve(sub(plus, minus), ranges, inside)
+        what = "effort" if kind == "be" else "momentum"
+        text = f"{name} has no {what} of its own: a {piece.element.branch.kind} branch"
+        raise ModelError([Diagnostic("E102", text, self.place)])
+
+    def _derivative(self, plain: Node, node: Node) -> Node:
+        try:
+            return time_derivative(plain)
+        except ValueError as cause:
+            text = f"{to_text(node)}: the derivative of {cause} is not known"
+            raise ModelError([Diagnostic("E518", text, self.place)]) from None
+
+    def _moving(self, node: Node, piece: Piece, ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        """Displacement or flow of a branch."""
+        kind, branch = node.data[1], piece.element.branch
+        if piece.member is not None:
+            m = piece.member
+            value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args)))
+            content = self.book.contents.get(piece.element.number)
+            if kind == "bf" or content is None:
+                return value
+            constant, fixed = content
+            return add(value, param(constant, *node.args) if fixed else var(constant, "s", *node.args))
+        if branch.on is not None:
+            value = self.at_piece(branch.on, piece, node.args)
+            return self.resolve(value if kind == "bq" else self._derivative(value, node), ranges, active)
+        ends = [self._end(c, "n" + kind[1], piece, node.args) for c in piece.element.ends]
+        return self.resolve(sub(*ends), ranges, active)
+
+    def _end(self, contact: Contact, kind: str, piece: Piece, at: tuple[Node, ...]) -> Node:
+        """A quantity of the node at one end; that of a common-flow ground is zero."""
+        if contact.node.startswith("#ground ") and kind != "ne":
+            return const(0.0)
+        loops = piece.element.loops_at(at)
+        return var(contact.node, kind, *(a.at(loops) for a in contact.at))
+
+    def at_piece(self, root: Node, piece: Piece, at: tuple[Node, ...]) -> Node:
+        """An expression over an element's loops at the indices of its name; sums inside get variables of their own."""
+        change = {index(name): node for name, node in piece.element.loops_at(at).items()}
+        return substitute(self._renamed(root), change)
+
+    def _renamed(self, root: Node) -> Node:
+        done: dict[Node, Node] = {}
+        nodes = topological([root])
+        if all(node.op != "reduce" for node in nodes):
+            return root
+        for node in nodes:
+            args = tuple(done[a] for a in node.args)
+            if node.op == "reduce":
+                own = f"#n{next(self._serial)}"
+                body = substitute(args[2], {index(node.data[1]): index(own)})
+                done[node] = reduction(node.data[0], own, args[0], args[1], body)
+            else:
+                done[node] = rebuild(node, args)
+        return done[root]
+
+    # -- where --------------------------------------------------------------------------------------------------
+
+    def affine(self, at: tuple[Node, ...], ranges: Ranges) -> tuple[Affine, ...]:
+        """Indices as affine forms."""
+        return tuple(self.sizes.affine(node, ranges.keys(), self.place) for node in at)
+
+    def piece(self, name: str, at: tuple[Node, ...], ranges: Ranges) -> Piece:
+        """The piece of a branch family that a reference lies in."""
+        pieces = self.book.pieces.get(name, [])
+        return pieces[self.locate(name, at, [p.box for p in pieces], ranges)]
+
+    def locate(self, name: str, at: tuple[Node, ...], boxes: Sequence[Box], ranges: Ranges) -> int:
+        """The box that holds a reference; _StraddleError where it runs over several, E805 where over none."""
+        places = self.affine(at, ranges)
+        held = {loop: r.interval for loop, r in ranges.items()}
+        reach = tuple(a.over(held) for a in places)
+        for k, box in enumerate(boxes):
+            if len(box) == len(reach) and box_holds(box, reach):
+                return k
+        corner = tuple(Interval(i.first, i.first) for i in reach)
+        for box in boxes:
+            if len(box) == len(corner) and box_holds(box, corner):
+                k = next(k for k, (b, r) in enumerate(zip(box, reach, strict=True)) if not b.holds(r))
+                loop = places[k].loop
+                assert loop is not None
+                raise _StraddleError(loop, box[k].last.plus(1).minus(places[k].offset), name)
+        text = ", ".join(str(i.first.value) for i in reach)
+        raise ModelError([Diagnostic("E805", f"{name}[{text}] is outside its range", self.place)])
+
+
+def _halves(loop: Loop, at: Bound) -> tuple[Loop, Loop]:
+    before = linear(-1.0, ((1.0, at.node),))
+    return Loop(loop.index, loop.first, before), Loop(loop.index, at.node, loop.last)

@@ -1,0 +1,211 @@
+"""Network -> its reflection on Paynter's diagram: the complementary formulations are the primal ones of the reflection.
+
+Effort and flow, momentum and displacement, kinetic and potential stores, common-effort and common-flow nodes, T* and
+V*, T and V, D and G change places (book, chapter 5).  What the primal arrows then call a displacement is a momentum,
+and Lagrange's equations of the reflection are the co-Lagrangian equations of the network: one lowering serves both.
+
+Signs carry over: a branch a -> b has e = e(a) - e(b) at common-effort and f = f(a) - f(b) at common-flow nodes.  An
+energy or content written over one node, or over the difference of two, is the element between them.  Displacements
+that no potential store holds, and initial positions: see `positions`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from sysdyn.compiler.model.terms import summands, vanishes
+from sysdyn.compiler.network.islands import grounded
+from sysdyn.compiler.network.linkages import with_linkages
+from sysdyn.compiler.network.positions import from_stores, massive, with_contents, with_quadratures
+from sysdyn.compiler.network.primal.reading import KINDS
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import (
+    Branch,
+    Coordinate,
+    Coupling,
+    Domain,
+    Energy,
+    Network,
+    Slope,
+    Terminal,
+)
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place
+
+_KINDS = {"be": "bf", "bf": "be", "bq": "bp", "bp": "bq", "ne": "nf", "nf": "ne"}
+_FUNCTIONS = {"T*": "V*", "V*": "T*", "T": "V", "V": "T", "D": "G", "G": "D"}
+_ELEMENTS = {"kinetic": "potential", "potential": "kinetic", "effort": "flow", "flow": "effort"}
+_SIDES = {"e": "f", "f": "e", "p": "q", "q": "p"}
+
+
+def reflect(network: Network) -> Network:
+    """The reflected network; written momentum coordinates become displacement coordinates.
+
+    The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
+    displacement or flow of a node or branch.
+    """
+    bare = with_linkages(from_stores(grounded(as_elements(network))))
+    network = with_contents(*with_quadratures(bare))
+    # quadratures for traces change nothing in the model where a mass on the node tells its flow
+    read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
+    return replace(
+        network,
+        coordinates=tuple(_coordinate(c) for c in network.coordinates),
+        energies=tuple(
+            replace(e, function=_FUNCTIONS[e.function], expression=_node(e.expression)) for e in network.energies
+        ),
+        works=tuple(replace(w, effort=_node(w.effort), on=_node(w.on)) for w in network.works),
+        constraints=tuple(replace(c, expression=_node(c.expression)) for c in network.constraints),
+        dynamics=tuple(replace(d, expression=_node(d.expression)) for d in network.dynamics),
+        initials=tuple(replace(i, target=_node(i.target)) for i in network.initials),
+        observations=tuple(replace(o, expression=_node(o.expression)) for o in network.observations),
+        expectations=tuple(
+            replace(e, left=_node(e.left), right=_node(e.right), within=None if e.within is None else _node(e.within))
+            for e in network.expectations
+        ),
+        nodes=tuple(replace(n, domain=_domain(n.domain)) for n in network.nodes),
+        branches=tuple(_branch(b) for b in network.branches),
+        couplings=tuple(_coupling(c) for c in network.couplings),
+        slopes=tuple(_moduli(network.couplings)),
+        read=read,
+    )
+
+
+def _node(root: Node) -> Node:
+    """The expression with the quantities of nodes and branches, and the audit's of their stores, reflected."""
+    change = {}
+    for node in ex.topological([root]):
+        if node.op == "var" and node.data[1] in _KINDS:
+            family, kind, order = node.data
+            change[node] = ex.var(family, _KINDS[kind], *node.args, order=order)
+        elif node.op == "var" and node.data[1] == "audit" and node.data[0] in _ELEMENTS:
+            change[node] = ex.var(_ELEMENTS[node.data[0]], "audit")
+    return ex.substitute(root, change) if change else root
+
+
+def _domain(domain: Domain) -> Domain:
+    return replace(
+        domain,
+        effort=domain.flow,
+        flow=domain.effort,
+        momentum=domain.displacement,
+        displacement=domain.momentum,
+        common="flow" if domain.common == "effort" else "effort",
+    )
+
+
+def _coordinate(c: Coordinate) -> Coordinate:
+    """A momentum coordinate's units stand already where the primal arrows look for those of a displacement."""
+    return replace(c, complementary=not c.complementary)
+
+
+def _energy(e: Energy) -> Energy:
+    return replace(e, function=_FUNCTIONS[e.function], expression=_node(e.expression))
+
+
+def _branch(b: Branch) -> Branch:
+    law = None if b.law is None else _node(b.law)
+    side = None if b.side is None else _SIDES[b.side]
+    return replace(b, domain=_domain(b.domain), kind=_ELEMENTS.get(b.kind, b.kind), side=side, law=law)
+
+
+def _coupling(c: Coupling) -> Coupling:
+    ratio = _node(c.ratio)
+    if c.kind == "transformer":
+        return replace(c, side=_SIDES[c.side], ratio=ratio)
+    # e1 = r f2 reads f1 = r e2 in the reflection: e2 = f1/r and with e1 f1 + e2 f2 = 0 e1 = -f2/r
+    return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), ratio)))
+
+
+def _moduli(couplings: Iterable[Coupling]) -> Iterator[Slope]:
+    """The moduli that are divided by."""
+    for c in couplings:
+        if c.kind == "gyrator" and not ex.is_const(c.ratio) and not ex.variables(c.ratio):
+            yield Slope(c.first.rpartition(".")[0] or c.first, c.ratio, c.loops, False, c.place)
+
+
+def _read(network: Network) -> Iterable[str]:
+    """Common-flow nodes whose flow an equation reads: common-effort nodes of the reflection."""
+    roots = [c.expression for c in network.constraints] + [d.expression for d in network.dynamics]
+    roots += [b.law for b in network.branches if b.law is not None] + [c.ratio for c in network.couplings]
+    roots += [n for w in network.works for n in (w.effort, w.on)]
+    return (n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] == "nf")
+
+
+# -- written energies as elements --------------------------------------------------------------------------
+
+_STORES = {
+    "V": ("potential", "nq", "bq", "e"),
+    "T*": ("kinetic", "nf", "bf", "p"),
+    "D": ("dissipator", "nf", "bf", "e"),
+}
+
+
+def as_elements(network: Network) -> Network:
+    """Energies and contents over one node, or over the difference of two, as the branches that they are."""
+    if not network.nodes:
+        return network
+    nodes = {n.name: n.domain for n in network.nodes}
+    kept, made = [], []
+    for number, energy in enumerate(network.energies):
+        for pieces in (summands(energy.expression), [energy.expression]):
+            names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]
+            found = [_element(energy, piece, name, nodes) for piece, name in zip(pieces, names, strict=True)]
+            branches = [b for b in found if b is not None]
+            if len(branches) == len(pieces):
+                made += branches
+                break
+        else:
+            kept.append(energy)
+    return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
+
+
+def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
+    """The branch whose law is the slope of an energy over u = x(a) - x(b), or None."""
+    store = _STORES.get(energy.function)
+    if store is None:
+        return None
+    kind, node_kind, own_kind, side = store
+    used = sorted((n for n in ex.variables(piece) if n.op == "var"), key=lambda n: n.number)
+    if not 1 <= len(used) <= 2 or any(n.data[1] != node_kind or n.data[2] for n in used):
+        return None
+    a, b = used[0], used[1] if len(used) == 2 else None
+    slope = ex.derivative(piece, a)
+    if b is not None and not vanishes(slope, ex.derivative(piece, b)):
+        return None
+    at = tuple(ex.index(loop.index) for loop in energy.loops)
+    own = ex.var(name, own_kind, *at)
+    law = ex.substitute(slope, {a: own} if b is None else {a: own, b: ex.const(0.0)})
+    minus = Terminal(None, ()) if b is None else Terminal(b.data[0], b.args)
+    plus = Terminal(a.data[0], a.args)
+    return Branch(name, at, energy.loops, nodes[a.data[0]], kind, side, law, plus, minus, None, energy.place)
+
+
+def unreflectable(network: Network) -> Diagnostic | None:
+    """The first statement that reads a displacement or flow where only momenta and efforts may stand (E602)."""
+    network = as_elements(network)
+    help_ = "formulation lagrangian, hamiltonian"
+    statements: list[tuple[str, tuple[ex.Node, ...], Place]] = [
+        (f"energy {e.function}", (e.expression,), e.place) for e in network.energies
+    ]
+    statements += [("work", (w.effort, w.on), w.place) for w in network.works]
+    gammas = [(f"gamma {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind == "gamma"]
+    statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind != "gamma"]
+    laws = [(f"law of {b.name}", (b.law,), b.place) for b in network.branches if b.law is not None]
+    moduli = [(f"ratio of {c.first.partition('#')[0]}", (c.ratio,), c.place) for c in network.couplings]
+    for what, roots, place in statements:
+        for node in ex.topological(roots):
+            if node.op == "var" and node.data[1] in KINDS:
+                message = f"{what} is written in {node}: it has no counterpart in the complementary family"
+                return Diagnostic("E602", message, place, help_)
+    for what, roots, place in (*laws, *moduli, *gammas):
+        own = what.removeprefix("law of ")
+        for node in ex.topological(roots):
+            if node.op == "var" and node.data[1] in ("nq", "bq") and node.data[0] != own:
+                return Diagnostic("E602", f"{what} depends on displacement {node}", place, help_)
+    wrong = next((b for b in network.branches if b.on is not None), None)
+    if wrong is not None:
+        message = f"'{wrong.name}' acts along an expression of displacements"
+        return Diagnostic("E602", message, wrong.place, help_)
+    return None

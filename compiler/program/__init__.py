@@ -1,0 +1,1 @@
+"""Descriptor form to program, C or NumPy text, and a loaded library."""

@@ -1,0 +1,213 @@
+"""Program -> C text, after runtime/core/model.h: functions sd_<block>_rows, _dy, _dyd.
+
+One loop a kernel, one static function a routine.  The text holds no name of the user's: unknowns are places, rows
+numbers (the manifest has the names).  Sizes and parameters are read from ix and p, so arrays of any length give the
+same text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.compiler.model.integers import Reference
+from sysdyn.compiler.program.emit_c_support import HEAD, SUPPORT
+from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
+from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
+
+C = Notation("sqrt", "pow", "sd_whole", "INFINITY", "NAN")
+
+_ARGUMENTS = (
+    "const double *restrict p, const int32_t *restrict ix, const int32_t *restrict at, const int32_t *restrict to, "
+    "double t, const double *restrict y, const double *restrict yd, double *restrict {out}"
+)
+_FUNCTIONS = {
+    "ln": "log", "abs": "fabs", "min": "sd_min", "max": "sd_max", "sign": "sd_sign", "step": "sd_step", "mod": "sd_mod",
+}  # fmt: skip
+_BOOLEAN = ("cmp", "and", "or", "not")
+
+
+def emit_c(program: Program, form: DescriptorForm) -> str:
+    """The C text of a program."""
+    bodies = [_routine(k, routine, form) for k, routine in enumerate(program.routines)]
+    text = "\n".join(bodies)
+    used = [code for name, code in SUPPORT if f"{name}(" in text]
+    blocks = [_block(name, part, program) for name in program.blocks() for part in ("rows", "dy", "dyd")]
+    return "\n".join([HEAD, *used, text, *(b for b in blocks if b)])
+
+
+def _loop(k: int) -> str:
+    return f"i{k}"
+
+
+def _operand(value: Operand) -> str:
+    return f"a{value}" if isinstance(value, int) else number(value, C)
+
+
+def _routine(k: int, routine: Routine, form: DescriptorForm) -> str:
+    writer = _Writer(routine)
+    body = writer.body(routine.body, "    " * (len(routine.loops) + 1))
+    lines = [f"/* {_comment(routine, form)} */"]
+    out = "r" if routine.part == "rows" else "v"
+    kind = "SD_APART void " if out == "r" else "SD_APART double *"
+    lines.append(f"static {kind}f{k}({_ARGUMENTS.format(out=out)})\n{{")
+    unused = [n for n in ("p", "ix", "at", "to", "t", "y", "yd") if n not in writer.used]
+    lines += [f"    {''.join(f'(void){n}; ' for n in unused).strip()}"] if unused else []
+    lines += writer.bases
+    for depth, (first, last) in enumerate(routine.loops):
+        name = _loop(depth)
+        head = f"for (ptrdiff_t {name} = {bound(first, _loop)}; {name} <= {bound(last, _loop)}; ++{name}) {{"
+        lines.append("    " * (depth + 1) + head)
+    lines += body
+    if out == "v" and routine.loops:
+        lines.append("    " * (len(routine.loops) + 1) + f"v += {routine.entries};")
+    lines += ["    " * (depth + 1) + "}" for depth in reversed(range(len(routine.loops)))]
+    if out == "v":
+        lines.append("    return v;")
+    return "\n".join([*lines, "}", ""])
+
+
+def _comment(routine: Routine, form: DescriptorForm) -> str:
+    rows = []
+    for row in routine.rows[:8]:
+        equations = form.rows[row]
+        line = f" (line {equations.place.start[0]})" if equations.place else ""
+        rows.append(f"row {row}: {equations.kind}{line}")
+    more = f", and {len(routine.rows) - 8} more" if len(routine.rows) > 8 else ""
+    return f"{routine.block}, {routine.part}: {', '.join(rows)}{more}"
+
+
+class _Writer:
+    """Statements of one routine as C; places that no loop enters are computed before the loops."""
+
+    def __init__(self, routine: Routine) -> None:
+        self.routine = routine
+        self.bases: list[str] = []
+        self.used: set[str] = {"ix"} if routine.loops else set()
+        self._names: dict[str, str] = {}
+
+    def body(self, statements: Sequence[Statement], indent: str) -> list[str]:
+        """Lines of statements."""
+        lines: list[str] = []
+        for s in statements:
+            match s:
+                case Assign():
+                    kind = "int" if s.op in _BOOLEAN else "double"
+                    lines.append(f"{indent}const {kind} a{s.target} = {self.value(s)};")
+                case Fold():
+                    lines += self.fold(s, indent)
+                case Store():
+                    lines.append(indent + self.store(s))
+        return lines
+
+    def store(self, s: Store) -> str:
+        """r[place] += value, or v[entry] = value."""
+        value = _operand(s.value)
+        if isinstance(s.place, Reference):
+            return f"r[{self.place(s.place, 'to')}] += {value};"
+        return f"v[{s.place}] = {value};"
+
+    def fold(self, s: Fold, indent: str) -> list[str]:
+        """A loop that accumulates."""
+        start = {"sum": "0.0", "prod": "1.0", "min": "INFINITY", "max": "(-INFINITY)"}[s.operator]
+        a, i, value = f"a{s.target}", _loop(s.loop), _operand(s.value)
+        self.used.add("ix")
+        step = {
+            "sum": f"{a} += {value};",
+            "prod": f"{a} *= {value};",
+            "min": f"{a} = sd_min({a}, {value});",
+            "max": f"{a} = sd_max({a}, {value});",
+        }[s.operator]
+        head = f"for (ptrdiff_t {i} = {bound(s.first, _loop)}; {i} <= {bound(s.last, _loop)}; ++{i}) {{"
+        inner = self.body(s.body, indent + "    ")
+        return [f"{indent}double {a} = {start};", indent + head, *inner, f"{indent}    {step}", indent + "}"]
+
+    def place(self, place: Reference, table: str) -> str:
+        """The position of an element in y, yd (table at) or r (table to)."""
+        self.used.add(table)
+        fixed, moving = position(place, f"{table}[{place.family}]", _loop, True)
+        return self._joined(fixed, moving)
+
+    def _joined(self, fixed: str, moving: str) -> str:
+        if "ix[" in fixed:
+            self.used.add("ix")
+            if self.routine.loops:
+                fixed = self._base(fixed)
+        return f"{fixed} + {moving}" if moving else fixed
+
+    def _base(self, text: str) -> str:
+        if text not in self._names:
+            self._names[text] = f"b{len(self._names)}"
+            self.bases.append(f"    const ptrdiff_t {self._names[text]} = {text};")
+        return self._names[text]
+
+    def value(self, s: Assign) -> str:
+        """The right-hand side of an assignment."""
+        args = [_operand(a) for a in s.args]
+        match s.op:
+            case "y" | "yd":
+                self.used.add(s.op)
+                return f"{s.op}[{self.place(s.data, 'at')}]"
+            case "p":
+                self.used.add("p")
+                return f"p[{s.data}]"
+            case "element":
+                self.used.update(("p", "ix"))
+                return f"p[{self._joined(*position(s.data, '', _loop, True))}]"
+            case "time":
+                self.used.add("t")
+                return "t"
+            case "index":
+                return f"(double){_loop(s.data)}"
+            case "sum":
+                return total(s.data, args, C)
+            case "mul":
+                return factors(s.data, args, C)
+            case "pow":
+                return f"pow({args[0]}, {args[1]})"
+            case "call":
+                return f"{_FUNCTIONS.get(s.data, s.data)}({', '.join(args)})"
+            case "cond":
+                return f"{args[0]} ? {args[1]} : {args[2]}"
+            case "cmp":
+                return f"{args[0]} {s.data} {args[1]}"
+            case "and" | "or":
+                return (" && " if s.op == "and" else " || ").join(args)
+            case "not":
+                return f"!{args[0]}"
+            case "table":
+                return self.table(s, args)
+        raise AssertionError(s.op)
+
+    def table(self, s: Assign, args: list[str]) -> str:
+        """A call of a table's evaluation."""
+        orders, start, sizes, clamped = s.data
+        self.used.update(("p", "ix"))
+        if len(args) == 1:
+            return f"sd_table(p + ix[{start}], ix[{sizes[0]}], {args[0]}, {orders[0]})"
+        where = f"p + ix[{start}], ix[{sizes[0]}], ix[{sizes[1]}], ix[{clamped}]"
+        return f"sd_table2({where}, {args[0]}, {args[1]}, {orders[0]}, {orders[1]})"
+
+
+def _block(name: str, part: str, program: Program) -> str:
+    """The exported function of a block's part: its routines in order."""
+    numbers = [k for k, r in enumerate(program.routines) if r.block == name and r.part == part]
+    if not numbers:
+        return ""
+    out = "r" if part == "rows" else "v"
+    head = (
+        f"void sd_{name}_{part}(const sd_frame *frame, double t, const double *y, const double *yd, double *{out})\n{{"
+    )
+    lines = [head]
+    for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
+        routine = program.routines[k]
+        call = f"f{k}(frame->p, frame->ix, frame->at, frame->to, t, y, yd, {out})"
+        if part != "rows":
+            call = f"v = {call}" if routine.loops else f"(void){call}"
+        lines.append(f"    {call};")
+        last = later < 0 or program.routines[later].kernel != routine.kernel
+        if part != "rows" and not routine.loops and last:
+            lines.append(f"    v += {routine.entries};")
+    if part != "rows":
+        lines.append("    (void)v;")
+    return "\n".join([*lines, "}", ""])

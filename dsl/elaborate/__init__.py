@@ -1,0 +1,1 @@
+"""Syntax tree to network: instances, levels, scenes, tables, files."""

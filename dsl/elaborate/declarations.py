@@ -1,0 +1,257 @@
+"""Declarations: coordinates, implicit unknowns, states, nodes, inputs, lets and outputs, labels."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+
+from sysdyn.dsl.elaborate.parameters import Parameters
+from sysdyn.dsl.elaborate.parts import declared
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Coordinate, Initial, NodeFamily, Parameter, State, Unknown
+from sysdyn.dsl.model.units import NONE, Dimension, si
+from sysdyn.dsl.names.calls import walk
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.symbols import (
+    BundleNode,
+    BundleSymbol,
+    ConstraintSymbol,
+    Definition,
+    DomainSymbol,
+    Family,
+    NodeSymbol,
+    ParameterSymbol,
+    PortSymbol,
+    UnknownSymbol,
+    Unsupported,
+    nearest,
+)
+from sysdyn.dsl.text.diagnostics import Related
+from sysdyn.dsl.tree import syntax
+
+_LATER = {
+    syntax.Discrete: "discrete variable",
+    syntax.When: "when",
+    syntax.Every: "every",
+}
+
+
+class Declarations(Parameters):
+    """Brings the names of a space into scope."""
+
+    def declare(self, statement: syntax.Statement) -> None:
+        """One declaration; statements of other kinds are passed over."""
+        match statement:
+            case syntax.Coord():
+                self._coordinates(statement)
+            case syntax.Implicit():
+                unit = self.unit(statement.unit)
+                for decl in statement.decls:
+                    family = self.current.family(decl.name, self.shape(decl))
+                    self._unknown(decl, "e", family, unit.dimension, None, False)
+                    self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.place(decl.span)))
+                    if statement.init is not None:
+                        self._own_initial(decl, "e", family, unit.dimension, statement.init)
+            case syntax.State():
+                self._state(statement)
+            case syntax.Node():
+                self._nodes(statement)
+            case syntax.Let() | syntax.Output() | syntax.Quasi():
+                self._definition(statement)
+            case syntax.Constraint():
+                decl = statement.decl
+                family = self.current.family(decl.name)
+                self.enter(ConstraintSymbol(decl.name, statement.kind, family, self.place(decl.span)))
+            case _:
+                self._later(statement)
+
+    def _later(self, statement: syntax.Statement) -> None:
+        what = _LATER.get(type(statement))
+        if what is None:
+            return
+        decls = declared(statement)
+        names = ", ".join(f"'{d.name}'" for d in decls)
+        message = " ".join(filter(None, (what, names, "is not supported yet (planned: events and discrete time)")))
+        self.report.note("N608", message, self.place(statement.span))
+        for decl in decls:
+            self.enter(Unsupported(decl.name, what, self.place(decl.span)))
+
+    def _unknown(
+        self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, domain: DomainSymbol | None, co: bool
+    ) -> None:
+        self.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.place(decl.span)))
+
+    def _nodes(self, statement: syntax.Node) -> None:
+        bundle = self.scope.find(statement.domain.name)
+        if isinstance(bundle, BundleSymbol):
+            if statement.init is not None:
+                message = "a bundle has no single initial value"
+                raise self.resolver.fail("E207", message, statement.init.span, help="init name.member.q = ...")
+            for decl in statement.decls:
+                members: dict[str, NodeSymbol | PortSymbol] = {}
+                for member, domain_name in bundle.members:
+                    domain = self.scope.find(domain_name)
+                    assert isinstance(domain, DomainSymbol)
+                    members[member] = self._node(decl, f"{decl.name}.{member}", domain)
+                self.enter(BundleNode(decl.name, members, self.place(decl.span)))
+            return
+        domain = self.domain(statement.domain)
+        for decl in statement.decls:
+            symbol = self._node(decl, decl.name, domain)
+            self.enter(symbol)
+            if statement.init is not None:
+                effort = domain.common == "effort"
+                unit = domain.effort if effort else domain.displacement
+                self._own_initial(decl, "ne" if effort else "nq", symbol.family, unit.dimension, statement.init)
+
+    def _node(self, decl: syntax.Decl, name: str, domain: DomainSymbol) -> NodeSymbol:
+        family = self.current.family(name, self.shape(decl))
+        place = self.place(decl.span)
+        self.parts.nodes.append(NodeFamily(family.name, family.whole, domain, place))
+        return NodeSymbol(name, family, domain, place)
+
+    def _coordinates(self, statement: syntax.Coord) -> None:
+        domain = self.domain(statement.domain)
+        co = statement.kind == "cocoord"
+        own, rate = (domain.momentum, domain.effort) if co else (domain.displacement, domain.flow)
+        conjugate, effort = (domain.displacement, domain.flow) if co else (domain.momentum, domain.effort)
+        for decl in statement.decls:
+            family = self.current.family(decl.name, self.shape(decl))
+            self._unknown(decl, "q", family, own.dimension, domain, co)
+            place = self.place(decl.span)
+            self.parts.coordinates.append(
+                Coordinate(family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place)
+            )
+            if statement.init is not None:
+                self._own_initial(decl, "q", family, own.dimension, statement.init)
+
+    def _own_initial(
+        self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, init: syntax.Initial
+    ) -> None:
+        """The initial value in a declaration: for all elements of the family."""
+        message = f"'{decl.name}' is in {dim.show(dimension)} but starts at {{}}"
+        with ExitStack() as stack:
+            at = tuple(
+                ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", first, last)).index)
+                for k, (first, last) in enumerate(family.shape)
+            )
+            value = self.resolver.wanted(init.value, dimension, "E207", message)
+            target = ex.var(family.name, kind, *family.prefix, *at)
+            self.add_initial(Initial(target, value, init.kind == "fixed", self.resolver.loops, self.place(init.span)))
+
+    def add_initial(self, initial: Initial, override: bool = False) -> None:
+        """Enter an initial value; a scene's replaces the model's."""
+        for k, before in enumerate(self.parts.initials):
+            if before.target is initial.target and before.loops == initial.loops:
+                if override:
+                    self.parts.initials[k] = initial
+                    return
+                related = (Related("first here", before.place),)
+                message = f"'{initial.target}' gets its initial value twice"
+                self.report.error("E106", message, initial.place, related=related)
+                raise Failed
+        self.parts.initials.append(initial)
+
+    def _state(self, statement: syntax.State) -> None:
+        decl = statement.decl
+        value = None if statement.value is None else self.resolver.scalar(statement.value)
+        unit = self.unit(statement.unit) if statement.unit else None
+        if unit is None:
+            unit = si((value.dimension or NONE) if value is not None else NONE)
+        family = self.current.family(decl.name, self.shape(decl))
+        self._unknown(decl, "s", family, unit.dimension, None, False)
+        self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))
+        if statement.value is not None:
+            init = syntax.Initial("fixed", statement.value, statement.value.span)
+            self._own_initial(decl, "s", family, unit.dimension, init)
+
+    def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:
+        decl = statement.decl
+        kind = {syntax.Let: "let", syntax.Output: "output", syntax.Quasi: "quasi"}[type(statement)]
+        dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.Quasi) else None
+        at: tuple[str, ...] = ()
+        implied = False
+        if decl.indices and not any(isinstance(i, syntax.Range) for i in decl.indices):
+            at = tuple(i.name for i in decl.indices if isinstance(i, syntax.Name))
+            if len(at) != len(decl.indices):
+                raise self.resolver.fail(
+                    "E806", f"'{decl.name}' is declared by its loop variables", decl.span, help="let x[i] = ..."
+                )
+        elif decl.indices and not isinstance(statement.value, syntax.Array):
+            help_ = f"for i in ... {{ {kind} {decl.name}[i] = ... }}"
+            raise self.resolver.fail(
+                "E806", f"the elements of '{decl.name}' are given by one formula", decl.span, help=help_
+            )
+        elif self.resolver.bound_loops():
+            at, implied = tuple(self.resolver.bound_loops()), True
+        place = self.place(decl.span)
+        if kind == "quasi":
+            self.parts.quasis.append(self.current.family(decl.name).name)
+        self.enter(Definition(decl.name, kind, statement.value, at, dimension, self.current, place, decl.span, implied))
+
+    def model_input(self, statement: syntax.Input) -> None:
+        """An input of the model itself: a scene may set it."""
+        decl = statement.decl
+        unit = self.unit(statement.unit)
+        place = self.place(decl.span)
+        if decl.indices:
+            raise self.resolver.fail("N608", f"an array of inputs ('{decl.name}') is not supported yet", decl.span)
+        self.parts.inputs[decl.name] = (unit, place)
+        self.resolver.inputs.add(decl.name)
+        if statement.value is None:
+            self.enter(ParameterSymbol(decl.name, self.current.family(decl.name), unit.dimension, False, place))
+            self.parts.parameters[decl.name] = Parameter(decl.name, (), unit, (), (), place)
+        else:
+            definition = Definition(
+                decl.name, "input", statement.value, (), unit.dimension, self.current, place, decl.span
+            )
+            self.enter(definition)
+            self.define_input(definition)
+
+    def define_input(self, definition: Definition) -> None:
+        """Give an input its value; one that holds a constant is a run-time value: setting it compiles nothing."""
+        name = definition.name
+        self.scope.symbols[name] = definition
+        if not self._is_constant(definition.expression):
+            return
+        unit = self.parts.inputs[name][0]
+        try:
+            with self.resolver.space(definition.space):
+                message = f"input '{name}' is declared {dim.show(unit.dimension)} but set to {{}}"
+                value = self.resolver.wanted(definition.expression, unit.dimension, "E207", message)
+        except Failed:
+            return
+        family = self.current.family(name)
+        self.scope.symbols[name] = ParameterSymbol(name, family, unit.dimension, False, definition.place)
+        self.parts.parameters[name] = Parameter(name, (), unit, (value,), (), definition.place)
+
+    def _is_constant(self, expression: syntax.Expr) -> bool:
+        """Whether an expression is made of numbers, parameters and constants only."""
+        seen: set[str] = set()
+        stack: list[syntax.Expr] = [expression]
+        while stack:
+            for node in walk(stack.pop()):
+                if isinstance(node, (syntax.Prime, syntax.Member, syntax.Reduction)):
+                    return False
+                if isinstance(node, syntax.Name) and node.name not in seen:
+                    seen.add(node.name)
+                    symbol = self.scope.find(node.name)
+                    if symbol is None and node.name in ("pi", "inf"):
+                        continue
+                    if isinstance(symbol, Definition) and symbol.kind == "const":
+                        stack.append(symbol.expression)
+                    elif not isinstance(symbol, ParameterSymbol):
+                        return False
+        return True
+
+    def domain(self, word: syntax.Word) -> DomainSymbol:
+        """The domain of that name; E202."""
+        symbol = self.scope.find(word.name)
+        if isinstance(symbol, DomainSymbol):
+            return symbol
+        domains = [n for n in self.scope.names() if isinstance(self.scope.find(n), DomainSymbol)]
+        near = nearest(word.name, domains)
+        if self.scope.is_broken(word.name):
+            raise Failed
+        help_ = f"'{near}'" if near else f"one of {', '.join(domains)}"
+        raise self.resolver.fail("E202", f"'{word.name}' is not a domain", word.span, help=help_)

@@ -1,0 +1,110 @@
+"""From a model as written to its parts: declarations first, then elements, then every statement resolved.
+
+A statement inside `for` is resolved once with its loops; a component is elaborated once a statement that instantiates
+it.  What a later issue builds (events, inequalities) is reported as N608 with its place, and the rest is still checked.
+"""
+
+from __future__ import annotations
+
+from sysdyn.dsl.elaborate.files import FileScope
+from sysdyn.dsl.elaborate.instances import Instances
+from sysdyn.dsl.elaborate.parts import flatten
+from sysdyn.dsl.elaborate.statements import STATEMENTS
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Dynamic, Initial, Loop, State
+from sysdyn.dsl.model.units import si
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.symbols import Definition, Scope, Space, Typed
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.tree import syntax
+
+
+class Elaborator(Instances):
+    """Elaborates one model of a file."""
+
+    def __init__(self, files: FileScope, model: syntax.Model, report: Report) -> None:
+        super().__init__(report)
+        self.files = files
+        self.model = model
+        self.source = files.file.source
+        self.space = Space("", Scope(files.scope), files.scope, self.source, component=model.name.name)
+        self._body = list(flatten(model.body))
+
+    def names(self) -> None:
+        """Bring the model's names into scope; values of inputs may change until `elements`."""
+        with self.entering(self.space):
+            for statement, _ in self._body:
+                if isinstance(statement, syntax.Broken):
+                    self.scope.broken |= statement.names
+            self.declare_parameters(self._body, {})
+            self.each(self._body, self._declared)
+            self.bodies.append((self.space, self._body))
+
+    def _declared(self, statement: syntax.Statement) -> None:
+        match statement:
+            case syntax.Input():
+                self.model_input(statement)
+            case syntax.Port() | syntax.Branch():
+                what = "port" if isinstance(statement, syntax.Port) else "branch"
+                message = f"a model has no {what}: nothing could be connected to it"
+                raise self.resolver.fail("E408", message, statement.span, help="node, or a component")
+            case syntax.Law():
+                raise self.resolver.fail("E303", "a law stands in a component with a branch", statement.span)
+            case syntax.Level():
+                raise self.resolver.fail("E803", "levels belong to components", statement.span)
+            case _:
+                self.declare(statement)
+
+    def elements(self) -> None:
+        """Elaborate the model's instances, those inside them, and the laws of all."""
+        with self.entering(self.space):
+            self.announce(self._body)
+        for space, body in self.bodies:
+            with self.entering(space):
+                self.each([s for s in body if isinstance(s[0], syntax.Law)], self.law)
+        for pending in self.pending:
+            with self.entering(pending.space):
+                try:
+                    pending.resolve()
+                except Failed:
+                    continue
+        for space, _ in self.bodies:
+            with self.entering(space):
+                self.lawless(space)
+
+    def statements(self) -> None:
+        """Resolve what the model and its instances say: constraints first, which others may read."""
+        self.resolver.complete = True
+        for space, body in self.bodies:
+            with self.entering(space):
+                self.each([s for s in body if isinstance(s[0], syntax.Constraint)], self.constraint)
+        for space, body in self.bodies:
+            with self.entering(space):
+                for kind, method in STATEMENTS.items():
+                    chosen = [s for s in body if isinstance(s[0], kind)]
+                    self.each(chosen, lambda s, m=method: m(self, s))
+                self._definitions()
+
+    def quadratures(self) -> None:
+        """States for the integrals that traces, lets and expectations read."""
+        for name, found in self.resolver.quadratures.items():
+            loops = tuple(Loop(f"#e{k}", first, last) for k, (first, last) in enumerate(found.shape))
+            at = tuple(ex.index(loop.index) for loop in loops)
+            state = ex.var(name, "s", *at)
+            self.parts.states.append(State(name, found.shape, si(found.dimension), found.place))
+            self.parts.dynamics.append(Dynamic(state, found.power, loops, found.place))
+            self.parts.given.add(name)
+            target = state if found.first is None else ex.sub(state, found.first)
+            self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
+
+    def _definitions(self) -> None:
+        """Resolve every let, output and quasi-velocity once, so that unused ones are checked too."""
+        for symbol in list(self.scope.symbols.values()):
+            if isinstance(symbol, Definition):
+                try:
+                    value = self.resolver.definition(symbol)
+                    if symbol.kind == "quasi" and isinstance(value, Typed):
+                        with self.resolver.space(symbol.space):
+                            self.virtual(value.node, f"quasi '{symbol.name}'", symbol.span)
+                except Failed:
+                    continue

@@ -1,0 +1,215 @@
+"""The names that a file declares: domains, bundles, units, constants, functions, tables, components, models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+from sysdyn.dsl.elaborate.tables import read_table
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model.network import Table
+from sysdyn.dsl.model.units import NONE, Unit, multiply
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.resolve import Resolver
+from sysdyn.dsl.names.symbols import (
+    BundleSymbol,
+    ComponentSymbol,
+    Definition,
+    DomainSymbol,
+    FunctionSymbol,
+    Scope,
+    Space,
+    Symbol,
+    TableSymbol,
+    nearest,
+)
+from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.diagnostics import Place, Related, Report, SourceText
+from sysdyn.dsl.tree import syntax
+
+LIBRARY = Path(__file__).parents[1] / "std"
+
+
+@cache
+def prelude() -> syntax.File:
+    """The file that is loaded before every other one."""
+    file, problems = parse(SourceText.read(LIBRARY / "prelude.sd", "std/prelude.sd"))
+    assert not problems, problems
+    return file
+
+
+class FileScope:
+    """A file's own names on top of the prelude's, the values of its tables, and the modules that it imports."""
+
+    def __init__(self, file: syntax.File, report: Report) -> None:
+        self.file = file
+        self.report = report
+        self.tables: dict[str, Table] = {}
+        self._modules: dict[Path, Scope | None] = {}
+        self.outer = Scope()
+        self._declare(prelude(), self.outer)
+        self.scope = Scope(self.outer)
+        self._declare(file, self.scope)
+
+    def _declare(self, file: syntax.File, scope: Scope) -> None:
+        for item in file.items:
+            if isinstance(item, syntax.Broken):
+                scope.broken |= item.names
+        for item in file.items:  # units first: everything else is written in them
+            if isinstance(item, (syntax.UnitAlias, syntax.UnitBase)):
+                self._unit(item, scope, file.source)
+        for item in file.items:
+            for symbol in self._symbols(item, scope, file.source):
+                self._enter(symbol, scope)
+
+    def _enter(self, symbol: Symbol, scope: Scope) -> None:
+        before = scope.symbols.get(symbol.name)
+        if before is not None:
+            related = (Related("first declared here", before.place),)
+            self.report.error("E106", f"'{symbol.name}' is declared twice", symbol.place, related=related)
+            return
+        scope.symbols[symbol.name] = symbol
+
+    def _unit(self, item: syntax.UnitAlias | syntax.UnitBase, scope: Scope, source: SourceText) -> None:
+        name = item.name.name
+        if name in scope.units:
+            self.report.error("E106", f"unit '{name}' is declared twice", Place(source, item.name.span))
+        elif isinstance(item, syntax.UnitBase):
+            scope.units[name] = Unit(((name, 1),), Fraction(1), name)
+        else:
+            resolver = Resolver(self.report)
+            try:
+                with resolver.within(scope, source):
+                    value = resolver.scalar(item.value)
+            except Failed:
+                return
+            if value.node.op != "const" or not 0.0 < value.node.data < float("inf"):
+                message = f"unit '{name}' is not a positive constant"
+                self.report.error("E201", message, Place(source, item.value.span))
+                return
+            scope.units[name] = Unit(value.dimension or NONE, Fraction(value.node.data), name)
+
+    def _symbols(self, item: syntax.TopLevel, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        match item:
+            case syntax.Domain():
+                yield from self._domain(item, scope, source)
+            case syntax.Bundle():
+                members = tuple((w.name, m.domain.name) for m in item.members for w in m.names)
+                yield BundleSymbol(item.name.name, members, Place(source, item.name.span))
+            case syntax.Component() | syntax.Model():
+                yield ComponentSymbol(item.name.name, item.body, scope, source, Place(source, item.name.span))
+            case syntax.Const():
+                span = item.name.span
+                place = Place(source, span)
+                space = Space("", scope, scope, source)
+                yield Definition(item.name.name, "const", item.value, (), None, space, place, span)
+            case syntax.Function():
+                yield FunctionSymbol(item, source, scope, Place(source, item.name.span))
+            case syntax.Table():
+                yield from self._table(item, scope, source)
+            case syntax.Import():
+                yield from self._import(item, source)
+
+    def _import(self, item: syntax.Import, source: SourceText) -> Iterator[Symbol]:
+        module = self._module(item, source)
+        if module is None:
+            for word in item.names:  # reported; what hangs on them is not reported again
+                self.scope.broken.add(word.name)
+            return
+        for word in item.names:
+            symbol = module.symbols.get(word.name)
+            unit = module.units.get(word.name)
+            if unit is not None:
+                self.scope.units[word.name] = unit
+            elif symbol is not None:
+                yield symbol
+            else:
+                near = nearest(word.name, module.symbols)
+                text = ".".join(item.module.names)
+                help_ = f"nearest exported name: '{near}'" if near else f"it exports {', '.join(module.symbols)}"
+                self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
+                self.scope.broken.add(word.name)
+
+    def _module(self, item: syntax.Import, source: SourceText) -> Scope | None:
+        """The names of a module: std.x from the library, others from the folder of the importing file."""
+        names = item.module.names
+        place = Place(source, item.module.span)
+        inside = names[0] == "std"
+        folder = LIBRARY if inside else Path(source.name).parent
+        path = folder.joinpath(*names[inside:]).with_suffix(".sd")
+        if path in self._modules:
+            found = self._modules[path]
+            if found is None:
+                self.report.error("E801", f"module '{'.'.join(names)}' imports itself", place)
+            return found
+        if not path.is_file():
+            modules = [p.stem for p in folder.glob("*.sd") if p.stem != "prelude"]
+            near = nearest(names[-1], modules)
+            head = "std." if inside else ""
+            help_ = f"nearest module: '{head}{near}'" if near else f"there are {', '.join(sorted(modules)) or 'none'}"
+            self.report.error("E103", f"there is no module '{'.'.join(names)}'", place, help=help_)
+            return None
+        self._modules[path] = None
+        file, problems = parse(SourceText.read(path, f"std/{path.name}" if inside else None))
+        self.report.extend(problems)
+        scope = Scope(self.outer)
+        before, self.scope = self.scope, scope
+        try:
+            self._declare(file, scope)
+        finally:
+            self.scope = before
+        self._modules[path] = scope
+        return scope
+
+    def _domain(self, item: syntax.Domain, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        units: dict[str, Unit] = {}
+        common, pseudo = "effort", None
+        for part in item.body:
+            match part:
+                case syntax.DomainRole():
+                    unit = read_unit(part.unit, scope, source, self.report)
+                    if unit is not None:
+                        units[part.kind] = unit
+                case syntax.DomainNode():
+                    common = part.common
+                case syntax.DomainPseudo():
+                    pseudo = read_unit(part.unit, scope, source, self.report)
+        place = Place(source, item.name.span)
+        missing = [k for k in ("effort", "flow", "momentum", "displacement") if k not in units]
+        if missing:
+            self.report.error("E210", f"domain {item.name.name}: its {missing[0]} is not given", place)
+            return
+        self._check_domain(item.name.name, units, pseudo, place)
+        e, f, p, q = (units[k] for k in ("effort", "flow", "momentum", "displacement"))
+        yield DomainSymbol(item.name.name, e, f, p, q, common, pseudo is not None, place)
+
+    def _check_domain(self, name: str, units: dict[str, Unit], pseudo: Unit | None, place: Place) -> None:
+        power = multiply(units["effort"].dimension, units["flow"].dimension)
+        want = dim.POWER if pseudo is None else pseudo.dimension
+        if power != want:
+            message = f"domain {name}: effort*flow is {dim.show(power)}, not {dim.show(want)}"
+            help_ = f"fix a unit, or declare 'pseudo: {dim.show(power)}'"
+            self.report.error("E210", message, place, help=help_)
+        for code, integral, rate in (("E211", "displacement", "flow"), ("E212", "momentum", "effort")):
+            wanted = multiply(units[rate].dimension, dim.TIME)
+            if units[integral].dimension != wanted:
+                letter = "q = int f dt" if integral == "displacement" else "p = int e dt"
+                edge = "bottom" if integral == "displacement" else "top"
+                message = f"domain {name}: {integral} is not the time integral of {rate} ({edge} edge: {letter})"
+                self.report.error(code, message, place, help=f"its unit should be {dim.show(wanted)}")
+
+    def _table(self, item: syntax.Table, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        heads = [(p.name, read_unit(p.unit, scope, source, self.report)) for p in item.params]
+        result = read_unit(item.result, scope, source, self.report)
+        units = [u for _, u in heads if u is not None]
+        if result is None or len(units) != len(heads):
+            return
+        place = Place(source, item.name.span)
+        arguments = tuple((name, unit.dimension) for (name, _), unit in zip(heads, units, strict=True))
+        yield TableSymbol(item.name.name, arguments, result.dimension, place)
+        table = read_table(item, units, result, source, self.report)
+        if table is not None:
+            self.tables[table.name] = table

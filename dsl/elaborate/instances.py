@@ -1,0 +1,337 @@
+"""Instances: `label: component(arguments) connections`, from elements between nodes to components within components.
+
+A builtin element becomes a branch (or two) with its law.  A component is a macro with a scope of its own: its ports
+are bound to nodes, its inputs to expressions, its parameters to values where the instance stands; then its body is
+elaborated under the label's path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from sysdyn.dsl.elaborate.elements import Elements
+from sysdyn.dsl.elaborate.head import Head
+from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
+from sysdyn.dsl.elaborate.parameters import Argument
+from sysdyn.dsl.elaborate.parts import Nested, flatten
+from sysdyn.dsl.elaborate.unit_variables import solve_units
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS, own_variables
+from sysdyn.dsl.names.symbols import (
+    BranchSymbol,
+    BundleNode,
+    BundleSymbol,
+    ComponentSymbol,
+    Definition,
+    DomainSymbol,
+    End,
+    Family,
+    InstanceSymbol,
+    NodeSymbol,
+    PortSymbol,
+    Scope,
+    Space,
+    Unsupported,
+    nearest,
+)
+from sysdyn.dsl.text.diagnostics import Place, Related, Report
+from sysdyn.dsl.tree import syntax
+
+BUILTINS = (*ONE_PORTS, *TWO_PORTS)
+
+
+class Instances(Elements):
+    """Elaborates instances."""
+
+    def __init__(self, report: Report) -> None:
+        super().__init__(report)
+        self.bodies: list[tuple[Space, list[Nested]]] = []
+        self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
+        self._waiting: dict[int, list[Callable[[], None]]] = {}  # instances not yet elaborated, by their symbol
+        self.resolver.awaken = self._awaken
+
+    def announce(self, statements: Sequence[Nested]) -> None:
+        """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
+        waiting = []
+        for statement, loops in statements:
+            if isinstance(statement, syntax.Instance):
+                try:
+                    waiting.append(self._announced(statement, loops))
+                except Failed:
+                    self.scope.broken.add(statement.decl.name)
+        for do in waiting:
+            do()
+
+    def _announced(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
+        name = s.component.names[0]
+        symbol = self.scope.find(name)
+        label = s.decl.name
+        if symbol is None and name in BUILTINS and len(s.component.names) == 1:
+            return lambda: self.each([(s, loops)], self._builtin)
+        if isinstance(symbol, Unsupported):
+            raise Failed
+        if not isinstance(symbol, ComponentSymbol):
+            if self.scope.is_broken(name):
+                raise Failed
+            components = [n for n in self.scope.names() if isinstance(self.scope.find(n), ComponentSymbol)]
+            near = nearest(name, (*components, *BUILTINS))
+            help_ = f"nearest name in scope: '{near}'" if near else "from std.x import " + name
+            raise self.resolver.fail("E101", f"unknown component '{name}'", s.component.span, help=help_)
+        before = self.scope.symbols.get(label)
+        if not isinstance(before, InstanceSymbol):
+            before = InstanceSymbol(label, self.place(s.decl.span))
+            self.enter(before)
+        elif not s.decl.indices:
+            related = (Related("first declared here", before.place),)
+            self.report.error("E106", f"'{label}' is declared twice", self.place(s.decl.span), related=related)
+            raise Failed
+        return self._wait(before, s, loops, symbol)
+
+    def _wait(
+        self, symbol: InstanceSymbol, s: syntax.Instance, loops: tuple[syntax.For, ...], component: ComponentSymbol
+    ) -> Callable[[], None]:
+        here = self.current
+        done: list[bool] = []
+
+        def elaborate() -> None:
+            if done:
+                return
+            done.append(True)
+            with self.entering(here):
+                self.each([(s, loops)], lambda statement: self._component(symbol, statement, component))
+
+        self._waiting.setdefault(id(symbol), []).append(elaborate)
+        return elaborate
+
+    def _awaken(self, symbol: InstanceSymbol) -> None:
+        """Another statement reads an instance that has not been elaborated yet."""
+        for do in self._waiting.pop(id(symbol), ()):
+            do()
+
+    def _component(self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol) -> None:
+        chain = (*self.current.chain, self.current.component)
+        if component.name in chain:
+            around = (*chain[chain.index(component.name) :], component.name)
+            raise self.resolver.fail("E801", f"component contains itself: {' -> '.join(around)}", s.component.span)
+        at, shape = self._label(s)
+        path = self.current.family(s.decl.name).name
+        number = len(symbol.spaces)
+        scope = Scope(component.file_scope)
+        space = Space(
+            path=path if not number else f"{path}#{number + 1}",
+            scope=scope,
+            file_scope=component.file_scope,
+            source=component.source,
+            loops=self.resolver.loops,
+            prefix=(*self.current.prefix, *at),
+            around=(*self.current.around, *shape),
+            component=component.name,
+            chain=chain,
+        )
+        level, body = choose_level(self, component, s, path)
+        space.level, space.elsewhere = level, elsewhere(component, level)
+        self._fill(symbol, s, component, space, list(flatten(body)))
+
+    def _fill(
+        self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: list[Nested]
+    ) -> None:
+        head = Head(body)
+        arguments = self._arguments(s, component, head, space)
+        inputs = self._connect(s, component, head, space)
+        solve_units(self, s, space, head, arguments, inputs)
+        symbol.spaces.append(space)
+        with self.entering(space):
+            for statement, _ in body:
+                if isinstance(statement, syntax.Broken):
+                    self.scope.broken |= statement.names
+            self.declare_parameters(body, arguments)
+            self._required(s, component, head, arguments)
+        self._bind_inputs(s, space, head, inputs)
+        with self.entering(space):
+            self.each(body, self.declare)
+            self.bodies.append((space, body))
+            self.announce(body)
+
+    def _arguments(
+        self, s: syntax.Instance, component: ComponentSymbol, head: Head, space: Space
+    ) -> dict[str, Argument]:
+        """Values of parameters; those that a level chosen by the scene has no use for are left out."""
+        found: dict[str, Argument] = {}
+        others = set(space.elsewhere) - set(head.parameters) if space.path in self.levels else ()
+        for arg in s.args or ():
+            if arg.name is None:
+                names = ", ".join(head.parameters)
+                raise self.resolver.fail(
+                    "E404", "positional argument", arg.span, help=f"name it: {names}" if names else None
+                )
+            if arg.name in head.inputs:
+                head.given[arg.name] = arg.value
+                continue
+            if arg.name in others:
+                message = f"'{s.decl.name}' has no parameter '{arg.name}' at level {space.level}: left out"
+                self.report.note("N905", message, Place(self.resolver.source, arg.span))
+                continue
+            if arg.name not in head.parameters:
+                near = nearest(arg.name, (*head.parameters, *head.inputs))
+                listed = f"nearest: '{near}'" if near else f"it has {', '.join(head.parameters) or 'none'}"
+                raise self.resolver.fail(
+                    "E405", f"'{component.name}' has no parameter '{arg.name}'", arg.span, help=listed
+                )
+            found[arg.name] = (arg.value, self.resolver.resolve(arg.value))
+        return found
+
+    def _required(self, s: syntax.Instance, component: ComponentSymbol, head: Head, given: dict[str, Argument]) -> None:
+        for name, statement in head.parameters.items():
+            if statement.value is None and name not in given:
+                place = Place(self._outer_source(s), s.span)
+                unit = statement.unit.text if statement.unit else "..."
+                message = f"parameter '{name}' of '{component.name}' has no value"
+                self.report.error("E406", message, place, help=f"{component.name}({name} = ... {unit})")
+
+    def _outer_source(self, s: syntax.Instance):  # type: ignore[no-untyped-def]
+        return self._instance_source
+
+    def _connect(
+        self, s: syntax.Instance, component: ComponentSymbol, head: Head, space: Space
+    ) -> dict[str, syntax.Expr]:
+        """Bind ports and branches; the inputs' expressions come back."""
+        self._instance_source = self.resolver.source
+        inputs = dict(head.given)
+        bound: set[str] = set()
+        for connection in s.connections:
+            match connection:
+                case syntax.Bind():
+                    self._bind(s, component, head, space, connection, inputs, bound)
+                case syntax.BindAcross():
+                    self._bind_branch(s, component, head, space, connection.name.name, connection, bound)
+                case syntax.Single() if len(head.branches) != 1 and len(head.ports) == 1:
+                    name = next(iter(head.ports))
+                    self._bind_port(s, head, space, name, connection.node)
+                    bound.add(name)
+                case _:
+                    if len(head.branches) != 1:
+                        wants = ", ".join((*head.ports, *(b for b in head.branches if b))) or "no connection"
+                        raise self.resolver.fail(
+                            "E402", f"'{s.decl.name}: {component.name}' is connected by name: {wants}", connection.span
+                        )
+                    self._bind_branch(s, component, head, space, next(iter(head.branches)), connection, bound)
+        for name in (*head.ports, *head.branches):
+            if name not in bound:
+                what = f"port '{name}'" if name in head.ports else f"branch '{name}'" if name else "the branch"
+                help_ = "bind it, or to ground"
+                raise self.resolver.fail("E408", f"{what} of '{s.decl.name}' is not connected", s.span, help=help_)
+        for name, statement in head.inputs.items():
+            if name not in inputs and statement.value is None:
+                raise self.resolver.fail(
+                    "E414", f"input '{name}' of '{s.decl.name}' is not bound", s.span, help=f"{name} = ..."
+                )
+        return inputs
+
+    def _bind(
+        self,
+        s: syntax.Instance,
+        component: ComponentSymbol,
+        head: Head,
+        space: Space,
+        connection: syntax.Bind,
+        inputs: dict[str, syntax.Expr],
+        bound: set[str],
+    ) -> None:
+        name = connection.name.name
+        if name in head.inputs:
+            inputs[name] = connection.value
+        elif name in head.ports:
+            self._bind_port(s, head, space, name, connection.value)
+            bound.add(name)
+        elif name in head.branches:
+            single = syntax.Single(connection.value, connection.span)
+            self._bind_branch(s, component, head, space, name, single, bound)
+        else:
+            near = nearest(name, (*head.ports, *head.inputs, *head.branches))
+            names = ", ".join((*head.ports, *head.inputs, *filter(None, head.branches)))
+            help_ = f"nearest: '{near}'" if near else f"it has {names or 'none'}"
+            raise self.resolver.fail(
+                "E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_
+            )
+
+    def _bind_port(self, s: syntax.Instance, head: Head, space: Space, name: str, value: syntax.Expr) -> None:
+        word = head.ports[name].domain
+        wanted = space.scope.find(word.name)
+        place = self.place(value.span)
+        if isinstance(wanted, BundleSymbol):
+            found = self.resolver.located(value)
+            if found is None or not isinstance(found.symbol, BundleNode):
+                raise self.resolver.fail(
+                    "E401", f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}", value.span
+                )
+            members: dict[str, NodeSymbol | PortSymbol] = {}
+            for member, inner in found.symbol.members.items():
+                if isinstance(inner, PortSymbol):
+                    end = inner.end
+                    end = End(end.node, tuple(ex.substitute(a, found.change) for a in end.at), end.domain)
+                else:
+                    end = self._node_end(inner, found.indices, found.change, value)
+                members[member] = PortSymbol(member, end, place)
+            space.scope.symbols[name] = BundleNode(name, members, place)
+            return
+        if not isinstance(wanted, DomainSymbol):
+            message = f"'{word.name}' is not a domain"
+            self.report.error("E202", message, Place(space.source, word.span))
+            raise Failed
+        bound_to = self.end(value, wanted)
+        assert bound_to is not None
+        self._same_domain(s, f"port '{name}'", wanted, bound_to, value)
+        space.scope.symbols[name] = PortSymbol(name, bound_to, place)
+
+    def _same_domain(self, s: syntax.Instance, what: str, wanted: DomainSymbol, end: End, value: syntax.Expr) -> None:
+        if end.domain.name != wanted.name:
+            message = f"{what} of '{s.decl.name}' is {wanted.name}, node '{self._text(value)}' is {end.domain.name}"
+            raise self.resolver.fail("E401", message, value.span, help="a gyrator or transformer couples domains")
+
+    def _bind_branch(
+        self,
+        s: syntax.Instance,
+        component: ComponentSymbol,
+        head: Head,
+        space: Space,
+        name: str,
+        connection: syntax.Connection,
+        bound: set[str],
+    ) -> None:
+        if name not in head.branches:
+            raise self.resolver.fail("E407", f"'{component.name}' has no branch '{name}'", connection.span)
+        if name in bound:
+            message = f"'{s.decl.name}: {component.name}' needs 1 connection, has {len(s.connections)}"
+            raise self.resolver.fail("E402", message, connection.span)
+        word = head.branches[name].domain
+        wanted = space.scope.find(word.name)
+        if not isinstance(wanted, DomainSymbol):
+            self.report.error("E202", f"'{word.name}' is not a domain", Place(space.source, word.span))
+            raise Failed
+        ends = self._ends(s, connection, wanted)
+        if ends.domain is not None and ends.on is None and ends.domain.name != wanted.name:
+            message = f"'{s.decl.name}' is {wanted.name}, its nodes are {ends.domain.name}"
+            raise self.resolver.fail("E401", message, connection.span, help="a gyrator or transformer couples domains")
+        family = Family(f"{space.path}.{name}" if name else space.path, space.prefix, space.around, ())
+        symbol = BranchSymbol(name or s.decl.name, family, wanted, self.place(s.decl.span))
+        space.scope.symbols[name] = symbol
+        space.ends[name] = ends
+        if not name:
+            space.bound.update(own_variables(symbol, space.prefix))
+        bound.add(name)
+
+    def _bind_inputs(self, s: syntax.Instance, space: Space, head: Head, inputs: dict[str, syntax.Expr]) -> None:
+        sight = self.resolver.sight()
+        for name, statement in head.inputs.items():
+            with self.entering(space):
+                dimension = self.unit(statement.unit).dimension
+            place = self.place(s.span)
+            if name in inputs:
+                value, here, bound = inputs[name], self.current, tuple(sight.items())
+            else:
+                assert statement.value is not None
+                value, here, bound = statement.value, space, ()
+            space.scope.symbols[name] = Definition(
+                name, "input", value, (), dimension, here, place, value.span, bound=bound
+            )

@@ -1,0 +1,89 @@
+"""Levels of a component: which variant of its interior an instance has (E802, E803, E808)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.symbols import ComponentSymbol
+from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.dsl.tree import syntax
+
+if TYPE_CHECKING:
+    from sysdyn.dsl.elaborate.instances import Instances
+
+
+def choose_level(
+    frame: Instances, component: ComponentSymbol, s: syntax.Instance, path: str
+) -> tuple[str | None, tuple[syntax.Statement, ...]]:
+    """Name of the level and the statements of base and level: the scene's choice, the instance's, the default."""
+    levels = {b.name.name: b for b in component.body if isinstance(b, syntax.Level)}
+    base = tuple(b for b in component.body if not isinstance(b, syntax.Level))
+    chosen, place = frame.levels.get(path, (None, None))
+    if chosen is None and len(s.component.names) > 1:
+        chosen, place = s.component.names[1], frame.place(s.component.span)
+    if chosen is None:
+        chosen = next((n for n, level in levels.items() if level.default), None)
+    if chosen is None:
+        if levels:
+            message = f"'{component.name}' has levels {', '.join(levels)} but no default"
+            help_ = f"{component.name}.{next(iter(levels))}(...)"
+            raise frame.resolver.fail("E803", message, s.component.span, help=help_)
+        return None, base
+    if chosen not in levels:
+        message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
+        frame.report.error("E802", message, place or frame.place(s.component.span))
+        raise Failed
+    return chosen, (*base, *_extended(frame, component, levels, levels[chosen], ()))
+
+
+def elsewhere(component: ComponentSymbol, chosen: str | None) -> dict[str, str]:
+    """Names that other levels than the chosen one declare, with the first of these levels."""
+    found: dict[str, str] = {}
+    for level in component.body:
+        if isinstance(level, syntax.Level) and level.name.name != chosen:
+            for statement in level.body:
+                for decl in getattr(statement, "decls", (getattr(statement, "decl", None),)):
+                    if decl is not None:
+                        found.setdefault(decl.name, level.name.name)
+    return found
+
+
+def _extended(
+    frame: Instances,
+    component: ComponentSymbol,
+    levels: dict[str, syntax.Level],
+    level: syntax.Level,
+    chain: tuple[str, ...],
+) -> tuple[syntax.Statement, ...]:
+    """A level's statements; those of the level that it extends where it has no statement of the same label."""
+    if level.extends is None:
+        return level.body
+    name = level.extends.name
+    parent = levels.get(name)
+    if parent is None or name in chain or name == level.name.name:
+        message = f"level '{level.name.name}' extends '{name}', which is no other level of '{component.name}'"
+        frame.report.error("E802", message, Place(component.source, level.extends.span))
+        raise Failed
+    inherited = _extended(frame, component, levels, parent, (*chain, level.name.name))
+    own = {key: b for b in level.body if (key := _label(b)) is not None}
+    kept = []
+    for statement in inherited:
+        key = _label(statement)
+        if key is None or key not in own:
+            kept.append(statement)
+        elif type(own[key]) is not type(statement):
+            message = f"'{key}' replaces a statement of another kind"
+            frame.report.error("E808", message, Place(component.source, own[key].span), help="a new label")
+            raise Failed
+    return (*kept, *level.body)
+
+
+def _label(statement: syntax.Statement) -> str | None:
+    """The label under which a statement can be replaced."""
+    if isinstance(
+        statement,
+        (syntax.Instance, syntax.Param, syntax.Let, syntax.Output, syntax.Quasi, syntax.Constraint, syntax.Input),
+    ):
+        return statement.decl.name
+    return None

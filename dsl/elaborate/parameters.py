@@ -1,0 +1,167 @@
+"""Parameters of a model or component: units, defaults, arguments, in the order of their dependence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sysdyn.dsl.elaborate.parts import Frame, Nested
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Parameter, Shape
+from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
+from sysdyn.dsl.names.calls import walk
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
+from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.text.diagnostics import Related
+from sysdyn.dsl.tree import syntax
+
+Argument = tuple[syntax.Expr, Typed | Vector]  # as written, and its value where the instance stands
+
+
+class Parameters(Frame):
+    """Declares parameters."""
+
+    def declare_parameters(self, statements: Sequence[Nested], given: dict[str, Argument]) -> None:
+        """Parameters in the order of their dependence (the default of one may name another); given: arguments."""
+        found: dict[str, tuple[syntax.Param, tuple[syntax.For, ...]]] = {}
+        for statement, loops in statements:
+            if isinstance(statement, syntax.Param):
+                name = statement.decl.name
+                if name in found:
+                    related = (Related("first declared here", self.place(found[name][0].decl.span)),)
+                    self.report.error(
+                        "E106", f"'{name}' is declared twice", self.place(statement.decl.span), related=related
+                    )
+                    continue
+                found[name] = (statement, loops)
+        for name in self._by_dependence(found):
+            statement, loops = found[name]
+            try:
+                with self.inside(loops):
+                    self._parameter(statement, given.get(name))
+            except Failed:
+                self.scope.broken.add(name)
+
+    def _by_dependence(self, found: dict[str, tuple[syntax.Param, tuple[syntax.For, ...]]]) -> list[str]:
+        needs = {name: _names_in(statement) & found.keys() for name, (statement, _) in found.items()}
+        order: list[str] = []
+        state: dict[str, int] = {}
+        for start in found:
+            stack = [(start, False)]
+            while stack:
+                name, done = stack.pop()
+                if done:
+                    state[name] = 2
+                    order.append(name)
+                elif name not in state:
+                    state[name] = 1
+                    stack.append((name, True))
+                    for other in sorted(needs[name]):
+                        if state.get(other) == 1:
+                            span = found[name][0].span
+                            message = (
+                                f"circular definition: {other} -> {name} -> {other}"
+                                if other != name
+                                else f"circular definition: {name} -> {name}"
+                            )
+                            self.report.error("E105", message, self.place(span))
+                        elif other not in state:
+                            stack.append((other, False))
+        return order
+
+    def _parameter(self, statement: syntax.Param, given: Argument | None) -> None:
+        decl = statement.decl
+        place = self.place(decl.span)
+        unit = self.unit(statement.unit) if statement.unit else None
+        shape = self.shape(decl)
+        family = self.current.family(decl.name, shape)
+        own = self.resolver.loops[len(self.current.loops) :]
+        if own and not decl.indices:
+            raise self.resolver.fail("E806", f"'{decl.name}' needs its loop variable: {decl.name}[i]", decl.span)
+        values: tuple[Node, ...] = ()
+        truth = False
+        if statement.value is not None and given is None:
+            value = self.resolver.resolve(statement.value)
+            values, unit, truth = self._values(statement, statement.value, value, unit, shape)
+        elif given is not None:
+            if unit is None and statement.value is not None:  # the default fixes the dimension
+                unit = self._values(statement, statement.value, self.resolver.resolve(statement.value), None, shape)[1]
+            values, unit, truth = self._values(statement, given[0], given[1], unit, shape)
+        if unit is None:
+            raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span)
+        around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
+        indices = (*around, *(loop.index for loop in own))
+        self.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))
+        self.parts.parameters[family.name] = Parameter(family.name, family.whole, unit, values, indices, place)
+
+    def _values(
+        self,
+        statement: syntax.Param,
+        written: syntax.Expr,
+        value: Typed | Vector,
+        unit: Unit | None,
+        shape: Shape,
+    ) -> tuple[tuple[Node, ...], Unit, bool]:
+        """Nodes of a default or an argument, and the unit that it fixes where none is declared."""
+        items = value.items if isinstance(value, Vector) else (value,)
+        for item in items:
+            self._is_run_constant(item.node, statement)
+        if isinstance(value, Vector) and (len(shape) != 1 or not self.fits(shape, len(items))):
+            message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
+            raise self.resolver.fail("E805", message, self._where(statement))
+        what = "default" if written is statement.value else "argument"
+        known = [i.dimension for i in items if i.dimension is not None]
+        dimension = unit.dimension if unit is not None else (known[0] if known else NONE)
+        for item in items:
+            if item.dimension is not None and item.dimension != dimension:
+                have, want = dim.show(item.dimension), dim.show(dimension)
+                is_ = "dimensionless" if have == "dimensionless" else f"in {have}"
+                message = f"'{statement.decl.name}' is declared {want} but its {what} is {is_}"
+                if unit is None:
+                    message = f"the values of '{statement.decl.name}' differ: {want} and {have}"
+                help_ = self._with_unit(written, unit) if have == "dimensionless" else None
+                code = "E207" if what == "default" else "E214"
+                if code == "E214":
+                    name = self.current.path or self.current.component
+                    message = f"argument {statement.decl.name} of '{name}' is {is_}, wants {want}"
+                raise self.resolver.fail(code, message, self._where(statement), help=help_)
+        truth = isinstance(value, Typed) and value.truth
+        nodes = tuple(i.node for i in items)
+        if truth:
+            nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
+        return nodes, unit or self._default_unit(written, dimension), truth
+
+    def _with_unit(self, value: syntax.Expr, unit: Unit | None) -> str | None:
+        return f"write '{value.text} {unit.text}'" if isinstance(value, syntax.Number) and unit else None
+
+    def _default_unit(self, value: syntax.Expr, dimension: Dimension) -> Unit:
+        if isinstance(value, syntax.Negative):
+            value = value.operand
+        if isinstance(value, syntax.Quantity):
+            found = read_unit(value.unit, self.scope, self.resolver.source, self.report)
+            if found is not None:
+                return found
+        return si(dimension)
+
+    def _is_run_constant(self, node: Node, statement: syntax.Param) -> None:
+        for inner in ex.topological([node]):
+            if inner.op in ("var", "time"):
+                message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
+                raise self.resolver.fail("E807", message, self._where(statement))
+
+    def fits(self, shape: Shape, count: int) -> bool:
+        """Whether a list of that length fills a shape."""
+        first, last = shape[0]
+        if not (ex.is_const(first) and ex.is_const(last)):
+            return False
+        return int(last.data) - int(first.data) + 1 == count
+
+    def _where(self, statement: syntax.Param) -> syntax.Span:
+        return statement.value.span if statement.value is not None else statement.decl.span
+
+
+def _names_in(statement: syntax.Param) -> set[str]:
+    roots: list[object] = [statement.value, *statement.decl.indices]
+    return {n.name for r in roots if r is not None for n in walk(r) if isinstance(n, syntax.Name)}  # type: ignore[arg-type]

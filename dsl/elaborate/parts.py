@@ -1,0 +1,172 @@
+"""What elaboration collects, and the frame that its rooms share: spaces, loops, names that are entered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import (
+    Branch,
+    Constraint,
+    Coordinate,
+    Coupling,
+    Dynamic,
+    Energy,
+    Expectation,
+    Golden,
+    Initial,
+    Loop,
+    NodeFamily,
+    Parameter,
+    Shape,
+    State,
+    Unknown,
+    Work,
+)
+from sysdyn.dsl.model.units import Unit
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.resolve import Resolver
+from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol
+from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.text.diagnostics import Place, Related, Report
+from sysdyn.dsl.tree import syntax
+
+Nested = tuple[syntax.Statement, tuple[syntax.For, ...]]
+
+
+@dataclass(slots=True)
+class Requirement:
+    """A `require` to be judged with the values bound."""
+
+    condition: Node
+    loops: tuple[Loop, ...]
+    place: Place
+    text: str
+
+
+@dataclass(slots=True)
+class Parts:
+    """The statements of a network as they are found."""
+
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+    coordinates: list[Coordinate] = field(default_factory=list)
+    unknowns: list[Unknown] = field(default_factory=list)
+    states: list[State] = field(default_factory=list)
+    energies: list[Energy] = field(default_factory=list)
+    works: list[Work] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    dynamics: list[Dynamic] = field(default_factory=list)
+    initials: list[Initial] = field(default_factory=list)
+    expectations: list[Expectation] = field(default_factory=list)
+    goldens: list[Golden] = field(default_factory=list)
+    quasis: list[str] = field(default_factory=list)
+    requirements: list[Requirement] = field(default_factory=list)
+    nodes: list[NodeFamily] = field(default_factory=list)
+    branches: list[Branch] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
+    inputs: dict[str, tuple[Unit, Place]] = field(default_factory=dict)  # of the model, which a scene may set
+    given: set[str] = field(default_factory=set)  # states that have a dynamic, sound or not
+
+
+class Frame:
+    """Shared by the rooms of elaboration: where we are, and how statements are walked through."""
+
+    def __init__(self, report: Report) -> None:
+        self.report = report
+        self.resolver = Resolver(report)
+        self.parts = Parts()
+        self.resolver.branches = self.parts.branches
+        self.scope = Scope()
+        self.current = Space("", self.scope, self.scope, self.resolver.source)
+
+    @contextmanager
+    def entering(self, space: Space) -> Iterator[None]:
+        """Work inside a space."""
+        before = self.scope, self.current
+        self.scope, self.current = space.scope, space
+        try:
+            with self.resolver.space(space):
+                yield
+        finally:
+            self.scope, self.current = before
+
+    def each(self, statements: Sequence[Nested], do: Callable[..., None]) -> None:
+        """Carry out statements in their loops; what fails has been reported."""
+        for statement, loops in statements:
+            try:
+                with self.inside(loops):
+                    do(statement)
+            except Failed:  # what it would have declared is not reported again where it is used
+                for decl in declared(statement):
+                    if decl.name not in self.scope.symbols:
+                        self.scope.broken.add(decl.name)
+
+    @contextmanager
+    def inside(self, loops: tuple[syntax.For, ...]) -> Iterator[None]:
+        """Bring the variables of `for` statements into sight."""
+        with ExitStack() as stack:
+            for loop in loops:
+                first = self.resolver.whole_number(loop.lower, "a bound")
+                last = self.resolver.whole_number(loop.upper, "a bound")
+                stack.enter_context(self.resolver.loop(loop.index.name, first, last))
+            yield
+
+    def place(self, span: syntax.Span) -> Place:
+        """A span of the present text."""
+        return Place(self.resolver.source, span)
+
+    def enter(self, symbol: Symbol) -> None:
+        """Bring a name into scope; E106 where it is there already."""
+        before = self.scope.symbols.get(symbol.name)
+        same = isinstance(before, ConstraintSymbol) and isinstance(symbol, ConstraintSymbol)
+        if before is None:
+            self.scope.symbols[symbol.name] = symbol
+        elif not (same and before.kind == symbol.kind):  # type: ignore[union-attr]
+            related = (Related("first declared here", before.place),)
+            self.report.error("E106", f"'{symbol.name}' is declared twice", symbol.place, related=related)
+            raise Failed
+
+    def unit(self, unit: syntax.Unit) -> Unit:
+        """The value of a unit as written."""
+        found = read_unit(unit, self.scope, self.resolver.source, self.report)
+        if found is None:
+            raise Failed
+        return found
+
+    def shape(self, decl: syntax.Decl) -> Shape:
+        """First and last of each index of a declared family."""
+        return tuple(self.bounds(i) for i in decl.indices)
+
+    def bounds(self, index: syntax.Index) -> tuple[Node, Node]:
+        """`1..n`, `3` (for 1..3), or a loop variable, whose range it takes."""
+        if isinstance(index, syntax.Range):
+            return self.resolver.whole_number(index.lower, "a bound"), self.resolver.whole_number(
+                index.upper, "a bound"
+            )
+        node = self.resolver.whole_number(index, "an index")
+        inside = {ex.index(loop.index): loop for loop in self.resolver.loops}
+        used = [n for n in ex.topological([node]) if n in inside]
+        if not used:
+            return ex.const(1), node
+        lows = {n: inside[n].first for n in used}
+        highs = {n: inside[n].last for n in used}
+        return ex.substitute(node, lows), ex.substitute(node, highs)
+
+
+def flatten(body: Sequence[syntax.Statement], loops: tuple[syntax.For, ...] = ()) -> Iterator[Nested]:
+    """The statements of a body with the `for` statements around each."""
+    for statement in body:
+        if isinstance(statement, syntax.For):
+            yield from flatten(statement.body, (*loops, statement))
+        else:
+            yield statement, loops
+
+
+def declared(statement: syntax.Statement) -> tuple[syntax.Decl, ...]:
+    """The names that a statement declares."""
+    decls: tuple[syntax.Decl, ...] = getattr(statement, "decls", ())
+    own = getattr(statement, "decl", None)
+    return decls if own is None else (*decls, own)

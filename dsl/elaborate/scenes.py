@@ -1,0 +1,326 @@
+"""What a scene asks: span, settings, traces, accuracy, formulation, and what it expects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.format.format import format_expression
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
+from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.members import Located
+from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
+from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.text.diagnostics import Place, SourceText
+from sysdyn.dsl.tree import syntax
+
+RESERVED = ("time", "audit", "parameters", "events", "derivatives")
+FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "auto")
+SOLVERS = ("auto", "bdf", "radau", "dopri", "euler")
+REDUNDANCY = ("error", "drop", "minimum_norm")
+_SOLVER_OPTIONS = ("order", "index", "step", "keep_implicit")
+
+
+class SceneReader:
+    """Reads one scene of an elaborated model."""
+
+    def __init__(self, elaborator: Elaborator) -> None:
+        self.model = elaborator
+        self.resolver = elaborator.resolver
+        self.report = elaborator.report
+        self.observations: list[Observation] = []
+        self.elements: list[ElementSetting] = []
+        self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
+        self._found: dict[str, object] = {}
+
+    def levels(self, scene: syntax.Scene) -> None:
+        """The `level` statements and those that set inputs: before the model's instances are elaborated."""
+        self._each(scene, {syntax.SceneLevel: SceneReader.level, syntax.Set: SceneReader.set_input})
+
+    def settings(self, scene: syntax.Scene) -> None:
+        """The `set` statements on parameters: when those of instances are known."""
+        self._each(scene, {syntax.Set: SceneReader.set_parameter})
+
+    def set_input(self, s: syntax.Set) -> None:
+        """A `set` of an input of the model; others wait."""
+        if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
+            self._set_input(s.target.name, *self.model.parts.inputs[s.target.name], s)
+
+    def read(self, scene: syntax.Scene, place: Place) -> Scene:
+        """Everything else of the scene."""
+        self._each(scene, _STATEMENTS)
+        self._each(scene, {syntax.Accuracy: SceneReader._accuracy})  # names of traced quantities are known by now
+        return Scene(scene.name.name, place, **self._found)  # type: ignore[arg-type]
+
+    def _each(self, scene: syntax.Scene, table: dict[type, Callable[..., None]]) -> None:
+        with self.model.entering(self.model.space):
+            for statement in scene.body:
+                if isinstance(statement, syntax.Broken):
+                    self.model.space.scope.broken |= statement.names
+                elif type(statement) in table:
+                    self.guarded(lambda s: table[type(s)](self, s), statement)
+
+    def command(self, source: SourceText, s: syntax.Set, do: Callable[[SceneReader, syntax.Set], None]) -> None:
+        """A `--set` of the command line."""
+        with self.model.entering(self.model.space), self.resolver.within(self.model.space.scope, source):
+            self.guarded(lambda statement: do(self, statement), s)
+
+    def guarded(self, do: Callable[..., None], statement: object) -> None:
+        """Carry out one statement; what fails has been reported."""
+        try:
+            do(statement)
+        except Failed:
+            return
+
+    def _once(self, key: str, value: object, span: syntax.Span) -> None:
+        if key in self._found:
+            raise self.resolver.fail("E106", f"the scene says '{key}' twice", span)
+        self._found[key] = value
+
+    # -- set -----------------------------------------------------------------------------------------------
+
+    def set_parameter(self, s: syntax.Set) -> None:
+        """`set ref = value` of a parameter or an element of one; paths lead into instances."""
+        if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
+            return
+        found = self.resolver.located(s.target)
+        symbol = None if found is None else found.symbol
+        if isinstance(symbol, Unsupported):
+            raise Failed
+        if found is not None and isinstance(symbol, ParameterSymbol):
+            self._set_parameter(symbol, found, s)
+            return
+        root = s.target
+        while isinstance(root, (syntax.Item, syntax.Member)):
+            root = root.base
+        shown = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
+        name = root.name if isinstance(root, syntax.Name) else shown
+        if self.model.space.scope.is_broken(name):
+            raise Failed
+        near = nearest(shown, (*self.model.parts.parameters, *self.model.parts.inputs))
+        message = f"'{shown}' is not a parameter or input of model '{self.model.model.name.name}'"
+        help_ = f"nearest: '{near}'" if near else "init sets initial values" if symbol is not None else None
+        raise self.resolver.fail("E910", message, s.target.span, help=help_)
+
+    def _set_input(self, name: str, unit: Unit, place: Place, s: syntax.Set) -> None:
+        value = self._bare(s.value, unit.dimension)
+        self.model.parts.parameters.pop(name, None)
+        space = self.model.space
+        if self.resolver.source is not space.source:  # the command line has a text of its own
+            space = Space("", space.scope, space.file_scope, self.resolver.source)
+        self.model.define_input(Definition(name, "input", value, (), unit.dimension, space, place, s.span))
+
+    def _bare(self, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
+        """On the command line a bare number is in SI units."""
+        inner = value.operand if isinstance(value, syntax.Negative) else value
+        if self.resolver.source is self.model.source or not isinstance(inner, syntax.Number) or not dimension:
+            return value
+        number = syntax.Quantity(inner.value, inner.text, _si_unit(dimension, inner.span), inner.span)
+        self.model.files.scope.units.update({f"SI {dim.show(dimension)}": si(dimension)})
+        return syntax.Negative(number, value.span) if isinstance(value, syntax.Negative) else number
+
+    def _set_parameter(self, symbol: ParameterSymbol, found: Located, s: syntax.Set) -> None:
+        parameter = self.model.parts.parameters[symbol.family.name]
+        value = self.resolver.resolve(self._bare(s.value, symbol.dimension or NONE))
+        items = value.items if isinstance(value, Vector) else (value,)
+        for item in items:
+            self._check_setting(symbol, item, s)
+        around = tuple(ex.substitute(n, found.change) for n in symbol.family.prefix)
+        at = (
+            *around,
+            *(self.resolver.whole_number(i, "an index") for i in found.indices if not isinstance(i, syntax.Range)),
+        )
+        nodes = tuple(i.node for i in items)
+        if symbol.truth:
+            nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
+        place = self.resolver.place(s.span)
+        if at:
+            if len(at) != len(parameter.shape) or len(items) != 1:
+                raise self.resolver.index_count(symbol.name, len(symbol.shape), len(found.indices), s.target.span)
+            self.elements.append(ElementSetting(parameter.name, at, nodes[0], place))
+            return
+        if isinstance(value, Vector) and (
+            len(parameter.shape) != 1 or not self.model.fits(parameter.shape, len(items))
+        ):
+            message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
+            raise self.resolver.fail("E805", message, s.value.span)
+        self.model.parts.parameters[parameter.name] = replace(parameter, values=nodes, indices=(), place=place)
+
+    def _check_setting(self, symbol: ParameterSymbol, value: Typed, s: syntax.Set) -> None:
+        if value.truth != symbol.truth:
+            raise self.resolver.fail(
+                "E207", f"'{symbol.name}' is {'a condition' if symbol.truth else 'a number'}", s.value.span
+            )
+        if value.dimension is not None and value.dimension != symbol.dimension:
+            message = f"'{symbol.name}' is in {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
+            raise self.resolver.fail("E207", message, s.value.span)
+        for inner in ex.topological([value.node]):
+            if inner.op in ("var", "time"):
+                message = f"parameter '{symbol.name}' is set to something that depends on '{inner}'"
+                raise self.resolver.fail(
+                    "E807", message, s.value.span, help="a parameter is a constant; an input may vary"
+                )
+
+    # -- span and numbers ----------------------------------------------------------------------------------
+
+    def _constant(self, expression: syntax.Expr, dimension: Dimension, what: str) -> Node:
+        node = self.resolver.wanted(expression, dimension, "E208", f"{what} is in {{}}, wants {dim.show(dimension)}")
+        for inner in ex.topological([node]):
+            if inner.op in ("var", "time"):
+                raise self.resolver.fail("E807", f"{what} depends on '{inner}': it must be a constant", expression.span)
+        return node
+
+    def _time(self, s: syntax.Time) -> None:
+        self._once("start", self._constant(s.start, dim.TIME, "the start"), s.span)
+        self._found["end"] = self._constant(s.stop, dim.TIME, "the end")
+
+    def _limit(self, s: syntax.Limit) -> None:
+        if s.name.name not in ("steps", "events"):
+            raise self.resolver.fail(
+                "E113", f"there is no limit '{s.name.name}'", s.name.span, help="limit steps, limit events"
+            )
+        before = self._found.get("limits", ())
+        assert isinstance(before, tuple)
+        self._found["limits"] = (*before, (s.name.name, self._constant(s.value, NONE, "a limit")))
+
+    def _formulation(self, s: syntax.Formulation) -> None:
+        self._choice(s.name, FORMULATIONS, "formulation")
+        self._once("formulation", s.name.name, s.span)
+        self._found["formulation_place"] = self.resolver.place(s.span)
+
+    def _redundancy(self, s: syntax.Redundancy) -> None:
+        self._choice(s.name, REDUNDANCY, "redundancy")
+        self._once("redundancy", s.name.name, s.span)
+
+    def _solver(self, s: syntax.Solver) -> None:
+        self._choice(s.name, SOLVERS, "solver")
+        self._once("solver", s.name.name, s.span)
+        options = []
+        for arg in s.args or ():
+            if arg.name is None or arg.name not in _SOLVER_OPTIONS:
+                message = f"the solver has no option '{arg.name or format_expression(arg.value)}'"
+                raise self.resolver.fail(
+                    "E405", message, arg.span, help=", ".join(f"{n} = .." for n in _SOLVER_OPTIONS)
+                )
+            if arg.name == "keep_implicit":
+                node = ex.conditional(self.resolver.condition(arg.value), ex.const(1.0), ex.const(0.0))
+            else:
+                node = self._constant(arg.value, dim.TIME if arg.name == "step" else NONE, arg.name)
+            options.append((arg.name, node))
+        self._found["solver_options"] = tuple(options)
+
+    def _choice(self, word: syntax.Word, choices: tuple[str, ...], what: str) -> None:
+        if word.name not in choices:
+            near = nearest(word.name, choices)
+            help_ = f"'{near}'" if near else f"one of {', '.join(choices)}"
+            raise self.resolver.fail("E607", f"there is no {what} '{word.name}'", word.span, help=help_)
+
+    # -- traces --------------------------------------------------------------------------------------------
+
+    def _trace(self, s: syntax.Trace) -> None:
+        if s.every is not None:
+            every = self._constant(s.every, dim.TIME, "the interval of a trace")
+            self._once("every", every, s.every.span)
+        for item in s.items:
+            self.guarded(self._item, item)
+
+    def _item(self, item: syntax.TraceItem) -> None:
+        with self.resolver.leniently(), self.resolver.unknown_as("E905", "trace '{}' does not exist"):
+            value = self.resolver.resolve(item.expr)
+        if isinstance(value, Vector):
+            raise self.resolver.fail(
+                "E905", f"'{format_expression(item.expr)}' is an array: trace its elements", item.span
+            )
+        name = item.alias.name if item.alias else format_expression(item.expr).replace("/", "\u2215")
+        where = item.alias.span if item.alias else item.span
+        if name in RESERVED:
+            raise self.resolver.fail(
+                "E911", f"trace name '{name}' belongs to the trace itself", where, help="another name with 'as'"
+            )
+        if any(o.name == name for o in self.observations):
+            raise self.resolver.fail("E106", f"'{name}' is traced twice", where, help="another name with 'as'")
+        node = ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
+        unit = self._traced_unit(item, value)
+        scaled = node
+        if unit.scale != 1 or unit.offset:
+            scaled = ex.scale(float(1 / unit.scale), ex.sub(node, ex.const(float(unit.offset))))
+        self._raw.setdefault(node, name)
+        text = format_expression(item.expr)
+        self.observations.append(Observation(name, scaled, unit, text, self.resolver.place(item.span)))
+
+    def _traced_unit(self, item: syntax.TraceItem, value: Typed) -> Unit:
+        if item.unit is None:
+            return si(value.dimension or NONE)
+        unit = read_unit(item.unit, self.model.space.scope, self.resolver.source, self.report)
+        if unit is None:
+            raise Failed
+        if value.dimension is not None and unit.dimension != value.dimension:
+            message = f"'{format_expression(item.expr)}' is in {dim.show(value.dimension)}, not {unit.text}"
+            raise self.resolver.fail("E208", message, item.unit.span)
+        return unit
+
+    def _accuracy(self, s: syntax.Accuracy) -> None:
+        value = self._constant(s.value, NONE, "the accuracy")
+        self._once("accuracy", value, s.span)
+        if value.op == "const" and not 0.0 < value.data < 1.0:
+            raise self.resolver.fail("E906", "accuracy must be positive and less than 1", s.value.span)
+        names = []
+        for target in s.on:
+            try:
+                with self.resolver.leniently():
+                    node = self.resolver.scalar(target).node
+            except Failed:
+                continue  # it has been said
+            if node not in self._raw:
+                text = format_expression(target)
+                raise self.resolver.fail(
+                    "E906",
+                    f"the accuracy of '{text}' is asked for, but it is not traced",
+                    target.span,
+                    help=f"trace {text}",
+                )
+            names.append(self._raw[node])
+        self._found["accuracy_on"] = tuple(names)
+
+    # -- the rest ------------------------------------------------------------------------------------------
+
+    def _init(self, s: syntax.Init) -> None:
+        self.model.initial(s, override=True)
+
+    def _expect(self, s: syntax.Expect) -> None:
+        self.model.expect(s)
+
+    def _golden(self, s: syntax.Golden) -> None:
+        self.model.golden(s)
+
+    def level(self, s: syntax.SceneLevel) -> None:
+        """`level ref = name`: before the model's instances are elaborated."""
+        text = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
+        self.model.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
+
+    def _later(self, s: syntax.When) -> None:
+        self.report.note("N608", "when is not supported yet (planned: events)", self.resolver.place(s.span))
+
+
+def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
+    name = f"SI {dim.show(dimension)}"
+    return syntax.Unit((syntax.UnitFactor(name, 1, ".", span),), name, span)
+
+
+_STATEMENTS: dict[type, Callable[..., None]] = {
+    syntax.Time: SceneReader._time,
+    syntax.Trace: SceneReader._trace,
+    syntax.Formulation: SceneReader._formulation,
+    syntax.Solver: SceneReader._solver,
+    syntax.Redundancy: SceneReader._redundancy,
+    syntax.Limit: SceneReader._limit,
+    syntax.Init: SceneReader._init,
+    syntax.Expect: SceneReader._expect,
+    syntax.Golden: SceneReader._golden,
+    syntax.When: SceneReader._later,
+}

@@ -1,0 +1,116 @@
+"""Interpolation tables, written in the text or in a file beside it; values in SI units.
+
+A file is comma-separated numbers, one row a line, in the units of the table's head; a first line of names and lines
+that begin with '#' are passed over.  It must lie inside the folder of the text that names it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+from sysdyn.dsl.model.network import Table
+from sysdyn.dsl.model.units import Unit
+from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.tree import syntax
+
+MAX_BYTES = 50_000_000
+Row = tuple[float, ...]
+
+
+def read_table(
+    item: syntax.Table, units: Sequence[Unit], result: Unit, source: SourceText, report: Report
+) -> Table | None:
+    """The table's breakpoints and values; None after reporting E206 or W302."""
+    name = item.name.name
+    place = Place(source, item.name.span)
+    try:
+        if item.rows is not None:
+            rows = _written(item, [*units, result], source, report)
+        else:
+            rows = _from_file(item, [*units, result], source, report)
+    except Failed:
+        return None
+    if item.extrapolation == "extend":
+        message = f"table '{name}' is extrapolated ('extend') beyond its data"
+        report.warning("W302", message, place, help="clamp or stop")
+    problem = _line_problem(rows) if len(units) == 1 else _grid_problem(rows, len(units), item.interpolation)
+    if problem:
+        report.error("E206", f"table {name}: {problem}", place)
+        return None
+    axes = tuple(tuple(sorted({row[k] for row in rows})) for k in range(len(units)))
+    values = tuple(row[-1] for row in sorted(rows))
+    return Table(name, item.interpolation, item.extrapolation or "clamp", axes, values, place)
+
+
+def _line_problem(rows: list[Row]) -> str | None:
+    if len(rows) < 2 or any(a[0] >= b[0] for a, b in pairwise(rows)):
+        return "the arguments must increase from row to row, two rows at least"
+    return None
+
+
+def _grid_problem(rows: list[Row], arguments: int, interpolation: str) -> str | None:
+    if arguments > 2 or interpolation not in ("linear", "hold"):
+        return "a table of two arguments is linear or hold, and there are no larger ones"
+    sizes = [len({row[k] for row in rows}) for k in range(2)]
+    if len({row[:2] for row in rows}) != sizes[0] * sizes[1] or len(rows) != sizes[0] * sizes[1] or min(sizes) < 2:
+        return "the rows must fill a grid, each point once"
+    return None
+
+
+def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
+    rows = []
+    for row in item.rows or ():
+        if len(row.numbers) != len(units):
+            message = f"a row of table {item.name.name} has {len(units)} numbers, {len(row.numbers)} given"
+            report.error("E206", message, Place(source, row.span))
+            raise Failed
+        texts = [n.text.replace(" ", "") for n in row.numbers]
+        rows.append(tuple(_scaled(t, u) for t, u in zip(texts, units, strict=True)))
+    return rows
+
+
+def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
+    place = Place(source, item.span)
+    assert item.file is not None
+    folder = Path(source.name).resolve().parent
+    path = (folder / item.file).resolve()
+    if not path.is_relative_to(folder):
+        help_ = "put the file beside the model"
+        report.error("E206", f"table {item.name.name}: '{item.file}' is outside the model's folder", place, help=help_)
+        raise Failed
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise OSError(27, "the file is too large")
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        report.error("E206", f"table {item.name.name}: '{item.file}' cannot be read: {reason}", place)
+        raise Failed from None
+    rows: list[Row] = []
+    for number, line in enumerate(lines, 1):
+        cells = [c.strip() for c in line.split(",")]
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            if len(cells) != len(units):
+                raise ValueError
+            rows.append(tuple(_scaled(c, u) for c, u in zip(cells, units, strict=True)))
+        except (ValueError, ZeroDivisionError, OverflowError):
+            if rows or number > 1:
+                message = f"table {item.name.name}: line {number} of '{item.file}' is not {len(units)} numbers"
+                report.error("E206", message, place)
+                raise Failed from None
+    return rows
+
+
+def _scaled(text: str, unit: Unit) -> float:
+    value = float(text)
+    if value - value != 0.0:
+        raise ValueError(text)
+    if unit.scale == 1 and not unit.offset:
+        return value
+    return float(Fraction(text) * unit.scale + unit.offset)

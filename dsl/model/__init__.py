@@ -1,0 +1,1 @@
+"""The values that the compiler receives: expressions, units, dimensions, the network."""

@@ -1,0 +1,333 @@
+"""The checked network: what a model says, names bound, values in SI units, arrays kept as families.
+
+Received by the compiler.  Every expression is a node of `expression`; every statement keeps its place in the text.
+A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the range 1..n.  A statement inside
+`for i in ..` (or under a sum) is one value here with its loops; nothing is unrolled but arrays written as literals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.units import Unit
+from sysdyn.dsl.text.diagnostics import Place
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """`for index in first..last`: bounds are whole numbers made of parameters and outer loop variables."""
+
+    index: str
+    first: Node
+    last: Node
+
+
+Shape = tuple[tuple[Node, Node], ...]  # (first, last) of each index of a family; () is a scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """A domain: the units of its four variables, and what its nodes have in common (effort or flow)."""
+
+    name: str
+    effort: Unit
+    flow: Unit
+    momentum: Unit
+    displacement: Unit
+    common: str
+    pseudo: bool
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class NodeFamily:
+    """Nodes of a domain.  Quantities in expressions: var kinds ne (common effort), nq nf np (common flow)."""
+
+    name: str
+    shape: Shape
+    domain: Domain
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """One end of a branch: an element of a node family, or the domain's ground (node None)."""
+
+    node: str | None
+    at: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """A branch plus -> minus, or along a displacement expression (`on`).
+
+    Its effort, flow, displacement, momentum are var kinds be bf bq bp of its name at `at` (loop variables of `loops`,
+    or constants).  kind: kinetic, potential, dissipator, effort, flow (sources), field (no law: it stands in energies
+    and constraints), port (one side of a coupling).  law: side = law, side one of e f q p; law holds the branch's own
+    conjugate variable, and others where it is modulated.
+    """
+
+    name: str
+    at: tuple[Node, ...]
+    loops: tuple[Loop, ...]
+    domain: Domain
+    kind: str
+    side: str | None
+    law: Node | None
+    plus: Terminal | None
+    minus: Terminal | None
+    on: Node | None
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """A two-port of two branches: transformer f1 = ratio*f2 (side f) or e1 = ratio*e2 (side e); gyrator e1 = ratio*f2.
+
+    The companion law follows from e1 f1 + e2 f2 = 0.
+    """
+
+    kind: str
+    first: str
+    second: str
+    at: tuple[Node, ...]
+    loops: tuple[Loop, ...]
+    side: str
+    ratio: Node
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Slope:
+    """What a branch's inverted law rests on: an expression of parameters that is not zero and has the sign
+    1 or -1, where one is given; where flat, it was zero with the values of the text.
+    """
+
+    name: str
+    expression: Node
+    loops: tuple[Loop, ...]
+    flat: bool
+    place: Place
+    sign: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A run-time constant; value holds one node, one per element of a literal array, or one over `loops`.
+
+    A parameter that is an array by a formula (`param x[1..n] = i*l`) has one value over the loop variables `indices`.
+    """
+
+    name: str
+    shape: Shape
+    unit: Unit
+    values: tuple[Node, ...]
+    indices: tuple[str, ...]
+    place: Place
+    whole: bool = False  # used as a size or an index: its value must be a whole number
+
+
+@dataclass(frozen=True, slots=True)
+class ElementSetting:
+    """`set m[2] = value`: one element of a parameter array."""
+
+    name: str
+    at: tuple[Node, ...]
+    value: Node
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """An interpolation table in SI units; points: breakpoints of each argument, values row-major."""
+
+    name: str
+    method: str  # linear pchip cubic hold
+    outside: str  # clamp extend stop
+    points: tuple[tuple[float, ...], ...]
+    values: tuple[float, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """A displacement coordinate (a momentum coordinate where complementary) with its domain's units."""
+
+    name: str
+    shape: Shape
+    complementary: bool
+    displacement: Unit  # of q (of p where complementary)
+    flow: Unit  # of q' (of p')
+    momentum: Unit  # conjugate of the displacement
+    effort: Unit
+    asserted: bool | None  # tangible, intangible, or not said
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """An implicit effort (or flow) closed by a gamma."""
+
+    name: str
+    shape: Shape
+    unit: Unit
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A dynamic variable s."""
+
+    name: str
+    shape: Shape
+    unit: Unit
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """One summand of a state function: function is T* T V V* (J) or D G (W).
+
+    `kept kinetic`, `kept potential` (J): what stores hold whose laws stand beside the state functions; for the audit.
+    """
+
+    function: str
+    expression: Node
+    loops: tuple[Loop, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """Virtual work: effort * delta(on).  kept: it is that of a store, whose energy the audit counts."""
+
+    effort: Node
+    on: Node
+    loops: tuple[Loop, ...]
+    place: Place
+    kept: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Constraint:
+    """`kind name[at]: left = right` as left - right = 0; at: indices in the family of that label."""
+
+    kind: str  # phi psi gamma
+    name: str
+    at: tuple[Node, ...]
+    expression: Node
+    loops: tuple[Loop, ...]
+    unit: Unit
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamic:
+    """state' = expression."""
+
+    state: Node  # var of kind s
+    expression: Node
+    loops: tuple[Loop, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Initial:
+    """target = value (fixed) or ~ value (a guess) at the start; target may be any expression of the unknowns.
+
+    Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
+    store: whose content that is, where no text says it; unit: of a displacement, of the rate of a momentum.
+    """
+
+    target: Node
+    value: Node
+    fixed: bool
+    loops: tuple[Loop, ...]
+    place: Place
+    store: str = ""
+    unit: str = "1"
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """A traced quantity in the unit asked for: value = (expression - offset)/scale of that unit, already applied."""
+
+    name: str
+    expression: Node
+    unit: Unit
+    text: str  # as the author wrote it, formatted
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """`expect moment: left op right within d`; moment is always, finally, at (an instant) or static."""
+
+    moment: str
+    at: Node | None
+    operator: str
+    left: Node
+    right: Node
+    within: Node | None
+    unit: Unit
+    text: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Golden:
+    """`expect golden "file" within r`."""
+
+    file: str
+    within: Node
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is asked of a model; None where the scene does not say."""
+
+    name: str
+    place: Place
+    start: Node | None = None
+    end: Node | None = None
+    every: Node | None = None
+    accuracy: Node | None = None
+    accuracy_on: tuple[str, ...] = ()
+    formulation: str | None = None
+    formulation_place: Place | None = None
+    solver: str | None = None
+    solver_options: tuple[tuple[str, Node], ...] = ()
+    redundancy: str | None = None
+    limits: tuple[tuple[str, Node], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A model under a scene, checked: names bound, dimensions agree, SI units everywhere."""
+
+    model: str
+    place: Place
+    parameters: tuple[Parameter, ...]
+    tables: tuple[Table, ...]
+    coordinates: tuple[Coordinate, ...]
+    unknowns: tuple[Unknown, ...]
+    states: tuple[State, ...]
+    energies: tuple[Energy, ...]
+    works: tuple[Work, ...]
+    constraints: tuple[Constraint, ...]
+    dynamics: tuple[Dynamic, ...]
+    initials: tuple[Initial, ...]
+    observations: tuple[Observation, ...]
+    expectations: tuple[Expectation, ...]
+    statics: tuple[Expectation, ...]  # on static quantities, parameters `static dof` etc.
+    goldens: tuple[Golden, ...]
+    scene: Scene | None
+    elements: tuple[ElementSetting, ...] = ()
+    nodes: tuple[NodeFamily, ...] = ()
+    branches: tuple[Branch, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    slopes: tuple[Slope, ...] = ()  # of laws that the compiler has inverted
+    quasis: tuple[str, ...] = ()  # families of quasi-velocities
+    read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)

@@ -1,0 +1,72 @@
+"""Numbers of parameters: what the checks that need values compute with.
+
+Parameters of any array size; elements are computed one at a time and only where a check asks for them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import ElementSetting, Loop, Parameter
+
+
+class Values:
+    """Values of a model's parameters; NaN where a parameter has none."""
+
+    def __init__(self, parameters: Mapping[str, Parameter], elements: Sequence[ElementSetting] = ()) -> None:
+        self._parameters = parameters
+        self._known: dict[tuple[str, tuple[int, ...]], float] = {}
+        for name in parameters:  # in the order of dependence: no deep recursion
+            if not parameters[name].shape:
+                self._element(name, ())
+        for setting in elements:
+            at = tuple(int(self.number(a)) for a in setting.at)
+            self._known[setting.name, at] = self.number(setting.value)
+
+    def number(self, node: Node, bound: Mapping[Node, float] | None = None) -> float:
+        """The value of a node made of parameters and bound loop variables; NaN if it holds anything else."""
+        return float(ex.evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
+
+    def truth(self, node: Node, bound: Mapping[Node, float] | None = None) -> bool:
+        """The value of a condition."""
+        return bool(ex.evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
+
+    def _lookup(self, node: Node, bound: Mapping[Node, float]) -> float:
+        if node in bound:
+            return bound[node]
+        if node.op != "param":
+            return math.nan
+        at = tuple(self.number(a, bound) for a in node.args)
+        if not all(map(math.isfinite, at)):
+            return math.nan
+        return self._element(node.data, tuple(int(a) for a in at))
+
+    def _element(self, name: str, at: tuple[int, ...]) -> float:
+        key = (name, at)
+        if key not in self._known:
+            parameter = self._parameters.get(name)
+            self._known[key] = math.nan
+            if parameter is not None and parameter.values:
+                self._known[key] = self._compute(parameter, at)
+        return self._known[key]
+
+    def _compute(self, parameter: Parameter, at: tuple[int, ...]) -> float:
+        bound = {ex.index(name): float(i) for name, i in zip(parameter.indices, at, strict=False)}
+        k = 0
+        if len(parameter.values) > 1:
+            k = at[-1] - int(self.number(parameter.shape[-1][0]))
+        return self.number(parameter.values[k], bound) if 0 <= k < len(parameter.values) else math.nan
+
+    def bounds(self, node: Node, loops: Sequence[Loop]) -> tuple[float, float]:
+        """Least and greatest value of an affine index over its loops (an empty loop gives inf, -inf)."""
+        low: dict[Node, float] = {}
+        high: dict[Node, float] = {}
+        for loop in loops:
+            me = ex.index(loop.index)
+            low[me], high[me] = self.number(loop.first, low), self.number(loop.last, high)
+            if low[me] > high[me]:
+                return math.inf, -math.inf
+        return self.number(node, low), self.number(node, high)

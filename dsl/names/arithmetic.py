@@ -1,0 +1,129 @@
+"""Sums, products, powers and conditions, with the dimensions of their operands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.units import NONE, Dimension, multiply, raised
+from sysdyn.dsl.names.context import Context, Value
+from sysdyn.dsl.names.symbols import Typed, Vector
+from sysdyn.dsl.text.diagnostics import Related
+from sysdyn.dsl.tree import syntax
+
+
+class Arithmetic(Context):
+    """Sums, products, powers and conditions, with the dimensions of their operands."""
+
+    def _sum(self, e: syntax.Sum) -> Value:
+        values = [self.resolve(t) for _, t in e.terms]
+        if any(isinstance(v, Vector) for v in values):
+            return self._vector_sum(e, values)
+        found: Dimension | None = None
+        where = e.terms[0][1]
+        for (_, term), value in zip(e.terms, values, strict=True):
+            assert isinstance(value, Typed)
+            self.is_number(value, term)
+            if value.dimension is None:
+                continue
+            if found is None:
+                found, where = value.dimension, term
+            elif value.dimension != found:
+                message = f"the two operands differ: {dim.show(found)} + {dim.show(value.dimension)}"
+                related = (Related(dim.show(found), self.place(where.span)),)
+                raise self.fail("E203", message, term.span, related=related, help=self.missing(found, value.dimension))
+        signs = [-1.0 if s == "-" else 1.0 for s, _ in e.terms]
+        return Typed(ex.linear(0.0, zip(signs, (v.node for v in values), strict=True)), found)  # type: ignore[union-attr]
+
+    def _vector_sum(self, e: syntax.Sum, values: Sequence[Value]) -> Value:
+        total = None
+        for (sign, term), value in zip(e.terms, values, strict=True):
+            if not isinstance(value, Vector) or (total is not None and len(value.items) != len(total)):
+                raise self.fail("E203", "an array is added to something of another size", term.span)
+            signed = [Typed(ex.neg(v.node) if sign == "-" else v.node, v.dimension) for v in value.items]
+            total = signed if total is None else [self.add(a, b, term.span) for a, b in zip(total, signed, strict=True)]
+        return Vector(tuple(total or ()))
+
+    def _product(self, e: syntax.Product) -> Value:
+        nodes: list[tuple[float, Node]] = []
+        dimension: Dimension | None = NONE
+        vector: Vector | None = None
+        for op, factor in e.factors:
+            value = self.resolve(factor)
+            if isinstance(value, Vector):
+                if vector is not None or op == "/":
+                    raise self.fail(
+                        "E203", "the product of two arrays is written dot(a, b) or cross(a, b)", factor.span
+                    )
+                vector = value
+                continue
+            self.is_number(value, factor)
+            power = -1 if op == "/" else 1
+            nodes.append((float(power), value.node))
+            if value.dimension is None:
+                dimension = None
+            elif dimension is not None:
+                dimension = multiply(dimension, value.dimension, power)
+        node = ex.product(1.0, nodes)
+        if vector is None:
+            return Typed(node, dimension)
+        items = []
+        for v in vector.items:
+            d = None if v.dimension is None or dimension is None else multiply(dimension, v.dimension)
+            items.append(Typed(ex.mul(node, v.node), d))
+        return Vector(tuple(items), vector.first)
+
+    def _negative(self, e: syntax.Negative) -> Value:
+        value = self.resolve(e.operand)
+        if isinstance(value, Vector):
+            return Vector(tuple(Typed(ex.neg(v.node), v.dimension) for v in value.items), value.first)
+        self.is_number(value, e.operand)
+        return Typed(ex.neg(value.node), value.dimension)
+
+    def _power(self, e: syntax.Power) -> Value:
+        base, exponent = self.scalar(e.base), self.scalar(e.exponent)
+        if exponent.dimension not in (None, NONE):
+            raise self.fail("E204", f"the exponent is in {dim.show(exponent.dimension)}", e.exponent.span)
+        if not base.dimension:
+            return Typed(ex.power(base.node, exponent.node), base.dimension if exponent.dimension else NONE)
+        if not ex.is_const(exponent.node):
+            message = f"the exponent must be a rational constant because the base is in {dim.show(base.dimension)}"
+            raise self.fail("E204", message, e.exponent.span, help="make the base dimensionless")
+        exact = Fraction(exponent.node.data).limit_denominator(1000)
+        if abs(exact) > 100:
+            raise self.fail("E204", f"the exponent {exponent.node} of a quantity is out of reason", e.exponent.span)
+        power: Fraction | int = int(exact) if exact.denominator == 1 else exact
+        dimension = tuple((k, int(v) if v == int(v) else v) for k, v in raised(base.dimension, power))
+        return Typed(ex.power(base.node, exponent.node), dimension)
+
+    def _compare(self, e: syntax.Compare) -> Value:
+        left, right = self.resolve(e.left), self.resolve(e.right)
+        if isinstance(left, Vector) or isinstance(right, Vector):
+            raise self.fail("E203", "arrays are not compared", e.span)
+        if left.truth or right.truth:
+            raise self.fail("E203", "a condition is not compared", e.span, help="and, or, not")
+        if None not in (left.dimension, right.dimension) and left.dimension != right.dimension:
+            message = f"the two operands differ: {dim.show(left.dimension)} {e.op} {dim.show(right.dimension)}"
+            raise self.fail("E203", message, e.span)
+        return Typed(ex.compare(e.op, left.node, right.node), NONE, truth=True)
+
+    def _and(self, e: syntax.And) -> Value:
+        return Typed(ex.both(*(self.condition(o) for o in e.operands)), NONE, truth=True)
+
+    def _or(self, e: syntax.Or) -> Value:
+        return Typed(ex.either(*(self.condition(o) for o in e.operands)), NONE, truth=True)
+
+    def _not(self, e: syntax.Not) -> Value:
+        return Typed(ex.negate(self.condition(e.operand)), NONE, truth=True)
+
+    def _conditional(self, e: syntax.Conditional) -> Value:
+        test = self.condition(e.test)
+        then, other = self.scalar(e.then), self.scalar(e.other)
+        if None not in (then.dimension, other.dimension) and then.dimension != other.dimension:
+            message = f"the two branches differ: {dim.show(then.dimension)} and {dim.show(other.dimension)}"
+            raise self.fail("E203", message, e.span)
+        dimension = then.dimension if then.dimension is not None else other.dimension
+        return Typed(ex.conditional(test, then.node, other.node), dimension)

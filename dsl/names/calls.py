@@ -1,0 +1,194 @@
+"""Functions, tables, reductions and arrays written as lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.units import NONE, Dimension, multiply
+from sysdyn.dsl.names.context import Context, Failed, Value
+from sysdyn.dsl.names.symbols import Definition, FunctionSymbol, Space, TableSymbol, Typed, Vector, nearest
+from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.tree import syntax
+
+
+class Calls(Context):
+    """Functions, tables, reductions and arrays written as lists."""
+
+    def _array(self, e: syntax.Array) -> Value:
+        return Vector(tuple(self.scalar(i) for i in e.items))
+
+    def _reduction(self, e: syntax.Reduction) -> Value:
+        first, last = self.whole_number(e.lower, "a bound"), self.whole_number(e.upper, "a bound")
+        if self._indexes_list(e):
+            return self._unrolled(e, first, last)
+        with self.loop(e.index.name, first, last, unique=True) as loop:
+            body = self.scalar(e.body)
+        if e.op == "prod" and body.dimension:
+            raise self.fail("E203", "the factors of a product over a range are dimensionless", e.body.span)
+        return Typed(ex.reduction(e.op, loop.index, first, last, body.node), body.dimension)
+
+    def _indexes_list(self, e: syntax.Reduction) -> bool:
+        """Whether the body takes elements of an array whose items were written out one by one."""
+        for inner in walk(e.body):
+            if isinstance(inner, syntax.Item) and isinstance(inner.base, syntax.Name):
+                symbol = self.scope.find(inner.base.name)
+                if isinstance(symbol, Definition) and not symbol.at:
+                    return True
+        return False
+
+    def _unrolled(self, e: syntax.Reduction, first: Node, last: Node) -> Value:
+        if not (ex.is_const(first) and ex.is_const(last)):
+            message = "the body takes elements of a list, so the bounds must be numbers"
+            raise self.fail("E806", message, e.span, help="an array with a formula for its elements")
+        before, values = self._bound, []
+        for k in range(int(first.data), int(last.data) + 1):
+            self._bound = {**before, e.index.name: Typed(ex.const(k), NONE)}
+            try:
+                values.append(self.scalar(e.body))
+            finally:
+                self._bound = before
+        if not values:
+            return Typed(ex.const(0.0 if e.op == "sum" else 1.0), None)
+        total = values[0]
+        for value in values[1:]:
+            if e.op == "sum":
+                total = self.add(total, value, e.body.span)
+            elif e.op == "prod":
+                d = None if None in (total.dimension, value.dimension) else multiply(total.dimension, value.dimension)
+                total = Typed(ex.mul(total.node, value.node), d)
+            else:
+                total = Typed(ex.call(e.op, total.node, value.node), total.dimension)
+        return total
+
+    def _call(self, e: syntax.Call) -> Value:
+        for arg in e.args:
+            if arg.name is not None:
+                raise self.fail("E404", f"functions take their arguments by position, not '{arg.name} ='", arg.span)
+        symbol = self.scope.find(e.name)
+        if isinstance(symbol, FunctionSymbol):
+            return self._function(symbol, e)
+        if isinstance(symbol, TableSymbol):
+            return self._table(symbol, e)
+        if e.name == "energy_through" and len(e.args) == 1:
+            return self.through(e.args[0].value)
+        if e.name in ("dot", "cross", "norm"):
+            return self._vector_call(e)
+        if e.name == "quasi":
+            raise self.fail("E319", "quasi(w) is what a work acts on", e.span, help="work E on quasi(w)")
+        if e.name not in dim.FUNCTIONS:
+            near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
+            help_ = f"nearest name in scope: '{near}'" if near else None
+            if self.scope.is_broken(e.name):
+                raise Failed
+            raise self.fail("E101", f"unknown function '{e.name}'", e.span, help=help_)
+        return self._builtin(e)
+
+    def _builtin(self, e: syntax.Call) -> Value:
+        name = e.name
+        count, _ = dim.FUNCTIONS[name]
+        values: list[Typed] = []
+        for arg in e.args:
+            value = self.resolve(arg.value)
+            values += list(value.items) if isinstance(value, Vector) and count == -1 else [self.scalar(arg.value)]
+        if (count == -1 and not values) or (count >= 0 and len(values) != count):
+            wants = "at least one argument" if count == -1 else f"{count} argument{'s' * (count != 1)}"
+            raise self.fail("E206", f"{name} takes {wants}, {len(values)} given", e.span)
+        common: Dimension | None = None
+        for k, value in enumerate(values):
+            where = e.args[min(k, len(e.args) - 1)].value
+            if dim.wants_plain(name) and value.dimension not in (None, NONE):
+                self._not_plain(name, value.dimension, where)
+            if value.dimension is not None and common is None:
+                common = value.dimension
+            elif value.dimension is not None and value.dimension != common:
+                message = f"the arguments of {name} differ: {dim.show(common)} and {dim.show(value.dimension)}"
+                raise self.fail("E206", message, where.span)
+        if name == "setsign":
+            raise self.fail("N608", "setsign is not supported yet (planned: events and inequalities)", e.span)
+        if name == "celsius":
+            return Typed(ex.add(values[0].node, ex.const(273.15)), dim.result(name, NONE))
+        return Typed(ex.call(name, *(v.node for v in values)), dim.result(name, common))
+
+    def _not_plain(self, name: str, dimension: Dimension | None, e: syntax.Expr) -> None:
+        text = self.source.text[e.span.start : e.span.end]
+        help_ = f"{name}({text}/(1 {dim.show(dimension)}))" if len(text) < 60 else None
+        raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)
+
+    def _vector_call(self, e: syntax.Call) -> Value:
+        wanted = 1 if e.name == "norm" else 2
+        values = [self.resolve(a.value) for a in e.args]
+        if len(values) != wanted or not all(isinstance(v, Vector) for v in values):
+            raise self.fail("E206", f"{e.name} takes {wanted} array{'s' * (wanted > 1)}", e.span)
+        a = values[0].items  # type: ignore[union-attr]
+        b = values[-1].items  # type: ignore[union-attr]
+        if len(a) != len(b) or (e.name == "cross" and len(a) != 3):
+            raise self.fail("E206", f"the arrays of {e.name} have {len(a)} and {len(b)} elements", e.span)
+        if e.name == "cross":
+            at = ((1, 2), (2, 0), (0, 1))
+            return Vector(tuple(self.add(_times(a[i], b[j]), _minus(_times(a[j], b[i])), e.span) for i, j in at))
+        total = _times(a[0], b[0])
+        for x, y in zip(a[1:], b[1:], strict=True):
+            total = self.add(total, _times(x, y), e.span)
+        if e.name == "dot":
+            return total
+        return Typed(ex.sqrt(total.node), None if total.dimension is None else dim.halved(total.dimension))
+
+    def _arguments(self, name: str, heads: Sequence[tuple[str, Dimension]], e: syntax.Call) -> list[Node]:
+        if len(heads) != len(e.args):
+            raise self.fail("E206", f"{name} takes {len(heads)} arguments, {len(e.args)} given", e.span)
+        nodes = []
+        for (head, dimension), arg in zip(heads, e.args, strict=True):
+            message = f"argument '{head}' of {name} is in {{}}, wants {dim.show(dimension)}"
+            nodes.append(self.wanted(arg.value, dimension, "E206", message))
+        return nodes
+
+    def _table(self, symbol: TableSymbol, e: syntax.Call) -> Value:
+        return Typed(ex.table(symbol.name, *self._arguments(symbol.name, symbol.arguments, e)), symbol.result)
+
+    def _function(self, symbol: FunctionSymbol, e: syntax.Call) -> Value:
+        definition, name = symbol.definition, symbol.name
+        units = [read_unit(p.unit, symbol.file_scope, symbol.source, self.report) for p in definition.params]
+        result = read_unit(definition.result, symbol.file_scope, symbol.source, self.report)
+        if result is None or None in units:
+            raise Failed
+        heads = [(p.name, u.dimension) for p, u in zip(definition.params, units, strict=True) if u]
+        nodes = self._arguments(name, heads, e)
+        if any(s.expression is definition.value for s in self._active):
+            raise self.fail("E105", f"circular definition: {name} -> {name}", e.span)
+        space = Space("", symbol.file_scope, symbol.file_scope, symbol.source)
+        marker = Definition(name, "fn", definition.value, (), None, space, symbol.place, definition.name.span)
+        arguments = {n: Typed(node, d) for (n, d), node in zip(heads, nodes, strict=True)}
+        self._active.append(marker)
+        try:
+            with self.space(space), self.bound(arguments):
+                message = f"function '{name}' is declared {dim.show(result.dimension)} but its value is {{}}"
+                node = self.wanted(definition.value, result.dimension, "E207", message)
+        finally:
+            self._active.pop()
+        return Typed(node, result.dimension)
+
+
+def walk(root: syntax.Expr) -> Iterator[object]:
+    """All syntax nodes below an expression."""
+    stack: list[object] = [root]
+    while stack:
+        node = stack.pop()
+        yield node
+        for name in getattr(type(node), "__slots__", ()):
+            child = getattr(node, name)
+            for part in child if isinstance(child, tuple) else (child,):
+                for item in part if isinstance(part, tuple) else (part,):
+                    if type(item).__module__.startswith("sysdyn.dsl.tree.syntax"):
+                        stack.append(item)
+
+
+def _times(a: Typed, b: Typed) -> Typed:
+    d = None if a.dimension is None or b.dimension is None else multiply(a.dimension, b.dimension)
+    return Typed(ex.mul(a.node, b.node), d)
+
+
+def _minus(a: Typed) -> Typed:
+    return Typed(ex.neg(a.node), a.dimension)

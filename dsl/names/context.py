@@ -1,0 +1,279 @@
+"""Where an expression is being resolved: scope, text, loops, report; and the entries that statements use.
+
+The resolver's rules are spread over `names`, `members`, `arithmetic` and `calls`; each builds on this context.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Constraint, Loop
+from sysdyn.dsl.model.units import NONE, Dimension
+from sysdyn.dsl.names.symbols import Definition, InstanceSymbol, ParameterSymbol, Scope, Space, Typed, Vector
+from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.tree import syntax
+
+Value = Typed | Vector
+
+
+@dataclass(slots=True)
+class Use:
+    """An index used on a family, to be checked against its shape once the sizes are known."""
+
+    shape: tuple[Node, Node]
+    value: Node
+    loops: tuple[Loop, ...]
+    name: str
+    place: Place
+
+
+@dataclass(slots=True)
+class Quadrature:
+    """The integral of a power since the start (J): a dynamic variable that only reading it brings into being.
+
+    first: the expression whose initial value it starts from; None: zero.
+    """
+
+    power: Node
+    shape: tuple[tuple[Node, Node], ...]
+    dimension: Dimension
+    place: Place
+    first: Node | None = None
+
+
+class Failed(Exception):  # noqa: N818
+    """The expression is wrong and has been reported."""
+
+
+class Context:
+    """What is in sight, and what has been learnt on the way."""
+
+    def __init__(self, report: Report) -> None:
+        self.report = report
+        self.uses: list[Use] = []
+        self.whole: set[str] = set()  # parameters used as sizes or indices
+        self.inputs: set[str] = set()  # parameters that are inputs: no sizes
+        self.branches: list[Branch] = []  # those found so far
+        self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
+        self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
+        self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
+        self.constraints: dict[str, list[Constraint]] = {}
+        self._values: dict[tuple[Definition, bool], Value | None] = {}
+        self._active: list[Definition] = []
+        self._loops: list[Loop] = []
+        self._bound: dict[str, Typed] = {}  # loop variables, function arguments, an element's own variables
+        self._names: dict[str, int] = {}
+        self.scope = Scope()
+        self.source = SourceText("", "")
+        self.file_scope = self.scope
+        self._unknown = ("E101", "unknown name '{}'")
+        self.lenient = False  # what the chosen level lacks is a note (language, decision 5)
+        self.virtual = False  # outputs and inputs are signals, held by virtual displacements
+        self.complete = False  # all elements are known
+        self.statics = False  # static quantities are in sight (expect static)
+
+    @contextmanager
+    def within(self, scope: Scope, source: SourceText) -> Iterator[None]:
+        """Resolve names in that scope and take spans as parts of that text."""
+        before = self.scope, self.source
+        self.scope, self.source = scope, source
+        try:
+            yield
+        finally:
+            self.scope, self.source = before
+
+    @contextmanager
+    def space(self, space: Space) -> Iterator[None]:
+        """Resolve inside a model or an instance: its names, its text, its loops, nothing else bound."""
+        before = self._bound, self._loops, self.file_scope
+        self._bound, self._loops, self.file_scope = dict(space.bound), list(space.loops), space.file_scope
+        try:
+            with self.within(space.scope, space.source):
+                yield
+        finally:
+            self._bound, self._loops, self.file_scope = before
+
+    @contextmanager
+    def bound(self, names: dict[str, Typed]) -> Iterator[None]:
+        """Bring values into sight that hide the scope's names."""
+        before = self._bound
+        self._bound = {**before, **names}
+        try:
+            yield
+        finally:
+            self._bound = before
+
+    def sight(self) -> dict[str, Typed]:
+        """What is bound here: to be brought into sight again later."""
+        return dict(self._bound)
+
+    @contextmanager
+    def inside(self, loops: tuple[Loop, ...], sight: dict[str, Typed]) -> Iterator[None]:
+        """Go back to where a statement stands."""
+        before = self._bound, self._loops
+        self._bound, self._loops = sight, list(loops)
+        try:
+            yield
+        finally:
+            self._bound, self._loops = before
+
+    @contextmanager
+    def unknown_as(self, code: str, message: str) -> Iterator[None]:
+        """Report unknown names under another code (message: with {} for the name)."""
+        before, self._unknown = self._unknown, (code, message)
+        try:
+            yield
+        finally:
+            self._unknown = before
+
+    @contextmanager
+    def virtually(self) -> Iterator[None]:
+        """Read the law of a modulus or a flow constraint: outputs and inputs stay marked as signals."""
+        before, self.virtual = self.virtual, True
+        try:
+            yield
+        finally:
+            self.virtual = before
+
+    @contextmanager
+    def leniently(self) -> Iterator[None]:
+        """What the chosen level of an instance lacks and another has is a note, and the statement is left out."""
+        before, self.lenient = self.lenient, True
+        try:
+            yield
+        finally:
+            self.lenient = before
+
+    @contextmanager
+    def loop(self, name: str, first: Node, last: Node, unique: bool = False) -> Iterator[Loop]:
+        """Bring a loop variable into sight; unique: under a name that no other loop has."""
+        inner = name
+        if unique or any(loop.index == name for loop in self._loops):
+            self._names[name] = self._names.get(name, 0) + 1
+            inner = f"{name}_{self._names[name]}"
+        before = self._bound
+        loop = Loop(inner, first, last)
+        self._bound = {**before, name: Typed(ex.index(inner), NONE)}
+        self._loops.append(loop)
+        try:
+            yield loop
+        finally:
+            self._loops.pop()
+            self._bound = before
+
+    @property
+    def loops(self) -> tuple[Loop, ...]:
+        """The loops around the present statement, outermost first."""
+        return tuple(self._loops)
+
+    def bound_loops(self) -> list[str]:
+        """Names of the loop variables in sight, as written."""
+        return [n for n, v in self._bound.items() if v.node.op == "index"]
+
+    def place(self, span: syntax.Span) -> Place:
+        """A span of the present text."""
+        return Place(self.source, span)
+
+    def fail(self, code: str, message: str, span: syntax.Span, **more: object) -> Failed:
+        """Report an error; raise what is returned."""
+        self.report.error(code, message, self.place(span), **more)  # type: ignore[arg-type]
+        return Failed()
+
+    # -- entries -------------------------------------------------------------------------------------------
+
+    def resolve(self, expression: syntax.Expr) -> Value:
+        """The value of an expression."""
+        raise NotImplementedError
+
+    def through(self, port: syntax.Expr) -> Typed:
+        """The energy that has gone into a component through one of its ports."""
+        raise NotImplementedError
+
+    def scalar(self, expression: syntax.Expr) -> Typed:
+        """A scalar value of any dimension."""
+        value = self.resolve(expression)
+        if isinstance(value, Vector):
+            raise self.fail("E203", "an array stands where one number is wanted", expression.span)
+        if value.truth:
+            raise self.fail("E203", "a condition stands where a number is wanted", expression.span)
+        return value
+
+    def wanted(self, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
+        """A scalar of one dimension; otherwise code with message (its {} is what was found)."""
+        value = self.scalar(expression)
+        if value.dimension is not None and value.dimension != dimension:
+            raise self.fail(code, message.format(dim.show(value.dimension)), expression.span)
+        return value.node
+
+    def condition(self, expression: syntax.Expr) -> Node:
+        """A condition."""
+        value = self.resolve(expression)
+        if isinstance(value, Vector) or not value.truth:
+            raise self.fail("E203", "a condition is wanted here: a comparison such as a < b", expression.span)
+        return value.node
+
+    def whole_number(self, expression: syntax.Expr, what: str) -> Node:
+        """An index or a bound: made of whole numbers, loop variables and dimensionless parameters."""
+        value = self.scalar(expression)
+        if value.dimension not in (None, NONE):
+            raise self.fail("E805", f"{what} is in {dim.show(value.dimension)}, not a number", expression.span)
+        for node in ex.topological([value.node]):
+            if node.op in ("var", "time", "table"):
+                raise self.fail("E807", f"{what} depends on '{node}', which is no constant", expression.span)
+            if node.op == "param" and node.data in self.inputs:
+                raise self.fail(
+                    "E807",
+                    f"{what} depends on the input '{node.data}', which may vary",
+                    expression.span,
+                    help="a param",
+                )
+            if node.op == "param":
+                self.whole.add(node.data)
+            if node.op == "const" and node.data != node.data:
+                raise Failed
+        return value.node
+
+    def missing(self, have: Dimension | None, want: Dimension | None) -> str | None:
+        """What factor would make two dimensions agree, and which parameter has it."""
+        if have is None or want is None:
+            return None
+        for factor in (dim.quotient(want, have), dim.quotient(have, want)):
+            level: Scope | None = self.scope
+            while level is not None:
+                for s in level.symbols.values():
+                    if isinstance(s, ParameterSymbol) and not s.shape and factor and s.dimension == factor:
+                        return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
+                level = level.outer
+        return None
+
+    def is_number(self, value: Typed, e: syntax.Expr) -> None:
+        """Report a condition in the place of a number."""
+        if value.truth:
+            raise self.fail("E203", "a condition stands where a number is wanted", e.span)
+
+    def add(self, a: Typed, b: Typed, span: syntax.Span) -> Typed:
+        """The sum of two values of one dimension."""
+        if None not in (a.dimension, b.dimension) and a.dimension != b.dimension:
+            raise self.fail("E203", f"the two operands differ: {dim.show(a.dimension)} + {dim.show(b.dimension)}", span)
+        return Typed(ex.add(a.node, b.node), a.dimension if a.dimension is not None else b.dimension)
+
+    def index(self, index: syntax.Index) -> Node:
+        """An affine index: loop variable + constant."""
+        if isinstance(index, syntax.Range):
+            raise self.fail("E806", "one element is wanted here, not a slice", index.span)
+        node = self.whole_number(index, "an index")
+        loops = [n for n in ex.topological([node]) if n.op == "index"]
+        if loops:
+            rest = node
+            for n in loops[:1]:
+                rest = ex.sub(node, n)
+            if len(loops) > 1 or any(n.op == "index" for n in ex.topological([rest])):
+                message = f"index {node} is not affine in one loop variable: the array would have to be unrolled"
+                raise self.fail("E806", message, index.span, help="i + c, or a table over the index")
+        return node

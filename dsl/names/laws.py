@@ -1,0 +1,175 @@
+"""Laws of elements: which edge of Paynter's diagram a law lies on, and what is wrong where it lies on none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.names.context import Context, Failed
+from sysdyn.dsl.names.members import branch_dimension
+from sysdyn.dsl.names.symbols import BranchSymbol, Typed
+from sysdyn.dsl.tree import syntax
+
+ONE_PORTS = ("kinetic", "potential", "dissipator", "effort", "flow")
+TWO_PORTS = ("transformer", "gyrator")
+_EDGES = {frozenset("pf"): "kinetic", frozenset("qe"): "potential", frozenset("ef"): "dissipator"}
+_OTHER = {"kinetic": "pf", "potential": "qe", "dissipator": "ef"}
+
+
+@dataclass(frozen=True, slots=True)
+class LawOf:
+    """side = law of a branch, and the kind of element that it makes."""
+
+    kind: str
+    side: str
+    law: Node
+
+
+def own_variables(branch: BranchSymbol, at: tuple[Node, ...], suffix: str = "") -> dict[str, Typed]:
+    """Variables e f q p of a branch under the names that its law uses."""
+    found = {}
+    for letter in "efqp":
+        node = ex.var(branch.family.name, f"b{letter}", *at)
+        found[f"{letter}{suffix}"] = Typed(node, branch_dimension(branch.domain, letter))
+    return found
+
+
+def law_of(
+    context: Context,
+    branch: BranchSymbol,
+    at: tuple[Node, ...],
+    side: str,
+    value: syntax.Expr,
+    wanted: str | None,
+    span: syntax.Span,
+) -> LawOf:
+    """Classify `side = value`; wanted: the kind that the author named (None in a component's law)."""
+    dimension = branch_dimension(branch.domain, side)
+    message = f"law of '{branch.name}': {side} is in {dim.show(dimension)}, the law in {{}}"
+    node = context.wanted(value, dimension, "E208", message)
+    own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
+    others = sorted(set(own) - {side})
+    if side in own or len(others) > 1:
+        names = ", ".join((side, *others))
+        raise context.fail(
+            "E303", f"the law must be solved for one port variable of its edge; it relates {names}", span
+        )
+    if not others:
+        return _source(context, branch, side, node, wanted, span)
+    kind = _EDGES.get(frozenset((side, others[0])))
+    if kind is None:
+        raise _off_diagram(context, side, others[0], span)
+    if wanted in ("effort", "flow"):
+        help_ = f"that is a {kind}: '{kind}({side} = ...)'"
+        raise context.fail(
+            "E315", f"source '{branch.name}': its law is a function of its own {others[0]}", span, help=help_
+        )
+    if wanted is not None and kind != wanted:
+        message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
+        raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
+    _alone(context, branch, kind, node, span)
+    return LawOf(kind, side, node)
+
+
+def _source(
+    context: Context, branch: BranchSymbol, side: str, node: Node, wanted: str | None, span: syntax.Span
+) -> LawOf:
+    """A law without a variable of its own branch: a source, or a store or dissipator that it degenerates to."""
+    if wanted in _OTHER:
+        if side not in _OTHER[wanted]:
+            raise context.fail("E323", f"'{branch.name}' is a {wanted}, but its law gives {side}", span)
+        return LawOf(wanted, side, node)
+    if side not in "ef" or (wanted is not None and wanted[0] != side):
+        raise context.fail(
+            "E303", f"a source gives its effort or its flow, not {side}", span, help="'e = ...' or 'f = ...'"
+        )
+    return LawOf("effort" if side == "e" else "flow", side, node)
+
+
+def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> Failed:
+    pair = frozenset((side, other))
+    if pair == frozenset("pq"):
+        help_ = "write it as a dissipator: e = M(q)*f with M = dp/dq"
+        return context.fail("E302", "p-q is the diagonal of the diagram: a memristive law", span, help=help_)
+    requirement = "p' = e" if pair == frozenset("pe") else "q' = f"
+    message = (
+        f"a law must relate p-f, q-e or e-f; this one relates {side} and {other}, which {requirement} already fixes"
+    )
+    return context.fail("E301", message, span)
+
+
+def _alone(context: Context, branch: BranchSymbol, kind: str, node: Node, span: syntax.Span) -> None:
+    """E304: the law of a store may not depend on another displacement or momentum."""
+    if kind == "dissipator":
+        return
+    for other in sorted((n for n in ex.variables(node) if n.op == "var"), key=lambda n: n.number):
+        name, var_kind, _ = other.data
+        if name != branch.family.name and var_kind in ("q", "nq", "bq", "p", "np", "bp"):
+            what = "displacement" if var_kind.endswith("q") else "momentum"
+            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store works there too"
+            function = "T*" if kind == "kinetic" else "V"
+            raise context.fail("E304", message, span, help=f"energy {function} = ... with ports for both")
+
+
+@dataclass(frozen=True, slots=True)
+class RatioOf:
+    """A two-port: side e or f of branch 1 = ratio * that of branch 2 (gyrator: e1 = ratio*f2)."""
+
+    kind: str
+    side: str
+    ratio: Node
+
+
+def ratio_of(
+    context: Context,
+    branches: tuple[BranchSymbol, BranchSymbol],
+    at: tuple[Node, ...],
+    kind: str,
+    side: str,
+    value: syntax.Expr,
+    span: syntax.Span,
+) -> RatioOf:
+    """The ratio of a transformer or gyrator from its one law (e1, f1, e2 or f2 = ...)."""
+    letter, number = side[0], int(side[1])
+    me, partner = branches[number - 1], branches[2 - number]
+    dimension = branch_dimension(me.domain, letter)
+    name = me.name.partition("#")[0]
+    message = f"law of '{name}': {side} is in {dim.show(dimension)}, the law in {{}}"
+    with context.virtually():
+        node, signals = ex.signals_held(context.wanted(value, dimension, "E208", message))
+    far = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == partner.family.name}
+    near = [
+        n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")
+    ]
+    expected = letter if kind == "transformer" else {"e": "f", "f": "e"}[letter]
+    wrong = {"e": "f", "f": "e"}[expected]
+    if expected not in far:
+        if wrong in far:
+            other = "gyrator" if kind == "transformer" else "transformer"
+            message = f"{kind} '{name}' given as {side} against {wrong}{3 - number}: that is a {other}"
+            raise context.fail("E316", message, span, help=f"'{other}({side} = ...)'")
+        raise context.fail("E303", f"the law of '{name}' gives {side} from {expected}{3 - number}", span)
+    ratio = ex.derivative(node, far[expected])
+    rest = ex.substitute(node, {far[expected]: ex.const(0.0)})
+    own = [n for n in ex.variables(ratio) if n.op == "var" and n.data[0] in (me.family.name, partner.family.name)]
+    flows = [n for n in own if n.data[1] in ("be", "bf")]
+    if near or flows or not ex.is_const(rest, 0.0):
+        shown = (near or flows or [far[expected]])[0]
+        message = f"{kind} ratio of '{name}' depends on {shown}, a flow or effort of its own ports"
+        raise context.fail("E317", message, span, help="ratios may depend on displacements and signals")
+    return _normal(kind, letter, number, ex.substitute(ratio, signals) if signals else ratio)
+
+
+def _normal(kind: str, letter: str, number: int, ratio: Node) -> RatioOf:
+    """Written for branch 1: e1 f1 + e2 f2 = 0 turns the law of one side into that of the other."""
+    if kind == "transformer":
+        # e2 = r e1 gives f1 = -r f2; f2 = r f1 gives e1 = -r e2
+        if number == 2:
+            return RatioOf(kind, "f" if letter == "e" else "e", ex.neg(ratio))
+        return RatioOf(kind, letter, ratio)
+    # gyrator: e1 = r f2.  f1 = g e2 gives e2 = f1/g = -r f1; e2 = r f1 gives e1 = -r f2; f2 = g e1 gives e1 = f2/g
+    inverse = ex.div(ex.const(1.0), ratio)
+    forms = {("e", 1): ratio, ("f", 1): ex.neg(inverse), ("e", 2): ex.neg(ratio), ("f", 2): inverse}
+    return RatioOf(kind, "e", forms[letter, number])

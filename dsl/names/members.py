@@ -1,0 +1,487 @@
+"""Members: `x.f`, `R1.e`, `M.La.q`, `X[i].cell.e`, `rod.multiplier`, `audit.energy`, `rod.on(x)`.
+
+A path is followed from left to right through instances, bundles and ports to a symbol; a last name that is no symbol
+there is a quantity of what was reached.  An instance's inside is written with the loop variables of its label; from
+outside they are replaced by the indices given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Constraint, Domain
+from sysdyn.dsl.model.units import NONE, Dimension, multiply
+from sysdyn.dsl.names.context import Failed, Quadrature, Use, Value
+from sysdyn.dsl.names.names import Names
+from sysdyn.dsl.names.symbols import (
+    BranchSymbol,
+    BundleNode,
+    ConstraintSymbol,
+    Definition,
+    DomainSymbol,
+    End,
+    InstanceSymbol,
+    NodeSymbol,
+    ParameterSymbol,
+    PortSymbol,
+    Space,
+    Symbol,
+    TwoPortSymbol,
+    Typed,
+    UnknownSymbol,
+    Unsupported,
+    Vector,
+    nearest,
+)
+from sysdyn.dsl.tree import syntax
+
+AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
+AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE}
+BRANCH = ("e", "f", "q", "p", "power", "energy", "T", "Tstar", "V", "Vstar")
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A symbol at the end of a path.
+
+    indices: own indices as written; change: loop variables of the instances on the way -> the indices given there.
+    """
+
+    symbol: Symbol
+    indices: tuple[syntax.Index, ...]
+    change: dict[Node, Node]
+
+
+class Members(Names):
+    """Paths and members."""
+
+    # -- paths ---------------------------------------------------------------------------------------------
+
+    def located(self, e: syntax.Expr) -> Located | None:
+        """The symbol that a path leads to; None where it leads to a quantity or is no path."""
+        match e:
+            case syntax.Name():
+                if e.name in self._bound:
+                    return None
+                symbol = self.scope.find(e.name)
+                return None if symbol is None else Located(symbol, (), {})
+            case syntax.Item():
+                base = self.located(e.base)
+                return None if base is None or base.indices else Located(base.symbol, e.indices, base.change)
+            case syntax.Member():
+                base = self.located(e.base)
+                return None if base is None else self._inside(base, e)
+        return None
+
+    def _inside(self, base: Located, e: syntax.Member) -> Located | None:
+        symbol = base.symbol
+        if isinstance(symbol, BundleNode):
+            member = symbol.members.get(e.name)
+            return None if member is None else Located(member, base.indices, base.change)
+        if isinstance(symbol, InstanceSymbol):
+            space, change = self.entered(symbol, base, e.base.span)
+            inner = space.scope.symbols.get(e.name)
+            return None if inner is None else Located(inner, (), change)
+        return None
+
+    def entered(self, symbol: InstanceSymbol, base: Located, span: syntax.Span) -> tuple[Space, dict[Node, Node]]:
+        """The space of an instance under the indices given."""
+        if not symbol.spaces:
+            self.awaken(symbol)
+        if not symbol.spaces:
+            raise Failed
+        count = len(symbol.spaces[0].around) - len(base.change)
+        if len(base.indices) != count:
+            raise self.index_count(symbol.name, count, len(base.indices), span)
+        at = tuple(self.index(i) for i in base.indices)
+        for space in symbol.spaces:
+            own = space.prefix[len(space.prefix) - count :]
+            if all(o.op == "index" or o is a for o, a in zip(own, at, strict=True)):
+                self._remember(symbol, space, base, at, count)
+                change = dict(base.change)
+                change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
+                return space, change
+        raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
+
+    def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
+        shape = space.around[len(space.around) - count :]
+        if len(symbol.spaces) == 1:
+            for node, bounds, index in zip(at, shape, base.indices, strict=True):
+                self.uses.append(Use(bounds, node, self.loops, symbol.name, self.place(index.span)))
+
+    # -- elements ------------------------------------------------------------------------------------------
+
+    def _item(self, e: syntax.Item) -> Value:
+        found = self.located(e)
+        if found is not None:
+            symbol = found.symbol
+            if isinstance(symbol, (ParameterSymbol, UnknownSymbol)):
+                return self._changed(self.own_element(symbol, found.indices, e.span), found.change)
+            if isinstance(symbol, Definition) and symbol.at and not symbol.implied:
+                if len(found.indices) != len(symbol.at):
+                    raise self.index_count(symbol.name, len(symbol.at), len(found.indices), e.span)
+                at = tuple(self.index(i) for i in found.indices)
+                return self._changed(self.definition(symbol, at), found.change)
+            if not isinstance(symbol, Definition):
+                return self.value(symbol, e.span)
+        value = self.resolve(e.base)
+        if not isinstance(value, Vector):
+            raise self.fail("E805", "only an array has elements", e.span)
+        if len(e.indices) != 1:
+            raise self.index_count("the array", 1, len(e.indices), e.span)
+        index = e.indices[0]
+        if isinstance(index, syntax.Range):
+            return self.slice(value, index)
+        return self.element_of_list(value, self.index(index), index.span)
+
+    def _changed(self, value: Value, change: dict[Node, Node]) -> Value:
+        if not change:
+            return value
+        if isinstance(value, Vector):
+            return Vector(tuple(Typed(ex.substitute(v.node, change), v.dimension) for v in value.items), value.first)
+        return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
+
+    # -- members -------------------------------------------------------------------------------------------
+
+    def _member(self, e: syntax.Member) -> Value:
+        if isinstance(e.base, syntax.Name) and e.base.name == "audit" and self.scope.find("audit") is None:
+            return self._audit(e)
+        whole = self.located(e)
+        if whole is not None:
+            return self._changed(self.value(whole.symbol, e.span), whole.change)
+        base = self.located(e.base)
+        if base is None:
+            inner = e.base.base if isinstance(e.base, syntax.Item) else e.base
+            outer = self.located(inner.base) if isinstance(inner, syntax.Member) else None
+            if outer is not None and isinstance(outer.symbol, InstanceSymbol) and isinstance(inner, syntax.Member):
+                self._instance(outer.symbol, outer, inner)  # says what the instance lacks
+            root = _root(e.base)
+            if root is not None and root.name not in self._bound and self.scope.find(root.name) is None:
+                raise self.unknown(root.name, root.span)
+            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'", e.span)
+        return self._quantity_of(base, e)
+
+    def _audit(self, e: syntax.Member) -> Value:
+        if e.name in AUDIT:
+            return Typed(ex.var(e.name, "audit"), AUDIT[e.name])
+        domains = {b.domain.name: b.domain for b in self.branches if b.domain.pseudo}
+        if e.name not in domains:
+            raise self.no_member("audit", e, (*AUDIT, *domains))
+        return self._ledger(domains[e.name], e)
+
+    def _ledger(self, domain: Domain, e: syntax.Member) -> Value:
+        """What the stores of a pseudo domain have gained since the start less what the other branches gave: zero."""
+        if not self.complete:
+            raise self.fail("E102", f"audit.{e.name} is a result: no law can read it", e.span)
+        held, supplied = ledger(domain, self.branches)
+        unit = domain.displacement if domain.common == "effort" else domain.momentum
+        given = self.balance(f"audit.{domain.name}", supplied, held, unit.dimension, e)
+        return Typed(ex.sub(held, given), unit.dimension)
+
+    def _shown(self, e: syntax.Expr) -> str:
+        return " ".join(self.source.text[e.span.start : e.span.end].split())[:60]
+
+    def no_member(self, owner: str, e: syntax.Member, members: Iterable[str]) -> Failed:
+        """Report E102 with the members there are."""
+        names = list(members)
+        near = nearest(e.name, names)
+        help_ = f"nearest: '{near}'" if near else f"it has {', '.join(names[:20])}" if names else None
+        return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=help_)
+
+    def _quantity_of(self, base: Located, e: syntax.Member) -> Value:
+        symbol = base.symbol
+        shown = self._shown(e.base)
+        match symbol:
+            case UnknownSymbol() if symbol.kind == "q":
+                return self._coordinate(symbol, base, e)
+            case ConstraintSymbol():
+                return self._constraint_member(symbol, base, e)
+            case NodeSymbol():
+                at = (
+                    *symbol.family.prefix,
+                    *self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e)),
+                )
+                return self._changed(self.node_quantity(End(symbol, at, symbol.domain), e), base.change)
+            case PortSymbol():
+                return self._changed(self.node_quantity(symbol.end, e), base.change)
+            case BranchSymbol():
+                at = self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e))
+                return self._changed(self.branch_quantity(symbol, at, e.name, e), base.change)
+            case TwoPortSymbol():
+                return self._two_port(symbol, base, e)
+            case InstanceSymbol():
+                return self._instance(symbol, base, e)
+            case Unsupported():
+                raise Failed
+        raise self.fail("E102", f"'{shown}' has no member '{e.name}'", e.span)
+
+    def _all(self, base: Located, symbol: NodeSymbol | BranchSymbol, e: syntax.Member) -> tuple[syntax.Index, ...]:
+        if len(base.indices) != len(symbol.family.shape):
+            raise self.index_count(symbol.name, len(symbol.family.shape), len(base.indices), e.span)
+        return base.indices
+
+    def _coordinate(self, symbol: UnknownSymbol, base: Located, e: syntax.Member) -> Value:
+        at = (*symbol.family.prefix, *self.indices(symbol.name, symbol.shape, base.indices))
+        family = symbol.family.name
+        assert symbol.domain is not None
+        domain = symbol.domain
+        co = symbol.complementary
+        kinds: dict[str, tuple[str, Dimension]] = {
+            "p" if co else "q": ("q", symbol.dimension),
+            "e" if co else "f": ("f", domain.effort.dimension if co else domain.flow.dimension),
+        }
+        kinds.setdefault("p", ("p", domain.momentum.dimension))
+        if e.name not in kinds:
+            raise self.no_member(symbol.name, e, sorted(kinds))
+        kind, dimension = kinds[e.name]
+        return self._changed(Typed(ex.var(family, kind, *at), dimension), base.change)
+
+    def node_quantity(self, end: End, e: syntax.Member) -> Typed:
+        """Member e of a common-effort node, q and f of a common-flow node."""
+        domain = end.domain
+        if domain.common == "effort":
+            if e.name != "e":
+                help_ = "a common-effort node has e; flows belong to elements"
+                raise self.fail("E102", f"node '{self._shown(e.base)}' has no member '{e.name}'", e.span, help=help_)
+            if end.node is None:
+                return Typed(ex.const(0.0), domain.effort.dimension)
+            return Typed(ex.var(end.node.family.name, "ne", *end.at), domain.effort.dimension)
+        kinds = {"q": ("nq", domain.displacement.dimension), "f": ("nf", domain.flow.dimension)}
+        kinds["p"] = ("np", domain.momentum.dimension)
+        if e.name not in kinds:
+            raise self.no_member(self._shown(e.base), e, kinds)
+        kind, dimension = kinds[e.name]
+        if end.node is None:
+            return Typed(ex.const(0.0), dimension)
+        return Typed(ex.var(end.node.family.name, kind, *end.at), dimension)
+
+    def branch_quantity(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, e: syntax.Member) -> Typed:
+        """Members e f q p of a branch, and the power it absorbs."""
+        family, domain = symbol.family, symbol.domain
+        at = (*family.prefix, *at)
+        if name not in BRANCH:
+            raise self.no_member(self._shown(e.base), e, BRANCH)
+        power = multiply(domain.effort.dimension, domain.flow.dimension)
+        if name == "power":
+            return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
+        if name == "energy":
+            return Typed(self._absorbed(symbol, at, power, e), multiply(power, dim.TIME))
+        if name in ("T", "Tstar", "V", "Vstar"):
+            return Typed(self._stored(symbol, at, name, power, e), multiply(power, dim.TIME))
+        return Typed(ex.var(family.name, f"b{name}", *at), branch_dimension(domain, name))
+
+    def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
+        """The energy that a branch has absorbed since the start: a quadrature."""
+        family = symbol.family
+        counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
+        node = ex.mul(ex.var(family.name, "be", *counters), ex.var(family.name, "bf", *counters))
+        return self.quadrature(f"{family.name}.energy", node, family.whole, power, at, e)
+
+    def quadrature(
+        self,
+        name: str,
+        power: Node,
+        shape: tuple[tuple[Node, Node], ...],
+        dimension: Dimension,
+        at: tuple[Node, ...],
+        e: syntax.Expr,
+    ) -> Node:
+        """The integral of a power (over the counters #e0, #e1, ... of its shape) at one element."""
+        found = Quadrature(power, shape, multiply(dimension, dim.TIME), self.place(e.span))
+        self.quadratures.setdefault(name, found)
+        return ex.var(name, "s", *at)
+
+    def balance(self, name: str, rate: Node, first: Node, dimension: Dimension, e: syntax.Expr) -> Node:
+        """The integral of a rate that starts at the initial value of `first`."""
+        self.quadratures.setdefault(name, Quadrature(rate, (), dimension, self.place(e.span), first))
+        return ex.var(name, "s")
+
+    def _stored(
+        self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member
+    ) -> Node:
+        """Energies T, T*, V, V* of a store: half the product where the law is linear, else its power's integral."""
+        family = symbol.family.name
+        kind, other = ("kinetic", "f") if name.startswith("T") else ("potential", "e")
+        law = self.laws.get(family)
+        if law is None or law.kind != kind:
+            what = "a kinetic" if kind == "kinetic" else "a potential"
+            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{name}': it is not {what} store", e.span)
+        one = ex.var(family, "bp" if kind == "kinetic" else "bq", *at)
+        two = ex.var(family, f"b{other}", *at)
+        own = [n for n in ex.variables(law.law) if n.op == "var" and n.data[0] == family]
+        slope = ex.derivative(law.law, own[0]) if own else ex.const(0.0)
+        linear = own and not ex.variables(slope)
+        if linear and ex.is_const(ex.substitute(law.law, {own[0]: ex.const(0.0)}), 0.0):
+            return ex.scale(0.5, ex.mul(one, two))
+        energy = self._absorbed(symbol, at, power, e)
+        return ex.sub(ex.mul(one, two), energy) if name.endswith("star") else energy
+
+    def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
+        members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
+        if e.name not in members:
+            raise self.no_member(symbol.name, e, members)
+        letter, k = members[e.name]
+        branch = symbol.branches[k - 1]
+        at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
+        return self._changed(self.branch_quantity(branch, at, letter, e), base.change)
+
+    def port_power(self, e: syntax.Expr) -> tuple[str, Node, Dimension]:
+        """Name and power of `instance.port`: what the branches inside absorb through it."""
+        base = self.located(e.base) if isinstance(e, syntax.Member) else None
+        if base is None or not isinstance(e, syntax.Member) or not isinstance(base.symbol, InstanceSymbol):
+            raise self.fail("E102", "energy_through(label.port) wants a port of a component", e.span)
+        space, change = self.entered(base.symbol, base, e.base.span)
+        port = space.scope.symbols.get(e.name)
+        if not isinstance(port, PortSymbol):
+            raise self.fail("E407", f"'{self._shown(e.base)}' has no port '{e.name}'", e.span)
+        if change or space.around:
+            raise self.fail("N608", "energy_through of an array of components is not supported yet", e.span)
+        end, terms = port.end, []
+        common = "f" if end.domain.common == "effort" else "e"
+        for branch in self.connected(space.path):
+            for terminal, sign in ((branch.plus, 1.0), (branch.minus, -1.0)):
+                name = None if end.node is None else end.node.family.name
+                if terminal is not None and terminal.node == name and terminal.at == end.at and name is not None:
+                    terms.append((sign, ex.var(branch.name, f"b{common}", *branch.at)))
+        other = self.node_quantity(end, syntax.Member(e, "e" if common == "f" else "f", e.span))
+        power = multiply(end.domain.effort.dimension, end.domain.flow.dimension)
+        return f"{space.path}.{e.name}.energy", ex.mul(ex.linear(0.0, terms), other.node), power
+
+    def through(self, port: syntax.Expr) -> Typed:
+        """The energy that has gone into a component through one of its ports."""
+        name, node, power = self.port_power(port)
+        return Typed(self.quadrature(name, node, (), power, (), port), multiply(power, dim.TIME))
+
+    def connected(self, path: str) -> Iterable[Branch]:
+        """Branches inside an instance."""
+        return [b for b in self.branches if b.name == path or b.name.startswith(f"{path}.")]
+
+    def _instance(self, symbol: InstanceSymbol, base: Located, e: syntax.Member) -> Value:
+        space, change = self.entered(symbol, base, e.base.span)
+        branch = space.scope.symbols.get("")
+        if isinstance(branch, BranchSymbol) and e.name in BRANCH:
+            return self._changed(self.branch_quantity(branch, (), e.name, e), change)
+        if space.scope.is_broken(e.name):
+            raise Failed
+        level = f" at level {space.level}" if space.level else ""
+        if e.name in space.elsewhere and self.lenient:
+            message = f"'{self._shown(e.base)}' has no '{e.name}'{level}: left out"
+            self.report.note("N905", message, self.place(e.span))
+            raise Failed
+        if e.name in space.elsewhere:
+            message = f"'{self._shown(e.base)}' has no member '{e.name}'{level}"
+            raise self.fail("E102", message, e.span, help=f"level {space.elsewhere[e.name]} has it")
+        names = [n for n in space.scope.symbols if n]
+        near = nearest(e.name, (*names, *BRANCH) if branch is not None else names)
+        help_ = f"nearest: '{near}'" if near else None
+        raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
+
+    # -- constraints ---------------------------------------------------------------------------------------
+
+    def _constraint_member(self, symbol: ConstraintSymbol, base: Located, e: syntax.Member) -> Value:
+        at = (*symbol.family.prefix, *(self.index(i) for i in base.indices))
+        at = tuple(ex.substitute(a, base.change) for a in at)
+        constraint, expression = self.constraint(symbol, at, e.span)
+        if e.name == "residual":
+            return Typed(expression, constraint.unit.dimension)
+        if e.name != "multiplier":
+            raise self.no_member(symbol.name, e, ("multiplier", "residual", "on(...)"))
+        if symbol.kind == "gamma":
+            raise self.fail("E102", f"gamma '{symbol.name}' has no multiplier: it closes an implicit unknown", e.span)
+        work = dim.ENERGY if symbol.kind == "phi" else dim.POWER
+        return Typed(self.multiplier(symbol, at), dim.quotient(work, constraint.unit.dimension))
+
+    def multiplier(self, symbol: ConstraintSymbol, at: tuple[Node, ...]) -> Node:
+        """The multiplier of a phi or psi as an unknown."""
+        return ex.var(symbol.family.name, "kappa" if symbol.kind == "phi" else "mu", *at)
+
+    def constraint(self, symbol: ConstraintSymbol, at: tuple[Node, ...], span: syntax.Span) -> tuple[Constraint, Node]:
+        """The constraint of a label (its element `at`) and left - right there."""
+        found = self.constraints.get(symbol.family.name, [])
+        if not found:
+            raise Failed
+        if len(found[0].at) != len(at):
+            raise self.index_count(symbol.name, len(found[0].at), len(at), span)
+        for constraint in found:
+            change: dict[Node, Node] = {}
+            fits = True
+            for own, asked in zip(constraint.at, at, strict=True):
+                loop = [n for n in ex.topological([own]) if n.op == "index"]
+                if loop:
+                    change[loop[0]] = ex.add(asked, ex.sub(loop[0], own))
+                else:
+                    fits = fits and own is asked
+            if fits:
+                return constraint, ex.substitute(constraint.expression, change)
+        raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
+
+    def _method(self, e: syntax.Method) -> Value:
+        base = self.located(e.base)
+        symbol = None if base is None else base.symbol
+        wrong = not isinstance(symbol, ConstraintSymbol) or symbol.kind == "gamma"
+        if base is None or wrong or e.name != "on" or len(e.args) != 1:
+            raise self.fail("E102", f"there is no '{e.name}(...)' here", e.span, help="label.on(expr) of a phi or psi")
+        assert isinstance(symbol, ConstraintSymbol)
+        at = (*symbol.family.prefix, *(self.index(i) for i in base.indices))
+        at = tuple(ex.substitute(a, base.change) for a in at)
+        _, residual = self.constraint(symbol, at, e.span)
+        target = self.scalar(e.args[0].value)
+        if target.dimension is None:
+            raise self.fail("E203", "a constant has no displacement", e.args[0].span)
+        node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
+        return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
+
+
+def branch_dimension(domain: DomainSymbol, letter: str) -> Dimension:
+    """Dimension of e, f, q or p in a domain."""
+    unit = {"e": domain.effort, "f": domain.flow, "q": domain.displacement, "p": domain.momentum}[letter]
+    return unit.dimension
+
+
+def ledger(domain: Domain, branches: Iterable[Branch]) -> tuple[Node, Node]:
+    """Content of the stores that a domain's ground holds, and what all other branches bring in from there.
+
+    At every node the flows (efforts, where nodes have a common flow) add up to zero, so those at ground do: the rate of
+    the first is the second.
+    """
+    content, through, kind = ("bq", "bf", "potential") if domain.common == "effort" else ("bp", "be", "kinetic")
+    held: list[Node] = []
+    supplied: list[Node] = []
+    for b in branches:
+        if b.domain.name != domain.name or b.plus is None or b.minus is None:
+            continue
+        sign = (b.minus.node is None) - (b.plus.node is None)  # +1: from a node to ground
+        if not sign:
+            continue
+        stores = b.kind == kind
+        node = ex.scale(float(sign if stores else -sign), ex.var(b.name, content if stores else through, *b.at))
+        for loop in reversed(b.loops):
+            node = ex.reduction("sum", loop.index, loop.first, loop.last, node)
+        (held if stores else supplied).append(node)
+    return ex.add(*held), ex.add(*supplied)
+
+
+_RATES = {"q": "f", "nq": "nf", "bq": "bf"}
+
+
+def reaction(residual: Node, holonomic: bool, target: Node, multiplier: Node) -> Node:
+    """Constraint effort along a displacement: -(d residual/dq) multiplier, projected on grad(target)."""
+    top: list[Node] = []
+    bottom: list[Node] = []
+    for node in sorted((n for n in ex.variables(target) if n.op == "var"), key=lambda n: n.number):
+        slope = ex.derivative(target, node)
+        held = node if holonomic else ex.var(node.data[0], _RATES.get(node.data[1], "f"), *node.args)
+        top.append(ex.mul(ex.derivative(residual, held), slope))
+        bottom.append(ex.mul(slope, slope))
+    return ex.neg(ex.div(ex.mul(multiplier, ex.add(*top)), ex.add(*bottom)))
+
+
+def _root(e: syntax.Expr) -> syntax.Name | None:
+    """The name that a path begins with."""
+    while isinstance(e, (syntax.Item, syntax.Member, syntax.Prime)):
+        e = e.base
+    return e if isinstance(e, syntax.Name) else None

@@ -1,0 +1,296 @@
+"""Names and what stands behind them: quantities, parameters, unknowns, definitions, elements of arrays."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.units import NONE, known
+from sysdyn.dsl.names.context import Context, Failed, Use, Value
+from sysdyn.dsl.names.symbols import (
+    BranchSymbol,
+    BundleNode,
+    BundleSymbol,
+    ComponentSymbol,
+    ConstraintSymbol,
+    Definition,
+    DomainSymbol,
+    FunctionSymbol,
+    InstanceSymbol,
+    NodeSymbol,
+    ParameterSymbol,
+    PortSymbol,
+    Symbol,
+    TableSymbol,
+    TwoPortSymbol,
+    Typed,
+    UnknownSymbol,
+    Unsupported,
+    Vector,
+    nearest,
+)
+from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.dsl.tree import syntax
+
+STATICS = ("coordinates", "m1", "m2", "dof", "configuration_dof", "redundant", "order", "manifold", "index")
+
+
+class Names(Context):
+    """Names, quantities, elements of arrays, inlined definitions."""
+
+    # -- leaves --------------------------------------------------------------------------------------------
+
+    def _number(self, e: syntax.Number) -> Value:
+        return Typed(ex.const(e.value), None if e.value == 0.0 else NONE)
+
+    def _quantity(self, e: syntax.Quantity) -> Value:
+        unit = read_unit(e.unit, self.scope, self.source, self.report)
+        if unit is None:
+            raise Failed
+        if unit.offset:
+            help_ = f"celsius({e.text})"
+            raise self.fail("E201", "degC is no unit of a quantity: its zero is not 0 K", e.span, help=help_)
+        self._looks_like_division(e)
+        value = e.value if unit.scale == 1 else float(Fraction(e.text) * unit.scale)
+        return Typed(ex.const(value), unit.dimension)
+
+    def _looks_like_division(self, e: syntax.Quantity) -> None:
+        """W201: the last unit has the name and the dimension of a variable in sight."""
+        last = e.unit.factors[-1]
+        if len(e.unit.factors) < 2 or last.op != "/" or last.exponent != 1:
+            return
+        symbol = self.scope.find(last.name)
+        own = known(last.name)
+        if isinstance(symbol, ParameterSymbol) and not symbol.shape and own is not None and symbol.dimension == own[0]:
+            before = e.unit.text.rpartition("/")[0]
+            message = f"in '{e.text} {e.unit.text}' {last.name} is the unit; a variable {last.name} is in scope"
+            help_ = f"'{e.text} {before} / {last.name}' divides by it"
+            self.report.warning("W201", message, self.place(e.span), help=help_)
+
+    def _bool(self, e: syntax.Bool) -> Value:
+        return Typed(ex.compare("==", ex.const(float(e.value)), ex.const(1.0)), NONE, truth=True)
+
+    def _text(self, e: syntax.Text) -> Value:
+        raise self.fail("E203", "a text stands where a value is wanted", e.span)
+
+    def _group(self, e: syntax.Group) -> Value:
+        return self.resolve(e.expr)
+
+    def _name(self, e: syntax.Name) -> Value:
+        if e.name in self._bound:
+            return self._bound[e.name]
+        symbol = self.scope.find(e.name)
+        return self._predefined(e.name, e.span) if symbol is None else self.value(symbol, e.span)
+
+    def _predefined(self, name: str, span: syntax.Span) -> Value:
+        match name:
+            case "t":
+                return Typed(ex.time(), dim.TIME)
+            case "pi":
+                return Typed(ex.const(math.pi), NONE)
+            case "inf":
+                return Typed(ex.const(math.inf), None)
+            case "ground" | "audit":
+                members = "its nodes' potential is zero" if name == "ground" else "write audit.energy or another member"
+                raise self.fail("E104", f"'{name}' is not a value", span, help=members)
+        if self.statics and name in STATICS:
+            return Typed(ex.param(f"static {name}"), NONE)
+        raise self.unknown(name, span)
+
+    def unknown(self, name: str, span: syntax.Span) -> Failed:
+        """Report a name that stands for nothing (E101, E905; E908 among static quantities)."""
+        if self.scope.is_broken(name):
+            return Failed()
+        if self.statics:
+            return self.fail("E908", f"unknown static quantity '{name}'", span, help=f"one of {', '.join(STATICS)}")
+        near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
+        code, message = self._unknown
+        help_ = f"nearest name in scope: '{near}'" if near else None
+        return self.fail(code, message.format(name), span, help=help_)
+
+    # -- symbols -------------------------------------------------------------------------------------------
+
+    def value(self, symbol: Symbol, span: syntax.Span) -> Value:
+        """What a symbol is worth by itself; E104 where it has members only."""
+        match symbol:
+            case ParameterSymbol() | UnknownSymbol():
+                return self._expanded(symbol, span) if symbol.shape else self.element(symbol, ())
+            case Definition():
+                return self.definition(symbol, self._implied(symbol, span) if symbol.implied else None)
+            case Unsupported():
+                raise Failed  # its declaration has been reported as N608
+            case NodeSymbol() | PortSymbol() | BundleNode():
+                domain = symbol.domain if isinstance(symbol, NodeSymbol) else None
+                common = domain.common if domain else "effort"
+                help_ = (
+                    f"write {symbol.name}.e (potential)"
+                    if common == "effort"
+                    else f"write {symbol.name}.q or {symbol.name}.f"
+                )
+                raise self.fail("E104", f"node '{symbol.name}' is not a value", span, help=help_)
+            case ConstraintSymbol():
+                help_ = "write its member: multiplier, residual, on(...)"
+                raise self.fail("E104", f"constraint '{symbol.name}' is not a value", span, help=help_)
+            case BranchSymbol() | TwoPortSymbol() | InstanceSymbol():
+                raise self.fail(
+                    "E104", f"element '{symbol.name}' is not a value", span, help=f"a member: {symbol.name}.f"
+                )
+            case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
+                raise self.fail("E104", f"'{symbol.name}' is not a value", span)
+
+    def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
+        if not all(name in self._bound for name in symbol.at):
+            raise self.fail("E101", f"'{symbol.name}' is known only inside its 'for {symbol.at[-1]}'", span)
+        return tuple(self._bound[name].node for name in symbol.at)
+
+    def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
+        """A whole array as a value: only where its bounds are written as numbers."""
+        if len(symbol.shape) != 1 or not all(ex.is_const(b) for b in symbol.shape[0]):
+            help_ = f"{symbol.name}[i] in a sum or a 'for'"
+            raise self.fail("E806", f"'{symbol.name}' is an array: name the element", span, help=help_)
+        first, last = (int(b.data) for b in symbol.shape[0])
+        return Vector(tuple(self.element(symbol, (ex.const(i),)) for i in range(first, last + 1)), first)
+
+    def element(self, symbol: ParameterSymbol | UnknownSymbol, at: tuple[Node, ...]) -> Typed:
+        """One element of a parameter or unknown."""
+        family = symbol.family
+        at = (*family.prefix, *at)
+        if isinstance(symbol, UnknownSymbol):
+            return Typed(ex.var(family.name, symbol.kind, *at), symbol.dimension)
+        node = ex.param(family.name, *at)
+        if symbol.truth:
+            return Typed(ex.compare("!=", node, ex.const(0.0)), NONE, truth=True)
+        return Typed(node, symbol.dimension)
+
+    # -- definitions ---------------------------------------------------------------------------------------
+
+    def definition(self, symbol: Definition, at: tuple[Node, ...] | None = None) -> Value:
+        """The value of a let, output, input or const, inlined; at: indices of a family's element."""
+        value = self._template(symbol)
+        if at is None:
+            return value
+        if isinstance(value, Vector):
+            return pick(value, at)
+        change = {ex.index(f"{symbol.name}.{name}"): node for name, node in zip(symbol.at, at, strict=True)}
+        return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
+
+    def _template(self, symbol: Definition) -> Value:
+        if symbol in self._active:
+            chain = [s.name for s in self._active[self._active.index(symbol) :]] + [symbol.name]
+            place = Place(symbol.space.source, symbol.span)
+            help_ = "break it with a state or an implicit closed by a gamma"
+            self.report.error("E105", f"circular definition: {' -> '.join(chain)}", place, help=help_)
+            raise Failed
+        key = symbol, self.virtual
+        if key in self._values:
+            value = self._values[key]
+            if value is None:
+                raise Failed
+            return value
+        self._values[key] = None
+        self._active.append(symbol)
+        placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
+        try:
+            with self.space(symbol.space), self.bound({**dict(symbol.bound), **placeholders}):
+                value = self.resolve(symbol.expression)
+                self._declared(symbol, value)
+                if self.virtual and symbol.kind in ("output", "input"):
+                    value = _signal(value)
+        finally:
+            self._active.pop()
+        self._values[key] = value
+        return value
+
+    def _declared(self, symbol: Definition, value: Value) -> None:
+        if symbol.dimension is None or not isinstance(value, Typed) or value.dimension in (None, symbol.dimension):
+            return
+        message = (
+            f"{symbol.kind} '{symbol.name}' is declared {dim.show(symbol.dimension)} "
+            f"but set to {dim.show(value.dimension)}"
+        )
+        raise self.fail("E207", message, symbol.expression.span)
+
+    # -- elements of arrays --------------------------------------------------------------------------------
+
+    def element_of_list(self, value: Vector, at: Node, span: syntax.Span) -> Typed:
+        """The item of an array written as a list."""
+        if not ex.is_const(at):
+            if at.op == "index":
+                return pick(value, (at,))
+            raise self.fail("E806", "an array written as a list is indexed by a number or a loop variable", span)
+        k = int(at.data) - value.first
+        if not 0 <= k < len(value.items):
+            last = value.first + len(value.items) - 1
+            raise self.fail("E805", f"index {at} is outside {value.first}..{last}", span)
+        return value.items[k]
+
+    def slice(self, value: Vector, index: syntax.Range) -> Vector:
+        """The part of a list between two numbers."""
+        bounds = [self.index(b) for b in (index.lower, index.upper)]
+        if not all(ex.is_const(b) for b in bounds):
+            raise self.fail("E806", "the bounds of a slice are numbers", index.span)
+        first, last = (int(b.data) for b in bounds)
+        items = (self.element_of_list(value, ex.const(k), index.span) for k in range(first, last + 1))
+        return Vector(tuple(items), first)
+
+    def index_count(self, name: str, count: int, given: int, span: syntax.Span) -> Failed:
+        """Report E805: a wrong number of indices."""
+        plural = "index" if count == 1 else "indices"
+        return self.fail("E805", f"'{name}' has {count or 'no'} {plural}, {given} given", span)
+
+    def own_element(
+        self, symbol: ParameterSymbol | UnknownSymbol, indices: tuple[syntax.Index, ...], span: syntax.Span
+    ) -> Value:
+        """`x[i]` of a parameter or unknown."""
+        if len(indices) != len(symbol.shape):
+            raise self.index_count(symbol.name, len(symbol.shape), len(indices), span)
+        if any(isinstance(i, syntax.Range) for i in indices):
+            if len(indices) == 1 and isinstance(indices[0], syntax.Range):
+                return self.slice(self._expanded(symbol, span), indices[0])
+            raise self.fail("E806", "a slice of an array with several indices", span)
+        return self.element(symbol, self.indices(symbol.name, symbol.shape, indices))
+
+    def indices(
+        self, name: str, shape: tuple[tuple[Node, Node], ...], indices: tuple[syntax.Index, ...]
+    ) -> tuple[Node, ...]:
+        """Affine indices of a family, remembered for the check against its shape."""
+        at = tuple(self.index(i) for i in indices)
+        for node, bounds, index in zip(at, shape, indices, strict=True):
+            self.uses.append(Use(bounds, node, self.loops, name, self.place(index.span)))
+        return at
+
+    # -- rates ---------------------------------------------------------------------------------------------
+
+    def _prime(self, e: syntax.Prime) -> Value:
+        base = e.base.expr if isinstance(e.base, syntax.Group) else e.base
+        value = self.resolve(base)
+        if isinstance(value, Vector):
+            raise self.fail("E203", "an array stands where one number is wanted", e.span)
+        dimension = None if value.dimension is None else dim.quotient(value.dimension, dim.TIME)
+        return Typed(self.rate(value.node, e.span), dimension)
+
+    def rate(self, node: Node, span: syntax.Span) -> Node:
+        """The time derivative of a node."""
+        try:
+            return ex.time_derivative(node)
+        except ValueError as error:
+            raise self.fail("E518", f"{error} has no time derivative among the variables", span) from None
+
+
+def pick(value: Vector, at: tuple[Node, ...]) -> Typed:
+    """The item of a list at a loop variable, as nested conditionals (observations of small lists)."""
+    node = value.items[-1].node
+    for k in range(len(value.items) - 2, -1, -1):
+        node = ex.conditional(ex.compare("==", at[0], ex.const(value.first + k)), value.items[k].node, node)
+    return Typed(node, value.items[0].dimension)
+
+
+def _signal(value: Value) -> Value:
+    """The value marked as one that virtual displacements hold."""
+    if isinstance(value, Vector):
+        return Vector(tuple(Typed(ex.signal(v.node), v.dimension) for v in value.items), value.first)
+    return Typed(ex.signal(value.node), value.dimension, value.truth)

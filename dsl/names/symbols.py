@@ -1,0 +1,326 @@
+"""What a name can stand for, and the scopes in which names are looked up."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Domain, Loop, Shape
+from sysdyn.dsl.model.units import Dimension, Unit
+from sysdyn.dsl.text.diagnostics import Place, SourceText
+from sysdyn.dsl.tree import syntax
+
+DomainSymbol = Domain
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """A resolved expression: a node and its dimension; None fits every dimension (the numbers 0 and inf)."""
+
+    node: Node
+    dimension: Dimension | None
+    truth: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """A resolved array; first is the index of its first item."""
+
+    items: tuple[Typed, ...]
+    first: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class BundleSymbol:
+    """A bundle of nodes: the domain of each member."""
+
+    name: str
+    members: tuple[tuple[str, str], ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentSymbol:
+    """A component with the file it stands in; a model is one without ports."""
+
+    name: str
+    body: tuple[syntax.Statement, ...]
+    file_scope: Scope
+    source: SourceText
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TableSymbol:
+    """An interpolation table with the dimensions of its arguments and values."""
+
+    name: str
+    arguments: tuple[tuple[str, Dimension], ...]
+    result: Dimension
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionSymbol:
+    """A function, inlined where it is called."""
+
+    definition: syntax.Function
+    source: SourceText
+    file_scope: Scope
+    place: Place
+
+    @property
+    def name(self) -> str:
+        """The function's name."""
+        return self.definition.name.name
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Where a name's values live: the path of its own name, and the indices of the instances around it.
+
+    shape holds the own indices only; `whole` the instances' too.  X[i].cell.q has family X.cell and prefix (i,).
+    """
+
+    name: str
+    prefix: tuple[Node, ...]
+    around: Shape
+    shape: Shape
+
+    @property
+    def whole(self) -> Shape:
+        """First and last of every index."""
+        return (*self.around, *self.shape)
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSymbol:
+    """A parameter or an input that holds a constant."""
+
+    name: str
+    family: Family
+    dimension: Dimension | None
+    truth: bool
+    place: Place
+
+    @property
+    def shape(self) -> Shape:
+        """Own indices."""
+        return self.family.shape
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownSymbol:
+    """A coordinate (kind q), implicit unknown (e) or state (s)."""
+
+    name: str
+    kind: str
+    family: Family
+    dimension: Dimension
+    domain: DomainSymbol | None
+    complementary: bool
+    place: Place
+
+    @property
+    def shape(self) -> Shape:
+        """Own indices."""
+        return self.family.shape
+
+
+@dataclass(frozen=True, slots=True)
+class ConstraintSymbol:
+    """The label of a phi, psi or gamma."""
+
+    name: str
+    kind: str
+    family: Family
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSymbol:
+    """A node of a domain."""
+
+    name: str
+    family: Family
+    domain: DomainSymbol
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class BundleNode:
+    """Several nodes (or ports) handled as one."""
+
+    name: str
+    members: dict[str, NodeSymbol | PortSymbol]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A node's element, or the domain's ground (node None)."""
+
+    node: NodeSymbol | None
+    at: tuple[Node, ...]  # all indices, those of instances first
+    domain: DomainSymbol
+
+
+@dataclass(frozen=True, slots=True)
+class PortSymbol:
+    """A component's port, bound to a node of its user."""
+
+    name: str
+    end: End
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class BranchSymbol:
+    """A branch: effort e, flow f, displacement q, momentum p between two ends or along an expression."""
+
+    name: str
+    family: Family
+    domain: DomainSymbol
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TwoPortSymbol:
+    """A transformer or gyrator: its branches carry e1 f1 and e2 f2."""
+
+    name: str
+    branches: tuple[BranchSymbol, BranchSymbol]
+    place: Place
+
+
+@dataclass(eq=False, slots=True)
+class Space:
+    """The inside of a model or of one instance: its scope, its text, the loops of its label."""
+
+    path: str
+    scope: Scope
+    file_scope: Scope
+    source: SourceText
+    loops: tuple[Loop, ...] = ()
+    prefix: tuple[Node, ...] = ()
+    around: Shape = ()
+    component: str = ""
+    chain: tuple[str, ...] = ()  # components around, for the check against recursion
+    level: str | None = None
+    elsewhere: Mapping[str, str] = field(default_factory=dict)  # what other levels declare, and one of these levels
+    bound: dict[str, Typed] = field(default_factory=dict)  # e f q p of the component's single branch
+    ends: dict[str, Any] = field(default_factory=dict)  # of its branches (instances.Ends)
+    laws: dict[str, Place] = field(default_factory=dict)  # branches that have a law
+
+    def family(self, name: str, shape: Shape = ()) -> Family:
+        """The family of a name declared inside."""
+        return Family(f"{self.path}.{name}" if self.path else name, self.prefix, self.around, shape)
+
+
+@dataclass(eq=False, slots=True)
+class InstanceSymbol:
+    """Instances under one label: one space a statement; `fits` says which of them has an index."""
+
+    name: str
+    place: Place
+    spaces: list[Space] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Definition:
+    """A let, output, quasi, input or const: an expression that is inlined.
+
+    at: loop variables of a family; implied: they are those of the loop around, not written where it is used.
+    """
+
+    name: str
+    kind: str
+    expression: syntax.Expr
+    at: tuple[str, ...]
+    dimension: Dimension | None  # declared (inputs, quasi-velocities)
+    space: Space  # where the expression is read
+    place: Place
+    span: syntax.Span
+    implied: bool = False
+    bound: tuple[tuple[str, Typed], ...] = ()  # loop variables in sight where it is read
+
+
+@dataclass(frozen=True, slots=True)
+class Unsupported:
+    """A name whose meaning is built by a later issue (discrete variables)."""
+
+    name: str
+    what: str
+    place: Place
+
+
+Symbol = (
+    DomainSymbol
+    | BundleSymbol
+    | ComponentSymbol
+    | TableSymbol
+    | FunctionSymbol
+    | ParameterSymbol
+    | UnknownSymbol
+    | ConstraintSymbol
+    | NodeSymbol
+    | BundleNode
+    | PortSymbol
+    | BranchSymbol
+    | TwoPortSymbol
+    | InstanceSymbol
+    | Definition
+    | Unsupported
+)
+
+
+@dataclass(slots=True)
+class Scope:
+    """Names of one level (prelude, file, model); a name not found is looked up in the outer level."""
+
+    outer: Scope | None = None
+    symbols: dict[str, Symbol] = field(default_factory=dict)
+    units: dict[str, Unit] = field(default_factory=dict)
+    broken: set[str] = field(default_factory=set)
+
+    def find(self, name: str) -> Symbol | None:
+        """The symbol of that name, nearest level first."""
+        scope: Scope | None = self
+        while scope is not None:
+            if name in scope.symbols:
+                return scope.symbols[name]
+            scope = scope.outer
+        return None
+
+    def unit(self, name: str) -> Unit | None:
+        """A unit declared in a file."""
+        scope: Scope | None = self
+        while scope is not None:
+            if name in scope.units:
+                return scope.units[name]
+            scope = scope.outer
+        return None
+
+    def is_broken(self, name: str) -> bool:
+        """Whether the name stands in a statement that could not be read."""
+        scope: Scope | None = self
+        while scope is not None:
+            if name in scope.broken:
+                return True
+            scope = scope.outer
+        return False
+
+    def names(self) -> Iterable[str]:
+        """All names in sight."""
+        scope: Scope | None = self
+        while scope is not None:
+            yield from scope.symbols
+            scope = scope.outer
+
+
+def nearest(name: str, names: Iterable[str]) -> str | None:
+    """The most similar name, if one is similar at all."""
+    found = difflib.get_close_matches(name[:80], list(dict.fromkeys(n for n in names if len(n) < 100)), 1, 0.6)
+    return found[0] if found else None

@@ -1,0 +1,58 @@
+"""From a unit as written to its value: known names, prefixes, aliases, declared bases (E201)."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Dimension, Unit, known, multiply, names, si_text
+from sysdyn.dsl.names.symbols import Scope, nearest
+from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.tree import syntax
+
+
+def read_unit(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -> Unit | None:
+    """The value of a unit; None after reporting E201 or E209."""
+    dimension: Dimension = NONE
+    scale = Fraction(1)
+    for factor in unit.factors:
+        if factor.name == "1":
+            continue
+        if factor.name == "degC" and len(unit.factors) == 1 and factor.exponent == 1:
+            return DEGREE_CELSIUS
+        declared = scope.unit(factor.name)
+        found = (declared.dimension, declared.scale) if declared else known(factor.name)
+        if found is None:
+            _unknown(unit, factor, scope, Place(source, factor.span), report)
+            return None
+        power = factor.exponent if factor.op == "." else -factor.exponent
+        dimension = multiply(dimension, found[0], power)
+        if abs(power) > 100:
+            report.error(
+                "E201", f"the exponent {factor.exponent} of a unit is out of reason", Place(source, factor.span)
+            )
+            return None
+        scale *= found[1] ** power
+    solved = any(factor.name.startswith("$") for factor in unit.factors)  # what the instance has made of $u
+    return Unit(dimension, scale, si_text(dimension) if solved else unit.text)
+
+
+def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: Place, report: Report) -> None:
+    if factor.name.startswith("$"):
+        report.error(
+            "E209",
+            f"unit variable {factor.name} stands outside a component: nothing determines it",
+            place,
+            help="write the unit itself",
+        )
+        return
+    message = f"'{factor.name}' is not a unit, in '{unit.text}'"
+    help_: str | None
+    before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
+    if scope.find(factor.name) is not None and before:
+        sign = "/" if factor.op == "/" else "*"
+        verb = "divide" if factor.op == "/" else "multiply"
+        help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
+    else:
+        near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
+        help_ = f"nearest unit: '{near}'" if near else None
+    report.error("E201", message, place, help=help_)

@@ -1,0 +1,1 @@
+"""Text to syntax tree: an automaton over tables generated from `sd.lark`, recovery and complaints."""

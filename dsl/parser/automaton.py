@@ -1,0 +1,236 @@
+"""The LALR(1) automaton: tokens in, syntax tree out, in one loop without recursion.
+
+The tables come from `table.py`. A reduction calls the rule's function in `build_expressions`,
+`build_statements` or `build_scenes`; rules that only hand on their child cost no call, lists grow in place. What is
+to be done about a token that does not fit is decided in `recovery`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from sysdyn.dsl.parser import build_expressions, build_scenes, build_statements
+from sysdyn.dsl.parser.lexing import Scanner
+from sysdyn.dsl.parser.notes import MAX_TERMS, Notes
+from sysdyn.dsl.parser.table import FINAL, GOTOS, LOOKAHEADS, ROWS, RULES
+from sysdyn.dsl.text.source import SourceText, Span
+from sysdyn.dsl.tree.syntax import Broken, Text, Word
+
+Build = Callable[[list[Any], Span, Notes], Any]
+
+MAX_NESTING = 200
+"""Deepest nesting of brackets, signs, exponents and conditionals together (E117)."""
+
+_MAX_PARTS = 2 * MAX_TERMS
+"""Terms and signs of a chain (E118); statements of a block and rows of a table are not counted."""
+
+_NESTING = frozenset({"(", "[", "{", "^", "not", "else"})
+_BODY = ("statement", "scene_statement", "action", "item", "role", "bundle_member")
+_BLOCKS_OF_STATEMENTS = ("for_", "when", "every", "level", "scene")
+
+
+def _rows() -> tuple[dict[str, int], ...]:
+    """For each state the action on each terminal: a state to shift to, or -1 - rule."""
+    sets = {str(number): line.split() for number, line in enumerate(LOOKAHEADS.splitlines())}
+    rows = []
+    for line in ROWS.splitlines():
+        row: dict[str, int] = {}
+        for entry in line.split():
+            action, _, number = entry.partition(":")
+            row.update(dict.fromkeys(sets[number], int(action)))
+        rows.append(row)
+    return tuple(rows)
+
+
+def _gotos() -> tuple[dict[str, int], ...]:
+    """For each state the next state behind each left side."""
+    return tuple(
+        {left: int(state) for left, _, state in (entry.rpartition(":") for entry in line.split())}
+        for line in GOTOS.splitlines()
+    )
+
+
+def _build(name: str) -> Build:
+    """The function of a rule: named as the rule, with `_` behind a name that Python has."""
+    for module in (build_expressions, build_statements, build_scenes):
+        found = getattr(module, name, None) or getattr(module, name + "_", None)
+        if found is not None:
+            function: Build = found
+            return function
+    raise LookupError(name)
+
+
+def _actions() -> tuple[tuple[str, int, Build | None, bool, tuple[tuple[int, bool], ...]], ...]:
+    """For each rule: left side, length, function (None: a list), whether it hands on, children."""
+    functions: dict[str, Build | None] = {"[]": None, "=": None}
+    actions = []
+    for line in RULES.splitlines():
+        left, length, name, *children = line.split()
+        if name not in functions:
+            functions[name] = _build(name)
+        places = tuple((-1 if item == "-" else int(item.rstrip("*")), item.endswith("*")) for item in children)
+        actions.append((left, int(length), functions[name], name == "=", places))
+    return tuple(actions)
+
+
+_TABLE_ROWS = _rows()
+_TABLE_GOTOS = _gotos()
+_TABLE_RULES = _actions()
+
+
+class Automaton:
+    """The stack of one parse: states, and for each its value, span and depth of nesting."""
+
+    def __init__(self, source: SourceText) -> None:
+        self.source = source
+        self.notes = Notes(source)
+        self.scanner = Scanner(source)
+        self.notes.docs = self.scanner.docs
+        self.states = [0]
+        self.values: list[Any] = [None]
+        self.starts = [0]
+        self.ends = [0]
+        self.depths = [0]
+        self.overflow = False
+        """Whether a chain has grown longer than is read."""
+        self.damaged: set[int] = set()
+        """Starts of statements whose head was mended so that their block could be read."""
+
+    @property
+    def row(self) -> dict[str, int]:
+        """The terminals that the present state can take."""
+        return _TABLE_ROWS[self.states[-1]]
+
+    def row_at(self, index: int) -> dict[str, int]:
+        """The terminals that an earlier state of the stack could take."""
+        return _TABLE_ROWS[self.states[index]]
+
+    @property
+    def finished(self) -> bool:
+        """Whether a whole file has been read."""
+        return self.states[-1] == FINAL
+
+    def advance(self, kind: str) -> bool:
+        """Take one terminal; False where it does not fit (the statement's start stays on the stack)."""
+        states = self.states
+        while True:
+            row = _TABLE_ROWS[states[-1]]
+            code = row.get(kind)
+            if code is None:
+                return self.finished
+            if code >= 0:
+                break
+            left, length, build, hands_on, children = _TABLE_RULES[-1 - code]
+            if hands_on:
+                states[-1] = _TABLE_GOTOS[states[-2]][left]
+            else:
+                self._reduce(left, length, build, children)
+        scanner = self.scanner
+        nested = kind in _NESTING or (kind == "-" and "<name>" in row)
+        states.append(code)
+        self.values.append(self._value(kind))
+        self.starts.append(scanner.start)
+        self.ends.append(scanner.end)
+        self.depths.append(self.depths[-1] + nested)
+        return True
+
+    def _value(self, kind: str) -> Any:
+        """What a terminal is worth: a word, a number, a text, or its own sign."""
+        scanner = self.scanner
+        if kind[0] != "<" or len(kind) < 3:
+            return kind
+        start, end = scanner.start, scanner.end
+        text = scanner.text[start:end]
+        if kind in ("<name>", "<function>"):
+            return Word(text, Span(start, end))
+        if kind == "<quantity>" and scanner.unit is not None:
+            unit = Span(*scanner.unit)
+            number = scanner.text[start : unit.start].rstrip()
+            return self.notes.quantity(number, Span(start, end), unit)
+        if kind == "<number>":
+            if scanner.unit is not None and scanner.unit[1] == end:
+                # a unit grown to a number where no quantity may stand (E114 has been said)
+                text = scanner.text[start : scanner.unit[0]]
+            return self.notes.number(text, Span(start, end))
+        if kind == "<text>":
+            return Text(text[1:-1], Span(start, end))
+        return None
+
+    def _reduce(self, left: str, length: int, build: Build | None, children: tuple[tuple[int, bool], ...]) -> None:
+        """Replace the topmost `length` entries by what the rule makes of them."""
+        states, values, starts, ends, depths = self.states, self.values, self.starts, self.ends, self.depths
+        if length:
+            base = len(values) - length
+            span = Span(starts[base], ends[-1])
+            if build is None and children[0] == (0, True):
+                parts = values[base]
+                rest = children[1:]
+            else:
+                parts = []
+                rest = children
+            for position, spliced in rest:
+                if position < 0:
+                    parts.append(None)
+                elif spliced:
+                    parts.extend(values[base + position])
+                else:
+                    parts.append(values[base + position])
+            if build is None and len(parts) > _MAX_PARTS and "body" not in left and "row" not in left:
+                self.overflow = True
+            del states[base:], values[base:], starts[base:], ends[base:], depths[base:]
+        else:
+            span = Span(ends[-1], ends[-1])
+            parts = [None] * len(children)
+        value = parts if build is None else build(parts, span, self.notes)
+        if span.start in self.damaged and left in _BLOCKS_OF_STATEMENTS:
+            value = self.broken(span)
+        self.push(left, value, span)
+
+    def push(self, left: str, value: Any, span: Span) -> None:
+        """Put a symbol with its value on the stack."""
+        self.states.append(_TABLE_GOTOS[self.states[-1]][left])
+        self.values.append(value)
+        self.starts.append(span.start)
+        self.ends.append(span.end)
+        self.depths.append(self.depths[-1])
+
+    def cut(self, size: int) -> None:
+        """Take everything above the first `size` entries from the stack."""
+        for stack in (self.states, self.values, self.starts, self.ends, self.depths):
+            del stack[size:]
+
+    def accepts(self, kind: str) -> bool:
+        """Whether the terminal would fit now; the stack stays as it is."""
+        states = list(self.states[-MAX_NESTING:])
+        while (code := _TABLE_ROWS[states[-1]].get(kind)) is not None:
+            if code >= 0:
+                return True
+            left, length, _, _, _ = _TABLE_RULES[-1 - code]
+            if length >= len(states):
+                return True
+            del states[len(states) - length :]
+            states.append(_TABLE_GOTOS[states[-1]][left])
+        return states[-1] == FINAL
+
+    def body(self) -> tuple[int, str]:
+        """Size of the stack where the present statement began, and what kind of statement it is."""
+        for index in range(len(self.states) - 1, -1, -1):
+            goto = _TABLE_GOTOS[self.states[index]]
+            for left in _BODY:
+                if left in goto:
+                    return index + 1, left
+        return 1, "item"
+
+    def broken(self, span: Span) -> Broken:
+        """A statement that could not be read."""
+        return Broken(frozenset(_names(self.source.text[span.start : span.end])), span)
+
+
+def _names(text: str) -> Iterator[str]:
+    """The names in a text, comments left out."""
+    import re
+
+    for match in re.finditer(r"#[^\r\n]*|([^\W\d]\w*)", text):
+        if match.group(1):
+            yield match.group(1)

@@ -1,0 +1,70 @@
+"""Text to syntax tree: never raises, reports everything that cannot be read, returns the rest.
+
+An error ends its statement, not the file: reading goes on with the next statement of the same
+block, and a `Broken` node stands where the statement was.
+"""
+
+from __future__ import annotations
+
+import gc
+
+from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
+from sysdyn.dsl.parser.recovery import Recovery
+from sysdyn.dsl.text.decoding import MAX_BYTES
+from sysdyn.dsl.text.diagnostics import Diagnostic
+from sysdyn.dsl.text.source import SourceText, Span
+from sysdyn.dsl.tree.syntax import File
+
+MAX_LINE = 10_000
+"""Longest line that is read."""
+
+
+def parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
+    """The syntax tree of a text, and what is wrong with its syntax.
+
+    The codes are E107 to E118, and E308 for a content written as an energy. Never raises; the time
+    is proportional to the length of the text.
+    """
+    refused = _refused(source)
+    if refused is not None:
+        return File(source, (), (), Span(0, len(source.text))), (refused,)
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return _parse(source)
+    finally:
+        if collecting:
+            gc.enable()
+
+
+def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
+    """Run the automaton to the end of the text."""
+    automaton = Automaton(source)
+    recovery = Recovery(automaton)
+    scanner = automaton.scanner
+    while not automaton.finished:
+        kind = recovery.checked(scanner.read(automaton.row))
+        if not automaton.advance(kind):
+            recovery.recover(kind)
+        elif automaton.depths[-1] > MAX_NESTING:
+            recovery.too_deep()
+        elif automaton.overflow:
+            recovery.too_long()
+    tree = File(source, automaton.values[-1], tuple(scanner.comments), Span(0, len(source.text)))
+    return tree, automaton.notes.report.diagnostics
+
+
+def _refused(source: SourceText) -> Diagnostic | None:
+    """E116 where the text is longer than anyone writes."""
+    text = source.text
+    if len(text) > MAX_BYTES:
+        message = f"the file is longer than {MAX_BYTES // 1_000_000} MB"
+        return Diagnostic("E116", message, source.place(0, 0), "a table of data belongs in a .csv file")
+    starts = (*source.line_starts, len(text))
+    for number in range(1, len(starts)):
+        if starts[number] - starts[number - 1] > MAX_LINE + 2:
+            start = starts[number - 1]
+            message = f"line {number} is longer than {MAX_LINE} characters"
+            help_ = "a line may be broken after a comma or an operator, or inside parentheses"
+            return Diagnostic("E116", message, source.place(start, start + 1), help_)
+    return None

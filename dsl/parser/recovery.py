@@ -1,0 +1,388 @@
+"""What is done about a token that does not fit: say it in the author's terms, and read on.
+
+A slip that has one obvious meaning is mended in place (`==` for `=`, a reserved word as a name,
+`3kg`). Otherwise the statement is given up at its start on the stack, the text is skipped to its
+end, and a `Broken` node takes its place; a statement with a block loses only its head, the block is
+read. Indentation is never needed, but where a bracket is missing it tells where.
+"""
+
+from __future__ import annotations
+
+import re
+
+from sysdyn.dsl.parser import complaints
+from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
+from sysdyn.dsl.parser.complaints import Complaint
+from sysdyn.dsl.parser.lexing import RESERVED, Bracket
+from sysdyn.dsl.parser.notes import MAX_TERMS
+from sysdyn.dsl.text.diagnostics import Related
+from sysdyn.dsl.text.source import Span
+
+MAX_SKIPPED = 100_000
+"""Tokens that are skipped for one error before the rest of the text is left unread."""
+
+MAX_ERRORS = 100
+"""After so many errors of syntax the rest of a text is not read: it is no model."""
+
+_MOST_BRACES = 10
+"""Open blocks that are named at the end of a text; more say nothing new."""
+
+_WORD = re.compile(r"[^\W\d]\w*+")
+_BLANK = re.compile(r"[ \t]*+")
+_BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as", "->", "{", ":="})
+"""Terminals that stand in no bracket, but may stand behind one."""
+
+_SLIPS = RESERVED | {"=", "=="}
+_OUTERMOST = frozenset({"model", "component", "scene", "domain", "bundle", "from"})
+_HEADS = {
+    "model": ("model", "<name>"),
+    "component": ("component", "<name>"),
+    "domain": ("domain", "<name>"),
+    "bundle": ("bundle", "<name>"),
+    "scene": ("scene", "<name>", "of", "<name>"),
+    "level": ("level", "<name>"),
+    "for": ("for", "<name>", "in", "<name>", "..", "<name>"),
+    "when": ("when", "true"),
+    "every": ("every", "<name>"),
+}
+"""For each statement with a block, a head that can be read in place of a faulty one."""
+
+
+class Recovery:
+    """The way on after a token that does not fit."""
+
+    def __init__(self, automaton: Automaton) -> None:
+        self.automaton = automaton
+        self.scanner = automaton.scanner
+        self.errors = 0
+
+    # --- slips that are mended ---
+
+    def checked(self, kind: str) -> str:
+        """The terminal that was read, or the one that is obviously meant."""
+        scanner, automaton = self.scanner, self.automaton
+        if kind == "<quantity>" and scanner.glued:
+            kind = self._glued()
+        elif kind not in automaton.row or kind in _SLIPS:
+            if automaton.accepts(kind):
+                return kind
+            if kind == "==" and automaton.accepts("="):
+                self._error(("E111", f"'==' compares; {self._defined()}", "="), self._token())
+                kind = "="
+            elif kind == "=" and automaton.accepts(":="):
+                self._error(("E113", "an action assigns with ':='", ":="), self._token())
+                kind = ":="
+            elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
+                self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
+                kind = "<name>"
+            elif kind == "=" and automaton.accepts("=="):
+                self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token())
+                kind = "=="
+        return kind
+
+    def _glued(self) -> str:
+        """A number with its unit grown to it: read as a quantity."""
+        scanner = self.scanner
+        scanner.glued = False
+        unit = scanner.unit or (scanner.end, scanner.end)
+        text = scanner.text
+        word = complaints.quoted(text[scanner.start : scanner.end])
+        help_ = f"{text[scanner.start : unit[0]]} {text[unit[0] : unit[1]]}"
+        self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token())
+        return "<quantity>" if self.automaton.accepts("<quantity>") else "<number>"
+
+    def _defined(self) -> str:
+        """What the author writes where '=' is wanted."""
+        word, _ = self._first_word(self.scanner.statement)
+        if word in ("phi", "psi", "gamma"):
+            return "a constraint is written with '='"
+        return f"'{word}' defines with '='" if word else "a value is given with '='"
+
+    # --- faults that end a statement ---
+
+    def too_deep(self) -> None:
+        """E117: more brackets, signs, exponents and conditionals in each other than are read."""
+        message = f"brackets, signs and conditionals are nested deeper than {MAX_NESTING}"
+        self._error(("E117", message, "name a part of it: let x = ..."), self._token())
+        self._give_up("<name>")
+
+    def too_long(self) -> None:
+        """E118: a chain of more terms than are read."""
+        self.automaton.overflow = False
+        message = f"an expression of more than {MAX_TERMS} terms"
+        self._error(("E118", message, "sum(i in 1..n: ...)"), self._token())
+        self._give_up("<name>")
+
+    def recover(self, kind: str) -> None:
+        """Report a terminal that does not fit and bring the automaton to where it can go on."""
+        automaton = self.automaton
+        if self.errors >= MAX_ERRORS:
+            self._stop(f"more than {MAX_ERRORS} errors of syntax: the rest of the file is not read")
+            return
+        size, body = automaton.body()
+        first = size == len(automaton.states)
+        if kind == "}" and body == "item" and (first or automaton.accepts("<newline>")):
+            self._error(("E112", "'}' closes nothing that is open", None), self._token())
+            if first:
+                self.scanner.restart(self.scanner.end, fresh=True)
+            return
+        if kind == "<end>" and automaton.accepts("}"):
+            self._close_all()
+            return
+        if body != "item" and self._brace_is_missing():
+            return
+        self._complain(kind)
+        self._give_up(kind)
+
+    def _complain(self, kind: str) -> None:
+        """Report why the statement cannot be read."""
+        automaton, scanner = self.automaton, self.scanner
+        size, body = automaton.body()
+        text = scanner.text[scanner.start : scanner.end]
+        start = self._statement_start()
+        word, after = self._first_word(start)
+        bracket = self._open_bracket(kind)
+        if kind == "<fault>" and scanner.fault == "text":
+            self._error(("E112", "the text that begins with this '\"' is not closed on its line", '"'), self._token())
+        elif bracket is not None:
+            self._not_closed(bracket)
+        elif kind == "<fault>":
+            self._error(complaints.character(text), self._token())
+        elif scanner.suspect is not None:
+            sign = scanner.text[scanner.dangling.start : scanner.dangling.end]
+            self._error(("E113", f"the statement ends with '{sign}': something is missing", None), scanner.dangling)
+        elif size == len(automaton.states) and kind != "<name>" and kind not in RESERVED:
+            self._error(complaints.first_token(text, kind, body), self._token())
+        elif kind == "if" and automaton.accepts("("):
+            self._error(complaints.conditional(), self._token())
+        elif self._other_level(word, kind, body):
+            where = "a scene" if body == "statement" else "a component"
+            here = "a model" if body == "statement" else "a scene"
+            what = "level x = name" if body == "statement" else "level name { }"
+            self._error(("E107", f"'{what}' belongs in {where}, not in {here}", None), Span(start, start + 5))
+        elif word and word not in self._words_here(size) and after[:1] not in (":", "["):
+            complaint = complaints.unknown(word, after, body)
+            if after.startswith("->") or (complaint[0] == "E113" and after[:1] in ("=", ",") and self._indented(start)):
+                complaint = complaints.connection()
+            self._error(complaint, Span(start, start + len(word)))
+        elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
+            message = f"'{word}' begins a statement here and cannot be the label of an element"
+            self._error(("E113", message, f"{word}_: ..."), Span(start, start + len(word)))
+        else:
+            accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
+            before = scanner.text[: scanner.start].rstrip()[-1:]
+            self._error(complaints.expected(accepted, kind, text, before), self._token())
+
+    def _words_here(self, size: int) -> dict[str, int]:
+        """The terminals with which a statement may begin here."""
+        return self.automaton.row_at(size - 1)
+
+    def _other_level(self, word: str, kind: str, body: str) -> bool:
+        """Whether this is the scene's `level` in a model, or the model's in a scene."""
+        if word != "level":
+            return False
+        if body == "statement":
+            return kind == "="
+        return body == "scene_statement" and kind in ("{", "extends", "<name>")
+
+    def _indented(self, start: int) -> bool:
+        """Whether the statement stands further right than the one before it."""
+        states, starts = self.automaton.states, self.automaton.starts
+        size, _ = self.automaton.body()
+        if size < 3 or size > len(states):
+            return False
+        before = starts[size - 2]
+        if self.automaton.values[size - 2] == "{":
+            return False
+        value = self.automaton.values[size - 2]
+        if isinstance(value, list) and value:
+            before = value[-1].span.start
+        return self.scanner.column(start) > self.scanner.column(before)
+
+    # --- brackets ---
+
+    def _open_bracket(self, kind: str) -> Bracket | None:
+        """The bracket of this statement that is missing its partner, if that is the fault."""
+        scanner = self.scanner
+        start = self._statement_start()
+        mine = [item for item in scanner.brackets if item.offset >= start and item.sign != "{"]
+        if not mine or mine[-1].offset >= scanner.start:
+            return None
+        text = scanner.text[scanner.start : scanner.end]
+        if scanner.suspect is not None or kind in ("<end>", "}") or text in (")", "]", ";"):
+            return mine[-1]
+        closing = ")" if mine[-1].sign == "(" else "]"
+        return mine[-1] if kind in _BEHIND and self.automaton.accepts(closing) else None
+
+    def _not_closed(self, bracket: Bracket) -> None:
+        """E112 with the place where indentation says that the bracket ends."""
+        scanner, source = self.scanner, self.automaton.source
+        line, _ = source.position(bracket.offset)
+        column = scanner.column(scanner.first_on_line(bracket.offset))
+        related = []
+        for number in range(line + 1, len(source.line_starts) + 1):
+            text = source.line(number)
+            if text.strip() and len(text) - len(text.lstrip(" \t")) <= column:
+                start = source.line_starts[number - 1] + len(text) - len(text.lstrip(" \t"))
+                message = "by its indentation it ends before this line"
+                related.append(Related(message, source.place(start, start + len(text.strip()))))
+                break
+        self.errors += 1
+        self.automaton.notes.report.error(
+            "E112",
+            f"'{bracket.sign}' opened at line {line} is not closed",
+            source.place(bracket.offset, bracket.offset + 1),
+            help={"(": ")", "[": "]", "{": "}"}[bracket.sign],
+            related=related,
+        )
+
+    def _brace_is_missing(self) -> bool:
+        """E112 where an item of the file begins inside a block that indentation has left."""
+        scanner, automaton = self.scanner, self.automaton
+        start = self._statement_start()
+        word, _ = self._first_word(start)
+        size, _ = automaton.body()
+        if word not in _OUTERMOST or word in self._words_here(size):
+            return False
+        braces = [item for item in scanner.brackets if item.offset < start and item.sign == "{"]
+        if not braces or scanner.column(start) > scanner.column(scanner.first_on_line(braces[0].offset)):
+            return False
+        automaton.cut(size)
+        self._close(braces)
+        scanner.restart(start, fresh=True)
+        scanner.pending = True
+        return True
+
+    def _close_all(self) -> None:
+        """E112 for each block that is open at the end of the text."""
+        self._close([item for item in self.scanner.brackets if item.sign == "{"])
+
+    def _close(self, braces: list[Bracket]) -> None:
+        """Report open blocks and close them; one whose '}' was taken for another's is named first."""
+        scanner = self.scanner
+        reported = list(braces)
+        if scanner.mismatched is not None and reported:
+            reported[-1] = scanner.mismatched
+            scanner.mismatched = None
+        for bracket in reported[-_MOST_BRACES:]:
+            self._not_closed(bracket)
+        while self.automaton.body()[1] != "item" and self.automaton.advance("}"):
+            pass
+        scanner.brackets.clear()
+
+    # --- going on ---
+
+    def _give_up(self, kind: str) -> None:
+        """Skip to the end of the statement and put a Broken node in its place."""
+        automaton, scanner = self.automaton, self.scanner
+        size, body = automaton.body()
+        start = self._statement_start()
+        base = sum(1 for item in scanner.brackets if item.offset < start)
+        if kind == "}" and scanner.closed is not None and scanner.closed.offset < start:
+            base += 1
+        automaton.cut(size)
+        if not self._skip(kind, start, base, body):
+            span = Span(start, max(start, scanner.start))
+            automaton.push(body, automaton.broken(span), span)
+
+    def _skip(self, kind: str, start: int, base: int, body: str) -> bool:
+        """Read to the end of the statement; True where a block was found whose head is mended."""
+        scanner = self.scanner
+        brackets = scanner.brackets
+        for _ in range(MAX_SKIPPED):
+            if scanner.suspect is not None:
+                del brackets[base:]
+                scanner.restart(scanner.suspect, fresh=True)
+                scanner.pending = True
+                return False
+            if kind == "<end>":
+                del brackets[base:]
+                return False
+            if kind == "<newline>" and not any(item.sign == "{" for item in brackets[base:]):
+                del brackets[base:]
+                scanner.pending = True
+                return False
+            if kind == "}" and self._leaves_block(base, body):
+                return False
+            if kind == "{" and len(brackets) == base + 1 and self._mend_head(start):
+                return True
+            kind = scanner.read(())
+        self._stop("the end of this statement cannot be found: the rest of the file is not read")
+        return True
+
+    def _leaves_block(self, base: int, body: str) -> bool:
+        """Whether the '}' just read ends the block that the statement stands in; it is read again."""
+        scanner = self.scanner
+        brackets = scanner.brackets
+        if len(brackets) < base and scanner.closed is not None:
+            brackets.append(scanner.closed)
+        elif body == "item" or self._closed_now() or any(item.sign == "{" for item in brackets[base:]):
+            return False
+        del brackets[base:]
+        scanner.restart(scanner.start, fresh=False)
+        return True
+
+    def _closed_now(self) -> bool:
+        """Whether the token just read closed a bracket."""
+        return self.scanner.closed is not None and self.scanner.closed.end == self.scanner.end
+
+    def _mend_head(self, start: int) -> bool:
+        """Read a head in place of the faulty one before a '{', so that the block can be read."""
+        automaton, scanner = self.automaton, self.scanner
+        word, after = self._first_word(start)
+        if word not in _HEADS or word not in automaton.row:
+            return False
+        brace = (scanner.start, scanner.end)
+        name = _WORD.match(after)
+        first = scanner.text.index(after, start + len(word)) if after else start
+        named = (first, first + len(name.group())) if name else (start, start)
+        size = len(automaton.states)
+        fits = True
+        for number, terminal in enumerate(_HEADS[word]):
+            scanner.start, scanner.end = (start, start + len(word)) if number == 0 else named
+            fits = fits and automaton.advance(terminal)
+        scanner.start, scanner.end = brace
+        if fits and automaton.advance("{"):
+            automaton.damaged.add(start)
+            return True
+        automaton.cut(size)
+        return False
+
+    def _stop(self, message: str) -> None:
+        """Leave the rest of the text unread."""
+        automaton, scanner = self.automaton, self.scanner
+        self._error(("E113", message, None), self._token())
+        automaton.cut(1)
+        scanner.brackets.clear()
+        scanner.restart(len(scanner.text), fresh=True)
+
+    # --- places ---
+
+    def _statement_start(self) -> int:
+        """Offset at which the present statement began."""
+        size, _ = self.automaton.body()
+        starts = self.automaton.starts
+        return starts[size] if size < len(starts) else self.scanner.start
+
+    def _first_word(self, start: int) -> tuple[str, str]:
+        """The word at an offset ('' where there is none) and the rest of its line."""
+        text = self.scanner.text
+        word = _WORD.match(text, start)
+        if word is None:
+            return "", ""
+        blank = _BLANK.match(text, word.end())
+        first = word.end() if blank is None else blank.end()
+        line, _ = self.automaton.source.position(start)
+        starts = self.automaton.source.line_starts
+        return word.group(), text[first : starts[line] if line < len(starts) else len(text)]
+
+    def _token(self) -> Span:
+        """The span of the present token; at least one character where there is one."""
+        scanner = self.scanner
+        return Span(scanner.start, scanner.end)
+
+    def _error(self, complaint: Complaint, span: Span) -> None:
+        """Report a complaint."""
+        self.errors += 1
+        code, message, help_ = complaint
+        self.automaton.notes.error(code, message, span, help_)

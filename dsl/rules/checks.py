@@ -1,0 +1,334 @@
+"""Rules on the resolved network: Paynter's diagram, constraints, values in their range, closed states.
+
+Each rule is one function that looks at resolved statements and reports; none raises.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Energy
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.text.diagnostics import Place, Related, Report
+
+_CLASS = {k: k[-1] for k in ("nq", "nf", "np", "bq", "bf", "bp")} | {"be": "e", "ne": "e"}
+
+
+def letter(node: Node) -> str:
+    """Kind q f p e s kappa mu audit: nodes' and branches' quantities count as those of coordinates."""
+    kind: str = node.data[1]
+    return _CLASS.get(kind, kind)
+
+
+def unknowns_of(node: Node, kinds: str = "") -> list[Node]:
+    """The unknowns of an expression (of those kinds) in the order of their making."""
+    found = (n for n in ex.variables(node) if n.op == "var" and (not kinds or letter(n) in kinds.split()))
+    return sorted(found, key=lambda n: n.number)
+
+
+def energies(model: Elaborator, report: Report) -> None:
+    """E307, E309, E312: the variables that each state function may have."""
+    for energy in model.parts.energies:
+        primal = energy.function in ("T*", "T", "V", "D")
+        for node in unknowns_of(energy.expression):
+            message, help_ = _misplaced(energy, node, primal)
+            if message:
+                code = "E309" if energy.function == "V" and letter(node) == "f" else "E307"
+                report.error(code, message, energy.place, help=help_)
+                break
+        if any(n.data[2] for n in unknowns_of(energy.expression)):
+            message = f"{energy.function} contains a second derivative: accelerations are results, not data"
+            report.error("E518", message, energy.place)
+    _twice(model, report)
+
+
+def _misplaced(energy: Energy, node: Node, primal: bool) -> tuple[str | None, str | None]:
+    kind = letter(node)
+    function = energy.function
+    if kind in ("kappa", "mu", "e", "audit"):
+        return f"{function} contains {node}: a state function depends on coordinates, rates, states and time", None
+    if kind == "f" and function == "V":
+        message = f"V contains the flow {node}: a velocity-dependent potential"
+        return message, "put the part linear in the flow into T*, or use 'work'"
+    if not primal:
+        return None, None
+    if kind == "p" and function != "T":
+        help_ = "energy T = ..." if function == "T*" else None
+        return (
+            f"{function} is a function of {'q and t' if function == 'V' else 'f, q and t'}; it holds momentum {node}",
+            help_,
+        )
+    if kind == "f" and function == "T":
+        return f"T is a function of p, q and t; it contains the flow {node}", "energy T* = ..."
+    return None, None
+
+
+def _twice(model: Elaborator, report: Report) -> None:
+    coenergy = {
+        n.data[0]: e for e in model.parts.energies if e.function == "T*" for n in unknowns_of(e.expression, "f")
+    }
+    for energy in model.parts.energies:
+        if energy.function == "T":
+            for node in unknowns_of(energy.expression, "p"):
+                if node.data[0] in coenergy:
+                    message = f"T and T* are both given for the store of '{node.data[0]}'"
+                    related = (Related("T* is given here", coenergy[node.data[0]].place),)
+                    help_ = "give one; the other is its Legendre transform"
+                    report.error("E312", message, energy.place, related=related, help=help_)
+                    break
+
+
+def families(model: Elaborator, report: Report) -> None:
+    """E318: coordinates and cocoordinates in one expression."""
+    co = {c.name for c in model.parts.coordinates if c.complementary}
+    if not co or len(co) == len(model.parts.coordinates):
+        return
+    primal = {c.name for c in model.parts.coordinates if not c.complementary}
+    for node, place in _expressions(model):
+        names = [n.data[0] for n in unknowns_of(node, "q f p")]
+        both = [next((n for n in names if n in group), None) for group in (primal, co)]
+        if all(both):
+            message = f"mixed families in one expression: coordinate {both[0]} and cocoordinate {both[1]}"
+            report.error("E318", message, place, help="one system is written in one family")
+
+
+def constraints(model: Elaborator, report: Report) -> None:
+    """E501, E502, E503, E511, E518 on phi and psi."""
+    for constraint in model.parts.constraints:
+        what = f"{constraint.kind} {constraint.name}"
+        expression, _ = ex.signals_held(constraint.expression)
+        nodes = unknowns_of(expression)
+        accelerations = [n for n in nodes if n.data[2]]
+        if accelerations:
+            message = f"{what} contains {accelerations[0]}: accelerations are results, not data"
+            report.error("E518", message, constraint.place)
+            continue
+        if constraint.kind == "gamma":
+            continue
+        implicit = [n for n in nodes if letter(n) in ("e", "kappa", "mu")]
+        flows = [n for n in nodes if letter(n) == "f"]
+        if implicit:
+            report.error("E502", f"{what} contains {_named(implicit[0])}", constraint.place, help="it is a gamma")
+        elif constraint.kind == "phi" and flows:
+            report.error("E501", f"{what} contains the flow {flows[0]}", constraint.place, help="it is a psi")
+        elif constraint.kind == "phi" and not [n for n in nodes if letter(n) == "q"]:
+            report.error(
+                "E511", f"{what} contains no coordinate", constraint.place, help="'require' checks a parameter"
+            )
+        elif constraint.kind == "psi" and not flows:
+            message = f"{what} contains no flow" + (": it is a phi" if nodes else "")
+            report.error("E511", message, constraint.place, help="a relation between displacements is a phi")
+        elif constraint.kind == "psi":
+            pair = _nonlinear(expression, flows)
+            if pair:
+                message = f"{what} is not linear in the flows: {pair[0]}*{pair[1]}"
+                help_ = "a nonlinear rate condition is not workless: gamma with an implicit effort"
+                report.error("E503", message, constraint.place, help=help_)
+
+
+def _named(node: Node) -> str:
+    kind = {"e": "the implicit unknown", "kappa": "the multiplier", "mu": "the multiplier"}[letter(node)]
+    return f"{kind} {node}"
+
+
+def _nonlinear(expression: Node, flows: list[Node]) -> tuple[Node, Node] | None:
+    """Two flows whose second derivative does not vanish (judged at sampled points where it is no constant)."""
+    for k, a in enumerate(flows):
+        slope = ex.derivative(expression, a)
+        for b in flows[k:]:
+            second = ex.derivative(slope, b)
+            if not ex.is_const(second, 0.0) and any(abs(v) > 1e-9 for v in _samples(second)):
+                return a, b
+    return None
+
+
+def _samples(node: Node) -> Iterable[float]:
+    leaves = [n for n in ex.topological([node]) if n.op in ("var", "param", "time", "index", "table")]
+    for seed in (1.0, 2.0, 3.0):
+        values = {n: 0.3 + ((k + 1) * seed * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
+        value = ex.evaluate([node], lambda n, v=values: v.get(n, 0.5))[0]  # type: ignore[misc]
+        if math.isfinite(value):
+            yield value
+
+
+def states(model: Elaborator, report: Report) -> None:
+    """E507: every state has exactly one dynamic."""
+    given: dict[str, list[Place]] = {}
+    for dynamic in model.parts.dynamics:
+        given.setdefault(dynamic.state.data[0], []).append(dynamic.place)
+    for state in model.parts.states:
+        places = given.get(state.name, [])
+        if not places and state.name in model.parts.given:
+            continue
+        if not places:
+            help_ = f"dynamic {state.name}' = ..."
+            report.error("E507", f"state {state.name} has no dynamic", state.place, help=help_)
+        elif len(places) > 1 and not state.shape:
+            related = (Related("and here", places[1]),)
+            report.error("E507", f"state {state.name} has {len(places)} dynamics", places[0], related=related)
+
+
+def accelerations(model: Elaborator, report: Report) -> None:
+    """E518: second derivatives feed traces and expectations only."""
+    statements: list[tuple[Node, Place]] = [(w.effort, w.place) for w in model.parts.works]
+    statements += [(d.expression, d.place) for d in model.parts.dynamics]
+    statements += [(i.target, i.place) for i in model.parts.initials]
+    for node, place in statements:
+        second = [n for n in unknowns_of(node) if n.data[2]]
+        if second:
+            message = f"second derivative {second[0]} outside trace and expect"
+            report.error("E518", message, place, help="accelerations are results, not data")
+
+
+def results(model: Elaborator, report: Report) -> None:
+    """E102: what the audit finds feeds traces and expectations only."""
+    parts = model.parts
+    read = [(n, w.place) for w in parts.works for n in (w.effort, w.on)]
+    read += [(c.expression, c.place) for c in parts.constraints] + [(d.expression, d.place) for d in parts.dynamics]
+    read += [(n, i.place) for i in parts.initials for n in (i.target, i.value)]
+    read += [(b.law, b.place) for b in parts.branches if b.law is not None]
+    read += [(c.ratio, c.place) for c in parts.couplings]
+    for node, place in read:
+        found = unknowns_of(node, "audit")
+        if found:
+            name = f"audit.{found[0].data[0]}"
+            help_ = "its expression, or a state that integrates the power"
+            report.error("E102", f"{name} is a result: no law can read it", place, help=help_)
+
+
+def smoothness(model: Elaborator, report: Report) -> None:
+    """W301: a law with a corner or a jump where its flow vanishes; a content with a corner there is set-valued."""
+    for work in model.parts.works:
+        _corner(work.effort, work.place, report)
+    for constraint in model.parts.constraints:
+        if constraint.kind == "gamma":
+            _corner(constraint.expression, constraint.place, report)
+    for energy in model.parts.energies:
+        if energy.function != "D":
+            continue
+        for flow in unknowns_of(energy.expression, "f"):
+            slope = ex.derivative(energy.expression, flow)
+            if _jumps(slope, flow):
+                message = f"content D with a corner at {flow} = 0 is set-valued friction: not supported yet"
+                report.note("N608", f"{message} (planned: events and inequalities)", energy.place)
+                break
+
+
+def _corner(node: Node, place: Place, report: Report) -> None:
+    if not any(n.op == "call" and n.data in ("abs", "sign") for n in ex.topological([node])):
+        return
+    for flow in unknowns_of(node, "f"):
+        if _jumps(node, flow) or _jumps(ex.derivative(node, flow), flow):
+            message = f"the law is not differentiable at {flow} = 0 and contains abs or sign"
+            report.warning("W301", message, place, help="tanh to smooth; set-valued friction is content D with abs")
+            return
+
+
+def _jumps(node: Node, at: Node) -> bool:
+    """Whether the value differs on the two sides of at = 0 (others at a sampled point)."""
+    leaves = [n for n in ex.topological([node]) if n.op in ("var", "param", "time", "index", "table")]
+    values = {n: 0.3 + ((k + 1) * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
+
+    def side(x: float) -> float:
+        return ex.evaluate([node], lambda n: x if n is at else values.get(n, 0.5))[0]
+
+    sides = [side(x) for x in (-1e-9, 1e-9, 1.0)]
+    return all(map(math.isfinite, sides)) and abs(sides[1] - sides[0]) > 1e-6 * (abs(sides[2]) + abs(sides[1]))
+
+
+def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
+    """E406, E904: parameters and inputs without a value (required: a scene wants them)."""
+    for name, parameter in model.parts.parameters.items():
+        if parameter.values or not required:
+            continue
+        if name in model.parts.inputs:
+            report.error("E904", f"input '{name}' of the model is not set", parameter.place, help=f"set {name} = ...")
+        else:
+            help_ = f"set {name} = ... in the scene, or a default"
+            report.error("E406", f"parameter '{name}' has no value", parameter.place, help=help_)
+
+
+def values(model: Elaborator, known: Values, report: Report) -> None:
+    """E322, E324, E805, E807 with the values bound."""
+    for r in model.parts.requirements:
+        node, loops, place, text = r.condition, r.loops, r.place, r.text
+        bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
+        if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
+            shown = ", ".join(f"{n} = {known.number(n, bound):g}" for n in _parameters(node))
+            report.error("E322", f"require {text} fails: {shown}", place)
+    for node, place in _expressions(model):
+        _divisions(node, place, known, report)
+    _sizes(model, known, report)
+    _indices(model, known, report)
+
+
+def _parameters(node: Node) -> list[Node]:
+    return [n for n in ex.topological([node]) if n.op == "param"]
+
+
+def _divisions(node: Node, place: Place, known: Values, report: Report) -> None:
+    for inner in ex.topological([node]):
+        if inner.op != "mul" or not any(e < 0 for e in inner.data):
+            continue
+        for exponent, factor in zip(inner.data, inner.args, strict=True):
+            if exponent < 0 and _is_constant(factor) and known.number(factor) == 0.0:
+                names = _parameters(factor)
+                shown = ", ".join(f"{n} = {known.number(n):g}" for n in names) or f"{factor} = 0"
+                report.error("E324", f"division by zero with the values bound: {inner}, {shown}", place)
+                return
+
+
+def _is_constant(node: Node) -> bool:
+    return all(n.op not in ("var", "time", "index", "table") for n in ex.topological([node]))
+
+
+def _sizes(model: Elaborator, known: Values, report: Report) -> None:
+    for name in sorted(model.resolver.whole):
+        parameter = model.parts.parameters.get(name)
+        if parameter is None or parameter.shape or not parameter.values:
+            continue
+        value = known.number(ex.param(name))
+        if value != math.floor(value) or abs(value) > 2**31 - 2:
+            message = f"'{name}' is a size or an index, so it must be a whole number: {value:g}"
+            report.error("E805", message, parameter.place)
+
+
+def _indices(model: Elaborator, known: Values, report: Report) -> None:
+    for use in model.resolver.uses:
+        low, high = known.bounds(use.value, use.loops)
+        first, last = (known.number(b) for b in use.shape)
+        if any(math.isnan(v) for v in (low, high, first, last)) or low > high:
+            continue
+        wrong = low if low < first else high if high > last else None
+        if wrong is not None:
+            report.error("E805", f"index {wrong:g} of '{use.name}' is outside {first:g}..{last:g}", use.place)
+        elif low != math.floor(low):
+            report.error("E805", f"index {low:g} of '{use.name}' is not a whole number", use.place)
+
+
+def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
+    """Every expression that the model's equations are made of."""
+    for e in model.parts.energies:
+        yield e.expression, e.place
+    for w in model.parts.works:
+        yield ex.add(w.effort, w.on) if w.effort is not w.on else w.on, w.place
+    for c in model.parts.constraints:
+        yield c.expression, c.place
+    for d in model.parts.dynamics:
+        yield d.expression, d.place
+    for i in model.parts.initials:
+        yield i.value, i.place
+    for p in model.parts.parameters.values():
+        for value in p.values:
+            yield value, p.place
+
+
+def run(model: Elaborator, report: Report, *, required: bool) -> None:
+    """All rules; those with values only where every value is there."""
+    for rule in (energies, families, constraints, states, accelerations, results, smoothness):
+        rule(model, report)
+    parameters(model, report, required=required)

@@ -1,0 +1,170 @@
+"""Rules on the network graph and on the laws of its elements (E306, E313, E314, E321, E325, E409, E411, E412)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.text.diagnostics import Place, Report
+from sysdyn.dsl.tree import syntax
+
+
+def run(model: Elaborator, known: Values, read: frozenset[str], report: Report) -> None:
+    """All rules."""
+    _lonely_nodes(model, known, read, report)
+    _loops_of_sources(model, report)
+    _idle_branches(model, report)
+    _lossless(model, report)
+    for branch in model.parts.branches:
+        _sign(branch, known, report)
+
+
+def _count(branch: Branch, known: Values) -> float:
+    """How many elements a branch statement makes."""
+    return math.prod(known.number(loop.last) - known.number(loop.first) + 1 for loop in branch.loops)
+
+
+def _ends(branches: Iterable[Branch]) -> Iterable[tuple[Branch, Terminal]]:
+    for branch in branches:
+        for terminal in (branch.plus, branch.minus):
+            if terminal is not None and terminal.node is not None:
+                yield branch, terminal
+
+
+def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report: Report) -> None:
+    """E409: a node that fewer than two elements touch (common flow: none) and nothing reads."""
+    touched: dict[str, float] = {}
+    for branch, terminal in _ends(model.parts.branches):
+        assert terminal.node is not None
+        touched[terminal.node] = touched.get(terminal.node, 0.0) + _count(branch, known)
+    mentioned = read | _mentioned(model)
+    names = [n.name for n in model.parts.nodes]
+    for node in model.parts.nodes:
+        size = math.prod(known.number(b) - known.number(a) + 1 for a, b in node.shape)
+        wanted = (2.0 if node.domain.common == "effort" else 1.0) * (size if not node.shape else 1.0)
+        count = touched.get(node.name, 0.0)
+        if count < wanted and node.name not in mentioned and size > 0 and not math.isnan(count):
+            _lonely(node, count, names, report)
+
+
+def _lonely(node: NodeFamily, count: float, names: list[str], report: Report) -> None:
+    how = "no element" if not count else "one element only" if node.domain.common == "effort" else "no element"
+    near = [n for n in names if n != node.name and n.lower()[:2] == node.name.lower()[:2]]
+    help_ = f"near names: {', '.join(near[:3])}; " if near else ""
+    report.error("E409", f"node '{node.name}' touches {how}", node.place, help=f"{help_}ground it if that is meant")
+
+
+def _mentioned(model: Elaborator) -> frozenset[str]:
+    """Nodes whose quantities stand in energies, works and constraints, and those that components hang on."""
+    roots = [e.expression for e in model.parts.energies] + [c.expression for c in model.parts.constraints]
+    roots += [n for w in model.parts.works for n in (w.effort, w.on)]
+    roots += [b.on for b in model.parts.branches if b.on is not None]
+    return frozenset(
+        n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] in ("ne", "nq", "nf", "np")
+    )
+
+
+def _loops_of_sources(model: Elaborator, report: Report) -> None:
+    """E411: sources that fix one quantity twice: effort sources between common-effort nodes, flow sources dually."""
+    groups: dict[tuple[str, str], Branch] = {}
+    parent: dict[object, object] = {}
+
+    def root(x: object) -> object:
+        while parent.setdefault(x, x) is not x and parent[x] != x:
+            x = parent[x]
+        return x
+
+    for branch in model.parts.branches:
+        if branch.kind != branch.domain.common or branch.loops or branch.plus is None or branch.minus is None:
+            continue
+        ends = [(branch.domain.name, t.node, t.at) for t in (branch.plus, branch.minus)]
+        a, b = (root(e) for e in ends)
+        if a == b:
+            what = "effort" if branch.kind == "effort" else "flow"
+            others = [g.name for (kind, _), g in groups.items() if kind == branch.domain.name]
+            message = (
+                f"loop of {what} sources: {', '.join((*others, branch.name))} fix the {what} between two nodes twice"
+            )
+            report.error("E411", message, branch.place, help="an element with a law between them")
+        parent[a] = b
+        groups[branch.domain.name, branch.name] = branch
+    _cutsets(model, report)
+
+
+def _cutsets(model: Elaborator, report: Report) -> None:
+    """E412: a node that only sources of its balanced quantity touch."""
+    at: dict[tuple[str, tuple[Node, ...]], list[Branch]] = {}
+    for branch, terminal in _ends(model.parts.branches):
+        assert terminal.node is not None
+        at.setdefault((terminal.node, terminal.at), []).append(branch)
+    for node in model.parts.nodes:
+        balanced = "flow" if node.domain.common == "effort" else "effort"
+        touching = at.get((node.name, ()), [])
+        alone = all(b.kind == balanced and not b.loops for b in touching)
+        if alone and not node.shape and len(touching) > 1 and node.domain.common == "effort":
+            names = ", ".join(b.name for b in touching)
+            message = f"cutset of {balanced} sources: the {balanced}s of {names} at node {node.name} must vanish in sum"
+            report.error("E412", message, node.place, help="an element that can take the difference")
+
+
+def _idle_branches(model: Elaborator, report: Report) -> None:
+    """E306: a branch without a law that stands in nothing."""
+    roots = [e.expression for e in model.parts.energies] + [c.expression for c in model.parts.constraints]
+    roots += [n for w in model.parts.works for n in (w.effort, w.on)]
+    roots += [b.on for b in model.parts.branches if b.on is not None]
+    used = {n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] in ("be", "bf", "bq", "bp")}
+    for branch in model.parts.branches:
+        if branch.kind == "field" and branch.name not in used:
+            message = f"branch '{branch.name}' has no law and occurs in no energy, content, work or constraint"
+            report.error("E306", message, branch.place, help="law e = ...")
+
+
+def _lossless(model: Elaborator, report: Report) -> None:
+    """E314: `lossless` holds by construction where a component is made of couplings alone."""
+    for space, body in model.bodies:
+        claims = [s for s, _ in body if isinstance(s, syntax.Lossless)]
+        if not claims:
+            continue
+        inside = [b for b in model.parts.branches if b.name.startswith(f"{space.path}.")]
+        place = Place(space.source, claims[0].span)
+        wrong = next((b for b in inside if b.kind in ("dissipator", "effort", "flow", "kinetic", "potential")), None)
+        if wrong is not None and wrong.kind in ("dissipator", "effort", "flow"):
+            message = f"'lossless' fails: '{wrong.name}' is a {wrong.kind}" + (
+                " source" if wrong.kind != "dissipator" else ""
+            )
+            report.error("E314", message, place)
+
+
+def _sign(branch: Branch, known: Values, report: Report) -> None:
+    """E321, E325: the modulus of a linear law, judged with the values bound."""
+    if branch.law is None or branch.kind not in ("kinetic", "potential", "dissipator"):
+        return
+    own = [n for n in ex.variables(branch.law) if n.op == "var" and n.data[0] == branch.name and n.data[1][0] == "b"]
+    if len(own) != 1:
+        return
+    slope = ex.derivative(branch.law, own[0])
+    if any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
+        return
+    bound = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
+    value = known.number(slope, bound)
+    if not value < 0.0:
+        return
+    name = branch.name.rpartition("#")[0] or branch.name
+    if branch.kind == "kinetic":
+        message = (
+            f"'{name}': the inertia is negative ({slope} = {value:g}): the motion is not determined forward in time"
+        )
+        report.error("E321", message, branch.place)
+        return
+    what = {"potential": "stiffness or capacitance", "dissipator": "resistance or damping"}[branch.kind]
+    message = f"'{name}': negative {what} ({slope} = {value:g})"
+    function = "V = 1/2*k*x.q^2" if branch.kind == "potential" else "D = 1/2*b*x.f^2"
+    keyword = "energy" if branch.kind == "potential" else "content"
+    report.error(
+        "E325", message, branch.place, help=f"an unstable element that is meant is written as '{keyword} {function}'"
+    )

@@ -1,0 +1,1 @@
+"""The text of a model, places in it, and findings as data."""

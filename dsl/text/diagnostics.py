@@ -1,0 +1,142 @@
+"""What is wrong with a model, as data: found by rules, collected by a report, shown elsewhere.
+
+A diagnostic names its code, says one sentence in the author's terms, and holds the place and,
+where there is one, the text to write instead (`help`). Rules never raise: they add to a `Report`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from sysdyn.dsl.text.source import Place, SourceText, Span
+
+__all__ = ["Diagnostic", "ModelError", "Place", "Related", "Report", "SourceText", "Span"]
+
+_SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
+
+
+@dataclass(frozen=True, slots=True)
+class Related:
+    """A second place that belongs to a diagnostic, with what is to be seen there."""
+
+    message: str
+    place: Place
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of CONTRACT's `related` list."""
+        line, column = self.place.start
+        return {"file": self.place.file, "line": line, "column": column, "message": self.message}
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding; `place` is None only for what belongs to no text (a command-line value)."""
+
+    code: str
+    message: str
+    place: Place | None
+    help: str | None = None
+    related: tuple[Related, ...] = ()
+    label: str | None = None
+    """A short text beside the carets, where the message alone does not say what is marked."""
+
+    @property
+    def severity(self) -> str:
+        """`error`, `warning` or `note`, by the code's letter."""
+        return _SEVERITIES[self.code[0]]
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of CONTRACT's `diagnostics` list."""
+        line = column = end_line = end_column = None
+        if self.place is not None:
+            line, column = self.place.start
+            end_line, end_column = self.place.end
+        return {
+            "code": self.code,
+            "severity": self.severity,
+            "message": self.message,
+            "help": self.help,
+            "file": None if self.place is None else self.place.file,
+            "line": line,
+            "column": column,
+            "end_line": end_line,
+            "end_column": end_column,
+            "related": [item.to_json() for item in self.related],
+        }
+
+
+class ModelError(Exception):
+    """The model cannot be used; `diagnostics` says why."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics: tuple[Diagnostic, ...] = tuple(diagnostics)
+        super().__init__("; ".join(f"{item.code}: {item.message}" for item in self.diagnostics))
+
+    def __reduce__(self) -> tuple[type[ModelError], tuple[tuple[Diagnostic, ...]]]:
+        return ModelError, (self.diagnostics,)
+
+
+class Report:
+    """Collects diagnostics; reading it gives them sorted by place, each once."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic] = ()) -> None:
+        self._found: dict[Diagnostic, None] = dict.fromkeys(diagnostics)
+
+    def add(self, diagnostic: Diagnostic) -> None:
+        """Add one diagnostic; a second equal one changes nothing."""
+        self._found.setdefault(diagnostic)
+
+    def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
+        """Add several diagnostics."""
+        for diagnostic in diagnostics:
+            self.add(diagnostic)
+
+    def error(
+        self,
+        code: str,
+        message: str,
+        place: Place | None,
+        *,
+        help: str | None = None,
+        related: Iterable[Related] = (),
+        label: str | None = None,
+    ) -> None:
+        """Add a finding; its severity follows from the code's letter."""
+        self.add(Diagnostic(code, message, place, help, tuple(related), label))
+
+    warning = error
+    note = error
+
+    def __iter__(self) -> Iterator[Diagnostic]:
+        return iter(self.diagnostics)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """Everything found, by file, then place, then code; files in the order of their first finding."""
+        files: dict[str, int] = {}
+        for item in self._found:
+            files.setdefault("" if item.place is None else item.place.file, len(files))
+        return tuple(sorted(self._found, key=lambda item: _order(item, files)))
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is at least one error."""
+        return any(item.severity == "error" for item in self._found)
+
+    def raise_if_failed(self) -> None:
+        """Raise ModelError with everything found if there is an error among it."""
+        if self.failed:
+            raise ModelError(self.diagnostics)
+
+
+def _order(item: Diagnostic, files: dict[str, int]) -> tuple[int, int, int, str, str]:
+    """Sort key: file, span, code, message."""
+    if item.place is None:
+        return files[""], -1, -1, item.code, item.message
+    span = item.place.span
+    return files[item.place.file], span.start, span.end, item.code, item.message

@@ -1,0 +1,309 @@
+"""One integration by a method of the core: from a consistent state to rows of observed values.
+
+The core advances in chunks of about 50 ms; between them rows are handed to `sink`, progress is shown, and Ctrl-C,
+--max-steps and --max-wall are honoured.  Values at output instants are moved onto the constraints and their hidden
+derivatives by the core (settled.py).
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate.least_norm import LeastNorm
+from sysdyn.runtime.integrate.methods import Method
+from sysdyn.runtime.integrate.metric import kinematic_scale, light
+from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.integrate.segments import Segment, segments
+from sysdyn.runtime.integrate.underlying import Underlying
+from sysdyn.runtime.integrate.unknown_roles import Roles, roles
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+from sysdyn.runtime.model.scales import ROUND_OFF, confirmed, magnitudes
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import column_order
+from sysdyn.runtime.start.restart import Restart
+from sysdyn.runtime.start.settled import Settler
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.structure.structure import DENSE, null_place
+
+CHUNK_SECONDS = 0.05
+CHUNK_STEPS = 1 << 20
+PROJECTED = ("1", "0")
+"""Forms whose rows let the constraints drift: accepted points are moved onto them."""
+ROOM = 4096
+"""Rows of the ring (blocks of at least 1024 rows are written at once)."""
+
+Sink = Callable[[Floats], None]
+Progress = Callable[[float], None]
+
+
+class Integration:
+    """The core's structures for one system and request; `run` drives them."""
+
+    def __init__(self, system: System, start: ConsistentState, request: Request) -> None:
+        self.system, self.start, self.request = system, start, request
+        self.cpu = 0.0
+        self.y, self.yd = start.for_form(system)
+        jy, jyd = system.jacobian(start.t, self.y, self.yd)
+        self._start_rate = self.yd.copy()
+        self._restart: Restart | None = None
+        # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
+        self.yd = np.where(system.differential(jyd), self.yd, 0.0)
+        self.roles: Roles = roles(system, jyd, request.index)
+        self.magnitude = self._magnitudes()
+        if system.form.name == "2":
+            jy, jyd = self._weighted(jy, jyd)
+        self._light = light(system, jy, jyd)
+        self._linear(jy, jyd)
+        self.settler = self._settler("settled", self.roles.state[: system.form.written])
+        stops = None if request.fixed_step else request.stops
+        self.segments = segments(start.t, request.t_end, stops)
+        self._stepper()
+        self._driver()
+
+    def _weighted(self, jy: Floats, jyd: Floats) -> tuple[Floats, Floats]:
+        """The Jacobian with the factors of the rows q' - f; the magnitudes of nu follow them."""
+        scale = kinematic_scale(self.system, self.magnitude, jy, jyd)
+        if (scale == self.system.kinematic_scale).all():
+            return jy, jyd
+        self.system.kinematic_scale[:] = scale
+        self.magnitude = self._magnitudes()
+        return self.system.jacobian(self.start.t, self.y, self.yd)
+
+    def _magnitudes(self) -> Floats:
+        found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd)
+        if self.request.magnitude is not None:
+            known = self.request.magnitude
+            found[: known.size] = np.where(known > 0.0, known, found[: known.size])
+        return np.ascontiguousarray(found)
+
+    def _linear(self, jy: Floats, jyd: Floats) -> None:
+        self.underlying: Underlying | None = None
+        if self.request.method == "dopri":
+            self.underlying = Underlying(self.system, self.magnitude, jy, jyd)
+            self.linear, self._order = self.underlying.linear, None
+            return
+        pattern = self.system.pattern
+        span = max(self.request.t_end - self.start.t, 1e-300)
+        self._order = column_order(pattern, jy + 1e3 / span * jyd)
+        self.linear = lib.core.sd_linear_new(
+            pattern.unknowns, *(lib.pointer(item) for item in (pattern.column, pattern.row, self._order))
+        )
+        if not self.linear:
+            raise MemoryError
+
+    def _settler(self, name: str, state: NDArray[np.bool_]) -> Settler:
+        form = self.system.form
+        n = form.written
+        kinematics = (form.k_q, form.k_f)
+        return Settler(self.system.another(name), kinematics, self.magnitude[:n], self._time, state, self._light[:n])
+
+    def _stepper(self) -> None:
+        request = self.request
+        self.method = Method(request.method, self.system, self.linear, self._order, self.underlying)
+        # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
+        self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
+        self._met = np.zeros(self.system.unknowns)
+        self._smooth = self.roles.smooth.astype(np.int32)
+        method = self.method.contents
+        method.rtol, method.t_end = request.rtol, self.segments[0].end
+        method.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
+        method.fixed_h = request.fixed_step or 0.0
+        method.atol = lib.pointer(self._atol)
+        method.magnitude, method.met = lib.pointer(self.magnitude), lib.pointer(self._met)
+        method.test, method.power = lib.pointer(self.roles.test), lib.pointer(self.roles.power)
+        if request.method == "radau":
+            method.smooth = lib.pointer(self._smooth)
+        elif request.method == "bdf":
+            method.max_order = request.max_order
+        else:
+            method.patience = request.stiff_steps
+        if request.method != "dopri" and self.system.form.name in PROJECTED:
+            self._project = self._settler("constraints", np.ones(self.system.form.written, dtype=bool))
+            method.project = self._project.address
+        self.method.start(self.start.t, self.y, self.yd)
+
+    def _driver(self) -> None:
+        request, system = self.request, self.system
+        self.observed = system.observed_rows("observe")[1]
+        self.width = lib.ROW_HEAD + 2 * self.observed
+        self.run_ = lib.core.sd_run_new(
+            self.method.stepper,
+            self.settler.core,
+            system.form.written,
+            system.form.extended,
+            self.observed,
+        )
+        if not self.run_:
+            raise MemoryError
+        self._calls = {
+            name: system.observer(name) for name in ("audit", "observe", "observe_rate", "observe_scale")
+        }
+        run = self.run_.contents
+        self._least_norm = LeastNorm(self.settler.system) if request.least_norm else None
+        if self._least_norm is not None:
+            run.least_norm = self._least_norm.address
+        for name, call in self._calls.items():
+            setattr(run, name, None if call is None else c.addressof(call))
+        self._audit_at = np.full(6, -1, dtype=np.int32)
+        order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
+        for k in system.description.families_of("audit"):
+            name = system.description.families[k].name.rsplit(".", 1)[-1]
+            if name in order:
+                self._audit_at[order.index(name)] = system.form.at[k]
+        self._instants = np.ascontiguousarray(request.instants, dtype=np.float64)
+        self._rows = np.zeros((max(64, min(ROOM, 1 << 24)) if self.width < 4096 else 64, self.width))
+        kinds = request.instant_kinds
+        self._kinds = np.ascontiguousarray(
+            np.full(self._instants.size, TRACE) if kinds is None else kinds, dtype=np.int32
+        )
+        run.instant_kind = lib.pointer(self._kinds)
+        run.start_rate = lib.pointer(self._start_rate)
+        run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
+        run.instants, run.every_step = self._instants.size, int(request.every_step)
+        run.sample_steps = int(request.sample_steps)
+        run.row, run.room = lib.pointer(self._rows), self._rows.shape[0]
+
+    def _drain(self, sink: Sink) -> None:
+        run = self.run_.contents
+        if run.rows:
+            sink(self._rows[: run.rows].copy())
+            run.rows = 0
+
+    def _failure(self, cause: str) -> SolverFailure:
+        method = self.method.contents
+        unknown: str | None = None
+        row: RowLabel | None = None
+        if cause in ("singular", "nonfinite") and 0 <= method.bad_row < self.system.rows:
+            row = self.system.row_label(method.bad_row)
+        if cause == "singular":
+            unknown = self.system.name(method.bad_column)
+        if cause in ("newton", "step_too_small", "error_test", "singular") and self.system.unknowns <= DENSE:
+            # where the equations themselves are singular there, say so, with the place
+            names, at = self._null_place()
+            if names:
+                return SolverFailure(
+                    "singular", method.t, method.h, ", ".join(names[:3]), self.system.row_label(at)
+                )
+            cause = "newton" if cause == "singular" else cause
+        if cause in ("error_test", "step_too_small", "newton"):
+            unknown = self._worst()
+        return SolverFailure(cause, method.t, method.h, unknown, row)
+
+    def _null_place(self) -> tuple[tuple[str, ...], int]:
+        """Unknowns and row of a singular pencil at the last accepted point; () where it is regular."""
+        method = self.method.contents
+        y, yd = self.method.point()
+        jy, jyd = self.system.jacobian(method.t, y, yd)
+        if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
+            return (), -1
+        return null_place(self.system, jy, jyd)
+
+    def _worst(self) -> str:
+        """The unknown with the largest weighted correction in the last step."""
+        method, n = self.method.contents, self.system.unknowns
+        change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
+        change = np.where(np.isfinite(change), change, np.inf)
+        if (self.roles.test >= 0).any():
+            change[self.roles.test < 0] = 0.0
+        return self.system.name(int(np.argmax(change)))
+
+    def largest(self) -> Floats:
+        """Largest magnitude so far of each observed quantity and of the terms of its expression [observed]."""
+        return lib.reader(self.run_.contents.largest, max(self.observed, 1))[: self.observed].copy()
+
+    def statistics(self) -> Statistics:
+        """Counters so far; residuals and Jacobians of the settling at output instants not included."""
+        method, core = self.method.contents, self.system.core
+        residuals, matrices = (0, 0) if self.underlying is None else self.underlying.evaluations
+        return Statistics(
+            method.steps,
+            method.rejected_steps,
+            core.residual_evaluations + residuals,
+            core.jacobian_evaluations + matrices,
+            self.linear.contents.factorisations,
+            method.newton_failures,
+        )
+
+    def _cross(self, segment: Segment) -> None:
+        """Restarts behind the instant at which a segment ended."""
+        n, method = self.system.form.written, self.method.contents
+        y, yd = self.method.point()
+        y, yd, _ = self.settler.settle(method.t, y[:n], yd[:n])
+        if self._restart is None:
+            self._restart = Restart(self.settler, self.roles.state[:n])
+        found = self._restart.across(segment.begin, y, yd)
+        if found is None:
+            raise self._failure("newton")
+        self.y[:], self._start_rate[:] = 0.0, 0.0
+        self.y[:n], self._start_rate[:n] = found
+        self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
+        method.t_end = segment.end
+        pointers = (lib.pointer(item) for item in (self.y, self.yd, y, yd))
+        lib.core.sd_run_restart(self.run_, segment.begin, segment.label, *pointers)
+
+    def _advance(self, sink: Sink, progress: Progress | None, began: float) -> None:
+        """To the end of a segment."""
+        request, method = self.request, self.method.contents
+        while True:
+            left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
+            before = time.process_time()
+            state = lib.core.sd_run_advance(self.run_, min(CHUNK_STEPS, max(left, 1)), CHUNK_SECONDS)
+            self.cpu += time.process_time() - before
+            self._drain(sink)
+            self.system.failure.check()
+            self.settler.system.failure.check()
+            if progress is not None:
+                progress(method.t)
+            if state == 3:
+                raise self._failure(lib.CAUSES[method.cause])
+            if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
+                raise self._failure("max_steps")
+            late = request.max_wall is not None and time.monotonic() - began > request.max_wall
+            if late and method.t < request.t_end:
+                raise self._failure("max_wall")
+            if state == 1:
+                break
+
+    def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
+        """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
+        began = time.monotonic()
+        self.system.core.residual_evaluations = self.system.core.jacobian_evaluations = 0
+        method = self.method.contents
+        for segment in self.segments:
+            if segment is not self.segments[0]:
+                before = time.process_time()
+                self._cross(segment)
+                self.cpu += time.process_time() - before
+            self._advance(sink, progress, began)
+        magnitude = confirmed(self.system, self.request.t_end - self.start.t, self._met, self.magnitude)
+        return Finished(
+            method.t,
+            self.statistics(),
+            magnitude[: self.system.form.written],
+            self.largest(),
+            self.cpu,
+            self.settler.core.contents.failures,
+        )
+
+    def __del__(self) -> None:
+        if getattr(self, "run_", None):
+            lib.core.sd_run_free(self.run_)
+        if getattr(self, "linear", None) and self.underlying is None:
+            lib.core.sd_linear_free(self.linear)
+
+
+def integrate(
+    system: System,
+    start: ConsistentState,
+    request: Request,
+    sink: Sink,
+    progress: Progress | None = None,
+) -> Finished:
+    """One integration; see Request.  sink receives blocks of rows [k, ROW_HEAD + 2 observed] (core/run.h)."""
+    return Integration(system, start, request).run(sink, progress)

@@ -1,0 +1,74 @@
+"""The stepping methods of the core behind one face: what an integration needs to know of each.
+
+The fields that both structures have under one name (t, h, steps, cause, ...) are read and set through `contents`.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from typing import Any
+
+from sysdyn.runtime.integrate.underlying import Underlying
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.model.system import System
+
+
+class Method:
+    """One of "bdf", "radau", "dopri" on one system.
+
+    linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri.
+    """
+
+    def __init__(
+        self, name: str, system: System, linear: Any, order: Ints | None, underlying: Underlying | None = None
+    ) -> None:
+        self.name = name
+        self._complex: int | None = None
+        self._core: Any = None
+        if name == "radau":
+            self._complex = _complex_linear(system.pattern, order)
+            self._core = lib.core.sd_radau_new(c.byref(system.core), linear, self._complex)
+        elif underlying is not None:
+            self._core = lib.core.sd_dopri_new(c.byref(system.core), underlying.core)
+        else:
+            self._core = lib.core.sd_bdf_new(c.byref(system.core), linear)
+        if not self._core:
+            raise MemoryError
+        self._n = system.unknowns
+
+    @property
+    def contents(self) -> Any:
+        """The core's structure."""
+        return self._core.contents
+
+    @property
+    def stepper(self) -> int:
+        """Address of its sd_stepper."""
+        address = getattr(lib.core, f"sd_{self.name}_stepper")(self._core)
+        assert isinstance(address, int)
+        return address
+
+    def start(self, t: float, y: Floats, yd: Floats) -> None:
+        """From (t, y, yd) with a step of its own choice."""
+        getattr(lib.core, f"sd_{self.name}_start")(self._core, t, lib.pointer(y), lib.pointer(yd), 0.0)
+
+    def point(self) -> tuple[Floats, Floats]:
+        """y, yd [unknowns] of the last accepted point."""
+        stepper = self.contents.stepper
+        return lib.reader(stepper.y, self._n).copy(), lib.reader(stepper.yd, self._n).copy()
+
+    def __del__(self) -> None:
+        if getattr(self, "_core", None):
+            getattr(lib.core, f"sd_{self.name}_free")(self._core)
+        if getattr(self, "_complex", None):
+            lib.core.sd_linear_z_free(self._complex)
+
+
+def _complex_linear(pattern: Pattern, order: Ints | None) -> int:
+    places = (lib.pointer(item) for item in (pattern.column, pattern.row, order))
+    made = lib.core.sd_linear_z_new(pattern.unknowns, *places)
+    if not made:
+        raise MemoryError
+    return int(made)

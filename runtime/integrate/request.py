@@ -1,0 +1,79 @@
+"""What is asked of one integration, and what it hands back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+
+LONGEST = 0.05
+"""Longest step as part of the span: short events of sources are met, and the dense output stays honest."""
+
+TRACE, STEP, COMPARED = 1, 2, 4
+"""Kinds of rows (their second column, a sum)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What an integration shall do.
+
+    t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
+    (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
+    absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; magnitude [unknowns as
+    written] known from an earlier run (else tracked); method: bdf, radau or dopri (form 0); fixed_step [s]: no error
+    test (bdf with max_order 1: the implicit Euler method); h_max [s]: longest step, None: LONGEST of the span; stops
+    [s] ascending: instants at which a step ends and the integration restarts (segments.py); least_norm: rows hold the
+    least multipliers of redundant constraints; stiff_steps: dopri gives up where stability holds it to more steps than
+    these.
+    """
+
+    t_end: float
+    instants: Floats
+    instant_kinds: Ints | None = None
+    every_step: bool = True
+    sample_steps: bool = False
+    rtol: float = 1e-6
+    atol: float | None = None
+    max_steps: int | None = None
+    max_wall: float | None = None
+    magnitude: Floats | None = None
+    index: int = 3
+    method: str = "bdf"
+    max_order: int = lib.MAX_ORDER
+    fixed_step: float | None = None
+    h_max: float | None = None
+    stops: Floats | None = None
+    least_norm: bool = False
+    stiff_steps: float = 1e5
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Deterministic counters of one or more runs."""
+
+    steps: int = 0
+    rejected_steps: int = 0
+    residual_evaluations: int = 0
+    jacobian_evaluations: int = 0
+    factorisations: int = 0
+    newton_failures: int = 0
+
+    def __add__(self, other: Statistics) -> Statistics:
+        return Statistics(*(getattr(self, name) + getattr(other, name) for name in self.__slots__))
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """An integration that reached its end.
+
+    magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
+    their expressions; cpu [s].
+    """
+
+    reached: float
+    statistics: Statistics
+    magnitude: Floats
+    largest: Floats
+    cpu: float
+    unsettled: int

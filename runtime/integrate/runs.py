@@ -1,0 +1,237 @@
+"""The runs of one simulation, each of which writes a trace.
+
+The first run streams into the file itself; a finer run into a neighbour `.NAME.part` that takes its place when it is
+finished: whatever is killed, a readable trace stands at the path.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sysdyn.runtime.integrate.accuracy import Sampled
+from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.integrate.options import Options, instants
+from sysdyn.runtime.integrate.request import COMPARED, STEP, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Description, Floats, Ints, element
+from sysdyn.runtime.model.scales import ROUND_OFF
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.trace.trace import Column, TraceWriter, columns_of
+
+LONG = 1000
+"""Steps of the bdf after which method auto tries radau, and of a stiff dopri."""
+STIFF = 1e5
+"""Steps that a stiff dopri which was asked for still takes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """All quantities of block observe at trace instants and (with sample_steps) accepted steps.
+
+    names [observed]; time [k]; kind [k] (TRACE, STEP, a sum); values [k, observed]; energy [k] (J) and constraints [k]
+    are the meters.  Where no quantity asks for samples there is the last row alone.
+    """
+
+    names: tuple[str, ...]
+    time: Floats
+    kind: Ints
+    values: Floats
+    energy: Floats
+    constraints: Floats
+
+
+class Runs:
+    """The runs of one simulation: each writes a trace; the last finished one stands at the path."""
+
+    def __init__(self, system: System, start: ConsistentState, options: Options, index: int, method: str) -> None:
+        self.system, self.start, self.options, self.index, self.method = system, start, options, index, method
+        self.columns: tuple[Column, ...] = columns_of(system.description)
+        self.names = _observed_names(system.description)
+        self.instants, self.kinds = instants(options)
+        self.path = Path(options.output)
+        self.target = self.path.resolve()
+        self.statistics, self.last_statistics = Statistics(), Statistics()
+        self.cpu = self.wall = 0.0
+        self.number = 0
+        self.patience: int | None = None
+        self.began = time.monotonic()
+        self.writer: TraceWriter | None = None
+        self.finished: Finished | None = None
+        self.rows: list[Floats] = []
+        self.samples: list[Floats] = []
+        self.done: tuple[Finished, list[Floats], TraceWriter] | None = None
+
+    def request(self, rtol: float, atol: float | None, magnitude: Floats | None) -> Request:
+        """One integration's request."""
+        options = self.options
+        left = None if options.max_wall is None else options.max_wall - (time.monotonic() - self.began)
+        return Request(
+            t_end=options.t_end,
+            instants=self.instants,
+            instant_kinds=self.kinds,
+            every_step=options.every is None,
+            sample_steps=options.sample_steps,
+            rtol=rtol,
+            atol=atol,
+            max_steps=self.most_steps,
+            max_wall=left,
+            magnitude=magnitude,
+            index=self.index,
+            stops=options.stops,
+            method="bdf" if self.method == "euler" else self.method,
+            stiff_steps=LONG if options.method == "auto" else STIFF,
+            least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
+            max_order=1 if self.method == "euler" else lib.MAX_ORDER,
+            fixed_step=options.euler_step if self.method == "euler" else None,
+        )
+
+    @property
+    def most_steps(self) -> int | None:
+        """The steps of a run: of the options, or of the patience with a method on trial."""
+        return min((n for n in (self.options.max_steps, self.patience) if n is not None), default=None)
+
+    def _write(self, rows: Floats) -> None:
+        kind = rows[:, 1].astype(np.int32)
+        traced = rows[(kind & TRACE) > 0]
+        assert self.writer is not None
+        self.writer.append(traced)
+        self.rows.append(rows[(kind & COMPARED) > 0])
+        taken = rows[(kind & (TRACE | STEP)) > 0]
+        if self._keeps:
+            self.samples.append(taken)
+        elif taken.size:
+            self.samples = [taken[-1:]]
+
+    @property
+    def _keeps(self) -> bool:
+        """Rows are kept for expects: some quantity of observe is not stored."""
+        return self.options.sample_steps or len(self.columns) < len(self.names)
+
+    def _progress(self, t: float) -> None:
+        options = self.options
+        if options.progress is not None:
+            span = options.t_end - options.t_start
+            fraction = (t - options.t_start) / span if span > 0.0 else 1.0
+            spent = time.monotonic() - self.run_began
+            options.progress(fraction, spent * (1.0 - fraction) / fraction if fraction > 0.01 else None)
+
+    def run(self, rtol: float, atol: float | None, magnitude: Floats | None) -> Finished:
+        """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
+        self.number += 1
+        first = self.done is None
+        target = self.target if first else self.target.with_name(f".{self.target.name}.part")
+        attributes: dict[str, str | float | int] = {
+            **self.options.attributes,
+            "method": self.method,
+            "rtol": float(rtol),
+            "atol": float(atol or 0.0),
+        }
+        self.rows, self.samples = [], []
+        self.run_began = wall = time.monotonic()
+        self.writer = TraceWriter(target, self.columns, len(self.names), attributes, self.options.parameters)
+        integration = Integration(self.system, self.start, self.request(rtol, atol, magnitude))
+        try:
+            finished = integration.run(self._write, self._progress)
+        except BaseException:
+            self._account(integration, wall)
+            self._leave(integration, first)
+            raise
+        self._account(integration, wall)
+        self.writer.flush()
+        self._take(first)
+        self.done, self.finished = (finished, self.samples, self.writer), finished
+        return finished
+
+    def _account(self, integration: Integration, wall: float) -> None:
+        self.cpu += integration.cpu
+        self.wall += time.monotonic() - wall
+        self.last_statistics = integration.statistics()
+        self.statistics = self.statistics + self.last_statistics
+
+    def _leave(self, integration: Integration, first: bool) -> None:
+        """After a failure: the rows so far stay if there is no finished run to keep."""
+        assert self.writer is not None
+        if first:
+            nominal = self.nominal(integration.largest(), integration.magnitude)
+            self.writer.finish(nominal, self.last_attributes(None), final=False)
+            return
+        self.writer.discard()
+        with contextlib.suppress(OSError):
+            self.writer.path.unlink()
+
+    def _take(self, first: bool) -> None:
+        """The finished run's file takes the path (the writer keeps writing its last attributes to it)."""
+        assert self.writer is not None
+        if not first:
+            assert self.done is not None
+            self.done[2].discard()
+            self.writer.path.replace(self.target)
+            self.writer.path = self.target
+
+    def sizes(self, largest: Floats, magnitude: Floats) -> Floats:
+        """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
+        less than round-off of the largest of the same unit, unknowns (magnitude [unknowns]) among them.
+        """
+        of_unit: dict[str, float] = {}
+        for family, first in zip(self.system.description.families, self.system.form.at, strict=False):
+            if family.size and first + family.size <= magnitude.size:
+                size = float(magnitude[first : first + family.size].max())
+                of_unit[family.unit] = max(of_unit.get(family.unit, 0.0), size)
+        sizes = [float(largest[column.place]) for column in self.columns]
+        for column, size in zip(self.columns, sizes, strict=True):
+            of_unit[column.unit] = max(of_unit.get(column.unit, 0.0), size)
+        return np.maximum(sizes, [ROUND_OFF * of_unit[column.unit] for column in self.columns])
+
+    def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
+        """Nominal magnitude of each stored quantity."""
+        sizes = self.sizes(largest, magnitude)
+        return {column.name: float(size) for column, size in zip(self.columns, sizes, strict=True)}
+
+    def last_attributes(self, error_estimate: float | None) -> dict[str, str]:
+        """Statistics and timings as JSON."""
+        found = {"statistics": json.dumps(self.statistics_object(error_estimate))}
+        if self.options.timings:
+            found["timings"] = json.dumps(self.timings())
+        return found
+
+    def statistics_object(self, error_estimate: float | None) -> dict[str, Any]:
+        """The counters of all runs, with the estimate."""
+        return {**asdict(self.statistics), "error_estimate": error_estimate}
+
+    def timings(self) -> dict[str, float]:
+        """cpu_integrate_s, wall_integrate_s, cpu_compile_s, wall_total_s."""
+        began = self.options.wall_began
+        total = time.monotonic() - (self.began if began is None else began)
+        return {
+            "cpu_integrate_s": self.cpu,
+            "wall_integrate_s": self.wall,
+            "cpu_compile_s": self.options.cpu_compile,
+            "wall_total_s": total,
+        }
+
+    def sampled(self, tolerance: float, magnitude: Floats | None) -> Sampled:
+        """One run of the accuracy control."""
+        finished = self.run(tolerance, None, magnitude)
+        places = [column.place for column in self.columns]
+        rows = np.concatenate(self.rows) if self.rows else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
+        values = rows[:, lib.ROW_HEAD :][:, places]
+        return Sampled(tolerance, values, self.sizes(finished.largest, finished.magnitude), finished.magnitude)
+
+    def collected(self) -> Samples:
+        """Samples of the run that stands in the trace."""
+        parts = self.samples if self.done is None else self.done[1]
+        rows = np.concatenate(parts) if parts else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
+        values = rows[:, lib.ROW_HEAD : lib.ROW_HEAD + len(self.names)]
+        return Samples(self.names, rows[:, 0], rows[:, 1].astype(np.int32), values, rows[:, 6], rows[:, 7])
+
+
+def _observed_names(description: Description) -> tuple[str, ...]:
+    rows = [description.rows[k] for k in description.rows_of("observe")]
+    return tuple(element(row.name, row.shape, k) for row in rows for k in range(row.size))

@@ -1,0 +1,47 @@
+"""The smooth pieces of an integration whose text jumps or has kinks at known instants.
+
+A step ends just before such an instant and the next begins just after it, so that every residual sees one side
+(language, rule 17).  Instants nearer to each other than CLOSE of the span are passed as one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+
+CLOSE = 1e-13
+"""Of the span: what happens within is one event (the same instant by two formulas)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """One smooth piece from begin to end [s]; label [s]: the instant at which its first row is written."""
+
+    begin: float
+    end: float
+    label: float
+
+
+def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
+    """The pieces of t0..t1; stops outside are left out."""
+    inside = np.unique(np.asarray([] if stops is None else stops, dtype=np.float64))
+    inside = inside[np.isfinite(inside)]
+    least = CLOSE * max(abs(t0), abs(t1), t1 - t0)
+    inside = inside[(inside > t0) & (inside < t1)]
+    found: list[Segment] = []
+    begin, label = t0, t0
+    k = 0
+    while k < inside.size:
+        last = k
+        while last + 1 < inside.size and inside[last + 1] - inside[last] <= least:
+            last += 1
+        before, after = float(np.nextafter(inside[k], -np.inf)), float(np.nextafter(inside[last], np.inf))
+        first, k = float(inside[last]), last + 1
+        if after >= t1:
+            break
+        if before > begin:
+            found.append(Segment(begin, before, label))
+        begin, label = after, first
+    return (*found, Segment(begin, t1, label))

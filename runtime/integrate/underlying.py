@@ -1,0 +1,211 @@
+"""The underlying ordinary differential equation of a model, from its blocks in the core (core/underlying.h).
+
+`Underlying` owns the core's structure: the matrix [M A^T; A 0] as entries of dF/dy and dF/dy' of form 0, the rows of
+the constraints in the places of their derivatives.  The equation exists where that matrix is regular (`undetermined` is
+empty): where coordinates without inertia are determined by constraints, and implicit efforts by gammas.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.forms import Planned
+from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import column_order
+from sysdyn.runtime.start.start import ConsistentState
+
+DENSE = 300
+"""Unknowns up to which the matrix is judged by its singular values."""
+SINGULAR = 1e-12
+_SWEEPS = 8
+_DERIVED = {"phi": "phi_acceleration", "phi_rate": "phi_acceleration", "psi": "psi_rate", "momentum": "momentum_rate"}
+"""Block of a constraint -> block of form 0 in whose rows its residual stands in a projection."""
+
+
+class Underlying:
+    """system: form "0"; magnitude [unknowns], kept and read by the core."""
+
+    def __init__(self, system: System, magnitude: Floats, jy: Floats, jyd: Floats) -> None:
+        self.system, self._magnitude = system, magnitude
+        kinds = system.kinds
+        self._unknown = np.flatnonzero(kinds != "q").astype(np.int32)
+        self._column = np.full(system.unknowns, -1, dtype=np.int32)
+        self._column[self._unknown] = np.arange(self._unknown.size)
+        moved = np.isin(kinds, ("f", "p"))
+        self._rate = np.where(moved, 2, np.where(kinds == "s", 1, 0)).astype(np.int32)[self._unknown]
+        self._select()
+        self._systems()
+        order = column_order(self.pattern, self.values(jy, jyd))
+        self._order = order
+        self.linear = lib.core.sd_linear_new(
+            self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))
+        )
+        self.core: Any = lib.core.sd_underlying_new(c.byref(system.core), self.linear) if self.linear else None
+        if not self.core:
+            raise MemoryError
+        core = self.core.contents
+        core.matrix, core.applied = c.addressof(self.matrix), c.addressof(self.applied)
+        core.position, core.velocity = (item and c.addressof(item) for item in (self.position, self.velocity))
+        core.direct = int(self._direct)
+        core.unknown, core.rate, core.column = map(lib.pointer, (self._unknown, self._rate, self._column))
+        core.source, core.from_rate = lib.pointer(self._source), lib.pointer(self._from_rate)
+        core.magnitude, core.tolerance = lib.pointer(magnitude), 1e-14
+
+    def _select(self) -> None:
+        """The matrix's pattern, and where its entries stand in dF/dy, dF/dy'."""
+        system = self.system
+        pattern, first = system.pattern, system.form.k_row.size
+        columns = pattern.columns_of()
+        in_y, in_rate = system.structural()
+        self._in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
+        of_rate = (self._rate > 0)[self._column[columns]]
+        take = self._in_matrix & np.where(of_rate, in_rate, in_y)
+        self._source = np.flatnonzero(take).astype(np.int32)
+        self._from_rate = of_rate[take].astype(np.int32)
+        number = self._unknown.size
+        start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
+        self.pattern = Pattern(number, number, start, (pattern.row[take] - first).astype(np.int32))
+
+    def _systems(self) -> None:
+        """The systems of the core: matrix, applied, position, velocity."""
+        system = self.system
+        number = len(system.form.calls)
+        self._calls = (lib.Call * max(number, 1))()
+        algebraic = (self._rate == 0)[self._column[system.pattern.columns_of()]] & self._in_matrix
+        self._direct = True
+        for k, planned in enumerate(system.form.calls):
+            self._calls[k] = system.calls[k]
+            if not algebraic[system.slots_dy(k)].any():
+                self._calls[k].n_dy = 0  # its slopes in y do not stand in the matrix
+            elif not planned.block.endswith("_reaction"):
+                self._direct = False
+        self.matrix = lib.System.from_buffer_copy(system.core)
+        self.matrix.call = c.addressof(self._calls)
+        kept = [k for k, planned in enumerate(system.form.calls) if not planned.block.endswith("_reaction")]
+        self._applied = (lib.Call * max(len(kept), 1))(*(system.calls[k] for k in kept))
+        self.applied = lib.System.from_buffer_copy(system.core)
+        self.applied.call, self.applied.calls = c.addressof(self._applied), len(kept)
+        self._keep: list[Any] = []
+        self.position = self._rows("phi")
+        self.velocity = self._rows("phi_rate", "psi", "momentum")
+
+    def _rows(self, *blocks: str) -> lib.System | None:
+        """Rows of constraints in the places of their derivatives; None where the model has none."""
+        system = self.system
+        planned = {item.block: item for item in system.form.calls}
+        found: list[tuple[str, Planned]] = [
+            (block, planned[_DERIVED[block]])
+            for block in blocks
+            if block in system.description.blocks and _DERIVED[block] in planned
+        ]
+        if not found:
+            return None
+        calls = (lib.Call * len(found))()
+        for k, (block, place) in enumerate(found):
+            calls[k] = system.call(block, place.at, place.to, system.rows)
+        self._keep.append(calls)
+        return lib.System(
+            unknowns=system.unknowns,
+            rows=system.rows,
+            calls=len(found),
+            call=c.addressof(calls),
+            stop=system.core.stop,
+        )
+
+    @property
+    def evaluations(self) -> tuple[int, int]:
+        """Residuals and Jacobians evaluated beside those of the system itself."""
+        return int(self.applied.residual_evaluations), int(self.matrix.jacobian_evaluations)
+
+    def values(self, jy: Floats, jyd: Floats) -> Floats:
+        """Entries of the matrix from those of dF/dy, dF/dy'."""
+        return np.where(self._from_rate > 0, jyd[self._source], jy[self._source])
+
+    def undetermined(self, jy: Floats, jyd: Floats) -> tuple[str, ...]:
+        """Unknowns, or x' for their derivatives, that the rows do not determine at a point; () where they do."""
+        matrix = _balanced(self.pattern, self.values(jy, jyd))
+        number = self.pattern.unknowns
+        if number == 0:
+            return ()
+        if number > DENSE:
+            return self._largest(_sparse_null(self.pattern, matrix))
+        full = np.zeros((number, number))
+        full[self.pattern.row, self.pattern.columns_of()] = matrix
+        if not np.isfinite(full).all():
+            return ()
+        _, sigma, vectors = np.linalg.svd(full)
+        null = vectors[sigma <= SINGULAR * sigma[0]]
+        return self._largest(np.abs(null).max(axis=0) if null.size else np.zeros(number))
+
+    def _largest(self, null: Floats) -> tuple[str, ...]:
+        """Names of the largest entries of a null vector."""
+        if not null.any():
+            return ()
+        places = np.flatnonzero(null > 1e-3 * null.max())
+        return tuple(self.system.name(int(self._unknown[k])) + "'" * int(self._rate[k] > 0) for k in places)
+
+    def slopes(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
+        """y, yd [unknowns] completed from the state in y: q' = f, f', p', s', kappa, mu, e.  SolverFailure."""
+        a, b = self.system._buffer(y), self.system._buffer(yd)
+        self._answer(t, lib.core.sd_underlying_slopes(self.core, t, lib.pointer(a), lib.pointer(b)))
+        return a[: self.system.unknowns], b[: self.system.unknowns]
+
+    def project(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """Y [unknowns] with q, f, p on the constraints at t.  SolverFailure."""
+        a, b = self.system._buffer(y), self.system._buffer(yd)
+        self.core.contents.ready = 0
+        self._answer(t, lib.core.sd_underlying_project(self.core, t, lib.pointer(a), lib.pointer(b)))
+        return a[: self.system.unknowns]
+
+    def _answer(self, t: float, cause: int) -> None:
+        self.system.failure.check()
+        if cause:
+            raise SolverFailure(lib.CAUSES[cause], t, 0.0)
+
+    def __del__(self) -> None:
+        if getattr(self, "core", None):
+            lib.core.sd_underlying_free(self.core)
+        if getattr(self, "linear", None):
+            lib.core.sd_linear_free(self.linear)
+
+
+def obstacle(system: System, state: ConsistentState) -> tuple[str, ...]:
+    """What keeps a model from having an underlying equation: unknowns not determined at a state.  system: form "0"."""
+    y, yd = state.for_form(system)
+    jy, jyd = system.jacobian(state.t, y, yd)
+    return Underlying(system, np.ones(system.unknowns), jy, jyd).undetermined(jy, jyd)
+
+
+def _balanced(pattern: Pattern, values: Floats) -> Floats:
+    """Rows and columns of largest entry about one (Ruiz 2001)."""
+    columns, values = pattern.columns_of(), values.copy()
+    for _ in range(_SWEEPS):
+        for places in (pattern.row, columns):
+            size = np.zeros(pattern.unknowns)
+            np.maximum.at(size, places, np.abs(values))
+            values = values / np.sqrt(np.where(size > 0.0, size, 1.0))[places]
+    return values
+
+
+def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:
+    """A null vector of a large matrix by inverse iteration; zeros where it is regular."""
+    from scipy.sparse import csc_array, eye_array
+    from scipy.sparse.linalg import splu
+
+    shape = (pattern.unknowns, pattern.unknowns)
+    matrix = csc_array((values, pattern.row, pattern.column), shape=shape)
+    try:
+        factors = splu(matrix)
+    except RuntimeError:
+        factors = splu((matrix + 1e-15 * eye_array(pattern.unknowns)).tocsc())
+    x = factors.solve(factors.solve(np.ones(pattern.unknowns)), trans="T")
+    x = factors.solve(x / np.abs(x).max())
+    large = np.abs(x).max()
+    return np.abs(x) / large if large * SINGULAR > 1.0 or not np.isfinite(large) else np.zeros(pattern.unknowns)

@@ -1,0 +1,56 @@
+"""Which unknowns the error test sees, and with which power of h Newton's test weighs them.
+
+Error test: displacements, momenta, dynamic variables, flows with inertia.  Left out: multipliers, implicit efforts,
+flows of massless coordinates (they follow from the others; their accuracy is that of the state, and on index 2 their
+local error is one order larger than what it does to the solution).  Where nothing else is left, they are tested.
+Newton's test: multipliers and other index-2 unknowns with h, index-3 multipliers with h^2 (Petzold & Lötstedt 1986).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.structure.rates import unique
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """test [unknowns]: -1 left out, 0 tested, 1 tested with h; power [unknowns]: of h in Newton's norm.
+
+    state [unknowns]: carry the state; differential [unknowns]: their derivative occurs;
+    smooth [unknowns]: it is determined.
+    """
+
+    test: Ints
+    power: Ints
+    state: NDArray[np.bool_]
+    differential: NDArray[np.bool_]
+    smooth: NDArray[np.bool_]
+
+
+def roles(system: System, jyd: Floats, index: int) -> Roles:
+    """Roles in one form at index `index` of that form (as written: the model's; 2: 2; 1: 1).
+
+    jyd: dF/dyd at the start, which shows the flows with inertia.
+    """
+    kinds = system.kinds
+    differential = system.differential(jyd)
+    state = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & differential)
+    test = np.where(state, 0, -1)
+    power = np.zeros(system.unknowns, dtype=np.int32)
+    multiplier = np.isin(kinds, ("kappa", "mu", "nu"))
+    if index >= 2:
+        power[multiplier | (kinds == "e") | ((kinds == "f") & ~differential)] = 1
+    if index >= 3:
+        power[np.isin(kinds, ("kappa", "mu"))] = 2
+        power[np.isin(kinds, ("f", "p")) & state] = 1
+        test[np.isin(kinds, ("f", "p")) & state] = 1
+    if not state.any():
+        test[kinds == "f"] = 0
+    if (test < 0).all():
+        test[:] = 0
+    return Roles(test.astype(np.int32), power, state, differential, unique(system, jyd))

@@ -1,0 +1,1 @@
+"""A compiled model as numbers: its description, its forms, and the system that the steppers see."""

@@ -1,0 +1,115 @@
+"""The stepping core as ctypes sees it: its functions' signatures, and its structures under their own names."""
+
+from __future__ import annotations
+
+import ctypes as c
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime import _core  # type: ignore[attr-defined]
+from sysdyn.runtime.model.core_structures import (
+    CAUSES,
+    MAX_ORDER,
+    ROW_HEAD,
+    ROWS,
+    STAGES,
+    Bdf,
+    Call,
+    Dopri,
+    Frame,
+    LeastNorm,
+    Linear,
+    Radau,
+    Run,
+    Settle,
+    Stepper,
+    System,
+    Underlying,
+)
+
+__all__ = [
+    "CAUSES",
+    "MAX_ORDER",
+    "ROWS",
+    "ROW_HEAD",
+    "STAGES",
+    "Bdf",
+    "Call",
+    "Dopri",
+    "Frame",
+    "LeastNorm",
+    "Linear",
+    "Radau",
+    "Run",
+    "Settle",
+    "Stepper",
+    "System",
+    "Underlying",
+    "core",
+    "pointer",
+    "reader",
+]
+
+_D, _I, _L, _P = c.c_double, c.c_int32, c.c_int64, c.c_void_p
+
+
+def pointer(array: NDArray[Any] | None) -> int | None:
+    """Address of an array's first element; the caller keeps the array alive."""
+    return None if array is None else array.ctypes.data
+
+
+def reader(address: int, number: int) -> NDArray[np.float64]:
+    """The core's doubles at an address as an array (a view)."""
+    return np.ctypeslib.as_array((c.c_double * number).from_address(address))
+
+
+def _load() -> Any:
+    core = c.CDLL(str(_core.__file__))
+    signatures: dict[str, tuple[Any, list[Any]]] = {
+        "sd_residual": (None, [_P, _D, _P, _P, _P]),
+        "sd_jacobian": (None, [_P, _D, _P, _P, _P, _P]),
+        "sd_linear_new": (c.POINTER(Linear), [_I, _P, _P, _P]),
+        "sd_linear_free": (None, [_P]),
+        "sd_linear_factor": (c.c_int, [_P, _P, _P]),
+        "sd_linear_solve": (None, [_P, _P]),
+        "sd_bdf_new": (c.POINTER(Bdf), [_P, _P]),
+        "sd_bdf_free": (None, [_P]),
+        "sd_bdf_start": (None, [_P, _D, _P, _P, _D]),
+        "sd_bdf_stepper": (_P, [_P]),
+        "sd_bdf_step": (c.c_int, [_P]),
+        "sd_bdf_dense": (None, [_P, _D, _P, _P]),
+        "sd_linear_z_new": (_P, [_I, _P, _P, _P]),
+        "sd_linear_z_free": (None, [_P]),
+        "sd_radau_new": (c.POINTER(Radau), [_P, _P, _P]),
+        "sd_radau_free": (None, [_P]),
+        "sd_radau_stepper": (_P, [_P]),
+        "sd_radau_start": (None, [_P, _D, _P, _P, _D]),
+        "sd_radau_dense": (None, [_P, _D, _P, _P]),
+        "sd_underlying_new": (c.POINTER(Underlying), [_P, _P]),
+        "sd_underlying_free": (None, [_P]),
+        "sd_underlying_slopes": (c.c_int, [_P, _D, _P, _P]),
+        "sd_underlying_project": (c.c_int, [_P, _D, _P, _P]),
+        "sd_dopri_new": (c.POINTER(Dopri), [_P, _P]),
+        "sd_dopri_free": (None, [_P]),
+        "sd_dopri_stepper": (_P, [_P]),
+        "sd_dopri_start": (None, [_P, _D, _P, _P, _D]),
+        "sd_settle_new": (c.POINTER(Settle), [_P, _P, _I]),
+        "sd_settle_free": (None, [_P]),
+        "sd_settle_point": (c.c_int, [_P, _D, _P, _P]),
+        "sd_least_norm_new": (c.POINTER(LeastNorm), [_P, _P, _I, _I]),
+        "sd_least_norm_free": (None, [_P]),
+        "sd_least_norm_apply": (c.c_int, [_P, _D, _P, _P]),
+        "sd_run_new": (c.POINTER(Run), [_P, _P, _I, _I, _I]),
+        "sd_run_free": (None, [_P]),
+        "sd_run_restart": (None, [_P, _D, _D, _P, _P, _P, _P]),
+        "sd_run_advance": (c.c_int, [_P, _L, _D]),
+    }
+    for name, (result, arguments) in signatures.items():
+        function = getattr(core, name)
+        function.restype = result
+        function.argtypes = arguments
+    return core
+
+
+core: Any = _load()

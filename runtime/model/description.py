@@ -1,0 +1,258 @@
+"""The manifest and the binding as typed frozen values.
+
+Receives the manifest's "structure" and the binding as core/model.h lays them down (plain mappings and arrays);
+hands on a `Description`: unknown families, row families, blocks with their kernels, p, ix, initial values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.failures import ContractError, RowLabel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Shape = tuple[tuple[int, int], ...]
+Index = tuple[int, int, int]
+"""(loop, slot, constant): the value is (loop variable or 0) + (ix[slot] or 0) + constant; loop, slot -1: none."""
+
+KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
+BASE = {
+    "dynamics_rate": "dynamics",
+    "phi_reaction": "dynamics",
+    "psi_reaction": "dynamics",
+    "momentum_rate": "momentum",
+    "phi_rate": "phi",
+    "phi_acceleration": "phi",
+    "psi_rate": "psi",
+    "gamma_rate": "gamma",
+    "observe_rate": "observe",
+    "observe_scale": "observe",
+}
+"""The block whose row families another block shares."""
+
+
+def count(shape: Shape) -> int:
+    """Elements of a family of that shape; scalars have one."""
+    size = 1
+    for first, last in shape:
+        size *= max(last - first + 1, 0)
+    return size
+
+
+def element(name: str, shape: Shape, position: int) -> str:
+    """The name of the element at a row-major position: x, x[3], x[2, 5]."""
+    if not shape:
+        return name
+    index = []
+    for first, last in reversed(shape):
+        position, rest = divmod(position, last - first + 1)
+        index.append(str(first + rest))
+    return f"{name}[{', '.join(reversed(index))}]"
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Unknowns of one name.  owner: coordinate (q f p) or constraint label (kappa mu)."""
+
+    name: str
+    kind: str
+    owner: str
+    unit: str
+    nominal: float | None
+    shape: Shape
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return count(self.shape)
+
+
+@dataclass(frozen=True, slots=True)
+class RowFamily:
+    """Rows of one label.  name, stored, rate: of the rows of block observe; fixed, written: of block initial."""
+
+    block: str
+    label: str
+    owner: str
+    kind: str
+    file: str
+    line: int
+    unit: str
+    shape: Shape
+    name: str
+    stored: bool
+    rate: bool
+    fixed: bool
+    written: bool
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return count(self.shape)
+
+    def at(self, position: int) -> RowLabel:
+        """The label of one row."""
+        return RowLabel(element(self.label, self.shape, position), self.kind, self.file, self.line)
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A place in a family by its indices."""
+
+    family: int
+    indices: tuple[Index, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Kernel:
+    """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration."""
+
+    loops: tuple[tuple[Index, Index], ...]
+    dy: tuple[tuple[Reference, Reference], ...]
+    dyd: tuple[tuple[Reference, Reference], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Initial:
+    """Initial values of elements of one family: positions [k], values [k] (SI), fixed or guessed."""
+
+    family: int
+    positions: NDArray[np.int64]
+    values: Floats
+    fixed: bool
+    label: RowLabel
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]."""
+
+    families: tuple[Family, ...]
+    rows: tuple[RowFamily, ...]
+    blocks: dict[str, tuple[Kernel, ...]]
+    p: Floats
+    ix: Ints
+    initial: tuple[Initial, ...]
+
+    def families_of(self, kind: str) -> tuple[int, ...]:
+        """Numbers of the families of one kind."""
+        return tuple(k for k, family in enumerate(self.families) if family.kind == kind)
+
+    def rows_of(self, block: str) -> tuple[int, ...]:
+        """Numbers of the row families of a block (those of its base where it shares them)."""
+        base = BASE.get(block, block)
+        return tuple(k for k, row in enumerate(self.rows) if row.block == base)
+
+
+def _shape(value: Any) -> Shape:
+    return tuple((int(first), int(last)) for first, last in value)
+
+
+def _shapes(value: Any, names: Sequence[str]) -> list[Shape]:
+    items = [value[name] for name in names] if isinstance(value, Mapping) else list(value)
+    if len(items) != len(names):
+        raise ContractError(f"the binding has {len(items)} shapes for {len(names)} families")
+    return [_shape(item) for item in items]
+
+
+def _reference(value: Any) -> Reference:
+    family, indices = value
+    return Reference(int(family), tuple((int(a), int(b), int(c)) for a, b, c in indices))
+
+
+def _pairs(value: Any) -> tuple[tuple[Reference, Reference], ...]:
+    return tuple((_reference(row), _reference(column)) for row, column in value)
+
+
+def _bound(value: Any, depth: int) -> Index:
+    """A loop's bound: a slot of ix, or an index that may follow a loop outside of it."""
+    if isinstance(value, int):
+        return (-1, value, 0)
+    loop, slot, constant = (int(part) for part in value)
+    if loop >= depth:
+        raise ContractError(f"a bound of loop {depth} follows loop {loop}")
+    return (loop, slot, constant)
+
+
+def _kernel(value: Mapping[str, Any]) -> Kernel:
+    loops = tuple(
+        (_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ()))
+    )
+    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())))
+
+
+def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
+    label = str(value.get("label") or value.get("name") or "")
+    return RowFamily(
+        block=str(value["block"]),
+        label=label,
+        owner=str(value.get("owner") or ""),
+        kind=str(value.get("kind") or value["block"]),
+        file=str(value.get("file") or ""),
+        line=int(value.get("line") or 0),
+        unit=str(value.get("unit") or "1"),
+        shape=shape,
+        name=str(value.get("name") or label),
+        stored=bool(value.get("stored", True)),
+        rate=bool(value.get("rate", False)),
+        fixed=bool(value.get("fixed", True)),
+        written=bool(value.get("written", True)),
+    )
+
+
+def _family(value: Mapping[str, Any], shape: Shape) -> Family:
+    if value["kind"] not in KINDS:
+        raise ContractError(f"family {value['name']}: unknown kind {value['kind']!r}")
+    nominal = value.get("nominal")
+    return Family(
+        name=str(value["name"]),
+        kind=str(value["kind"]),
+        owner=str(value.get("owner") or value["name"]),
+        unit=str(value.get("unit") or "1"),
+        nominal=None if not nominal else abs(float(nominal)),
+        shape=shape,
+    )
+
+
+def _initial(value: Mapping[str, Any], names: Mapping[str, int]) -> Initial:
+    family = value["family"]
+    return Initial(
+        family=names[family] if isinstance(family, str) else int(family),
+        positions=np.atleast_1d(np.asarray(value["positions"], dtype=np.int64)),
+        values=np.atleast_1d(np.asarray(value["values"], dtype=np.float64)),
+        fixed=bool(value["fixed"]),
+        label=RowLabel(
+            str(value.get("label") or family),
+            "init",
+            str(value.get("file") or ""),
+            int(value.get("line") or 0),
+        ),
+    )
+
+
+def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Description:
+    """Typed values of a manifest (whole, or its "structure") and a binding.
+
+    Raises ContractError where they do not fit each other.
+    """
+    structure = manifest.get("structure", manifest)
+    families, rows = structure["families"], structure["rows"]
+    shapes = _shapes(binding["shapes"], [str(item["name"]) for item in families])
+    row_shapes = _shapes(binding["row_shapes"], [str(item.get("label")) for item in rows])
+    names = {str(item["name"]): k for k, item in enumerate(families)}
+    return Description(
+        families=tuple(_family(item, shape) for item, shape in zip(families, shapes, strict=True)),
+        rows=tuple(_row(item, shape) for item, shape in zip(rows, row_shapes, strict=True)),
+        blocks={
+            str(name): tuple(_kernel(kernel) for kernel in block["kernels"])
+            for name, block in structure["blocks"].items()
+        },
+        p=np.ascontiguousarray(binding["p"], dtype=np.float64),
+        ix=np.ascontiguousarray(binding["ix"], dtype=np.int32),
+        initial=tuple(_initial(item, names) for item in binding.get("initial", ())),
+    )

@@ -1,0 +1,221 @@
+"""The index forms: which blocks stand where.
+
+A form is a list of calls with their tables `at` (where unknown families begin) and `to` (where row families
+begin); nothing else distinguishes the forms (q' = f are rows of the runtime's own):
+  3     as written (2, 1 or 0 where the model's index is that): phi and psi
+  2     stabilised (Gear, Gupta, Leimkuhler 1985): q' - f + Phi_q^T nu = 0, phi and phi_rate, multipliers nu; the row of
+        each q is weighted (metric.py)
+  2v    phi_rate in the place of phi
+  1     phi_acceleration in the place of phi, psi_rate of psi
+  0     as 1, momentum_rate in the place of momentum: linear in the slopes, what the underlying equation is made of
+  constraints   what holds between displacements, flows and momenta alone (no rows q' - f)
+  settled   all rows that hold at a consistent point: as written and hidden (no rows q' - f)
+  start     the same, dynamics_rate and the block `initial`
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from sysdyn.runtime.model.description import BASE, Description, Ints, RowFamily, element
+from sysdyn.runtime.model.failures import ContractError, RowLabel
+
+NOWHERE = -(2**30)
+"""A table's entry for a family that this call must not touch: any place made of it is out of range."""
+
+_HEAD = (("dynamics", "dynamics"), ("phi_reaction", "dynamics"), ("psi_reaction", "dynamics"))
+_TAIL = (("gamma", "gamma"), ("lambda", "lambda"))
+FORMS: dict[str, tuple[tuple[str, str], ...]] = {
+    "3": (*_HEAD, ("momentum", "momentum"), ("phi", "phi"), ("psi", "psi"), *_TAIL),
+    "2": (
+        *_HEAD,
+        ("phi_reaction", "kinematics"),
+        ("phi_normal", "kinematics"),
+        ("momentum", "momentum"),
+        ("phi", "phi"),
+        ("phi_rate", "phi_rate"),
+        ("psi", "psi"),
+        *_TAIL,
+    ),
+    "2v": (*_HEAD, ("momentum", "momentum"), ("phi_rate", "phi_rate"), ("psi", "psi"), *_TAIL),
+    "1": (
+        *_HEAD,
+        ("momentum", "momentum"),
+        ("phi_acceleration", "phi_acceleration"),
+        ("psi_rate", "psi_rate"),
+        *_TAIL,
+    ),
+    "0": (
+        *_HEAD,
+        ("momentum_rate", "momentum_rate"),
+        ("phi_acceleration", "phi_acceleration"),
+        ("psi_rate", "psi_rate"),
+        *_TAIL,
+    ),
+    "constraints": (("momentum", "momentum"), ("phi", "phi"), ("phi_rate", "phi_rate"), ("psi", "psi")),
+    "settled": (
+        *_HEAD,
+        ("momentum", "momentum"),
+        ("momentum_rate", "momentum_rate"),
+        ("phi", "phi"),
+        ("phi_rate", "phi_rate"),
+        ("phi_acceleration", "phi_acceleration"),
+        ("psi", "psi"),
+        ("psi_rate", "psi_rate"),
+        ("gamma", "gamma"),
+        ("gamma_rate", "gamma_rate"),
+        ("lambda", "lambda"),
+    ),
+}
+FORMS["start"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"), ("initial", "initial"))
+"""form -> (block, group of rows it is added to); blocks a model lacks are skipped."""
+BARE = ("constraints", "settled", "start")
+"""Forms without rows q' - f."""
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """One call: block, at [unknown families], to [row families]."""
+
+    block: str
+    at: Ints
+    to: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A choice of calls with the layout of y and of the rows.
+
+    written: unknowns as written (nu stand behind them); at: places of the families, audit families behind
+    the written ones (`extended` in all); kind: of each unknown; k_row, k_q, k_f: the rows q' - f;
+    groups: (name of the group, row family, first row), ascending.
+    """
+
+    name: str
+    written: int
+    unknowns: int
+    extended: int
+    rows: int
+    at: Ints
+    calls: tuple[Planned, ...]
+    kind: tuple[str, ...]
+    k_row: Ints
+    k_q: Ints
+    k_f: Ints
+    groups: tuple[tuple[str, int, int], ...]
+
+    def row_label(self, description: Description, row: int) -> RowLabel:
+        """The author's label of a row."""
+        if row < self.k_row.size:
+            place = int(self.k_q[row])
+            return RowLabel(f"{unknown_name(description, self, place)}' = f", "kinematic")
+        for group, family, first in reversed(self.groups):
+            if row >= first:
+                label = description.rows[family].at(row - first)
+                if group in BASE:
+                    return RowLabel(label.label, group, label.file, label.line)
+                return label
+        raise ContractError(f"row {row} belongs to no family")
+
+
+def unknown_name(description: Description, form: Form, place: int) -> str:
+    """Name of the unknown at a place of y."""
+    for k, family in enumerate(description.families):
+        if family.kind != "audit" and form.at[k] <= place < form.at[k] + family.size:
+            return element(family.name, family.shape, place - int(form.at[k]))
+    return f"nu[{place - form.written}]"
+
+
+def _layout(description: Description) -> tuple[Ints, list[str], int]:
+    """At (audit families behind the others), kind of each unknown, number with the audit families."""
+    at = np.zeros(len(description.families), dtype=np.int32)
+    kinds: list[str] = []
+    for k, family in enumerate(description.families):
+        if family.kind != "audit":
+            at[k] = len(kinds)
+            kinds += [family.kind] * family.size
+    end = len(kinds)
+    for k in description.families_of("audit"):
+        at[k] = end
+        end += description.families[k].size
+    return at, kinds, end
+
+
+def _kinematics(description: Description, at: Ints) -> tuple[Ints, Ints, dict[str, int]]:
+    """Places of q and of its f for every row q' - f; first row of each coordinate."""
+    flows = {description.families[k].owner: k for k in description.families_of("f")}
+    places_q, places_f, first = [], [], {}
+    number = 0
+    for k in description.families_of("q"):
+        family = description.families[k]
+        if family.owner not in flows:
+            raise ContractError(f"coordinate {family.owner} has a displacement and no flow")
+        flow = flows[family.owner]
+        if description.families[flow].size != family.size:
+            raise ContractError(f"coordinate {family.owner}: displacement and flow differ in size")
+        first[family.owner] = number
+        number += family.size
+        places_q.append(np.arange(family.size) + at[k])
+        places_f.append(np.arange(family.size) + at[flow])
+    if not places_q:
+        return np.zeros(0, np.int32), np.zeros(0, np.int32), first
+    return np.concatenate(places_q).astype(np.int32), np.concatenate(places_f).astype(np.int32), first
+
+
+def _stabilised(rows: tuple[RowFamily, ...], home: str, first: dict[str, int]) -> Ints:
+    """`to` of a block that adds to the rows q' - f of the coordinates that its rows are of."""
+    places = [first.get(row.owner, NOWHERE) if row.block == home else NOWHERE for row in rows]
+    return np.array(places, dtype=np.int32)
+
+
+def plan(description: Description, name: str) -> Form:
+    """The calls and tables of one index form."""
+    at, kind, extended = _layout(description)
+    written = len(kind)
+    k_q, k_f, first = _kinematics(description, at)
+    bare = name in BARE
+    if bare:
+        k_rows, number = np.zeros(0, np.int32), 0
+    else:
+        k_rows, number = np.arange(k_q.size, dtype=np.int32), int(k_q.size)
+    nu = at.copy()
+    tables: dict[str, Ints] = {}
+    groups: list[tuple[str, int, int]] = []
+    calls: list[Planned] = []
+    stabilised = name == "2" and "phi" in description.blocks
+    normal = "phi_normal" if "phi_normal" in description.blocks else "phi_reaction"
+    for block, group in FORMS[name]:
+        if block not in description.blocks or (
+            group in ("kinematics", "phi_rate") and name == "2" and not stabilised
+        ):
+            continue
+        if group == "kinematics" and block != normal:
+            continue
+        if group != "kinematics" and group not in tables:
+            tables[group] = np.full(len(description.rows), NOWHERE, dtype=np.int32)
+            for k in description.rows_of(group):
+                tables[group][k] = number
+                groups.append((group, k, number))
+                number += description.rows[k].size
+        if group == "kinematics":
+            for k in description.families_of("kappa"):
+                nu[k] = len(kind)
+                kind += ["nu"] * description.families[k].size
+            calls.append(Planned(block, nu, _stabilised(description.rows, BASE.get(block, block), first)))
+        else:
+            calls.append(Planned(block, at, tables[group]))
+    return Form(
+        name=name,
+        written=written,
+        unknowns=len(kind),
+        extended=max(extended, len(kind)),
+        rows=number,
+        at=at,
+        calls=tuple(calls),
+        kind=tuple(kind),
+        k_row=k_rows,
+        k_q=np.zeros(0, np.int32) if bare else k_q,
+        k_f=np.zeros(0, np.int32) if bare else k_f,
+        groups=tuple(groups),
+    )

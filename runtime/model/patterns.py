@@ -1,0 +1,124 @@
+"""Sparsity by index arithmetic: kernels of a block -> rows and columns of its entries -> one fixed pattern.
+
+No loop over elements: a kernel of 10^5 iterations costs a few NumPy operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Index, Ints, Kernel, Reference, Shape
+from sysdyn.runtime.model.failures import ContractError
+
+Longs = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Entries in the order of the block's list: row, column [entries]."""
+
+    row: Longs
+    column: Longs
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Compressed columns: column [unknowns + 1], row [entries]; rows ascend within a column."""
+
+    rows: int
+    unknowns: int
+    column: Ints
+    row: Ints
+
+    @property
+    def entries(self) -> int:
+        """Number of places."""
+        return int(self.row.size)
+
+    def columns_of(self) -> Longs:
+        """Column of each entry [entries]."""
+        return np.repeat(np.arange(self.unknowns), np.diff(self.column))
+
+
+def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:
+    """Value of an index in each iteration [number]."""
+    loop, slot, constant = index
+    value = np.full(number, constant + (int(ix[slot]) if slot >= 0 else 0), dtype=np.int64)
+    return value if loop < 0 else value + columns[loop]
+
+
+def _iterations(kernel: Kernel, ix: Ints) -> list[Longs]:
+    """Value of each loop variable in each iteration, last loop fastest; inner bounds may follow outer loops."""
+    columns: list[Longs] = []
+    for first, last in kernel.loops:
+        number = columns[0].size if columns else 1
+        low = _value(first, columns, number, ix)
+        count = np.maximum(_value(last, columns, number, ix) - low + 1, 0)
+        start = np.cumsum(count) - count
+        inner = np.arange(int(count.sum()), dtype=np.int64) + np.repeat(low - start, count)
+        columns = [*(np.repeat(column, count) for column in columns), inner]
+    return columns
+
+
+def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: int, ix: Ints) -> Longs:
+    """Row-major position in its family in each iteration [number]."""
+    position = np.zeros(number, dtype=np.int64)
+    if len(reference.indices) != len(shape):
+        raise ContractError(
+            f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
+        )
+    for index, (first, last) in zip(reference.indices, shape, strict=True):
+        value = _value(index, loops, number, ix)
+        if number and (value.min() < first or value.max() > last):
+            raise ContractError(f"an index runs over {value.min()}..{value.max()} outside {first}..{last}")
+        position = position * (last - first + 1) + (value - first)
+    return position
+
+
+def places(
+    kernels: Sequence[Kernel],
+    which: str,
+    ix: Ints,
+    shapes: tuple[Sequence[Shape], Sequence[Shape]],
+    tables: tuple[Ints, Ints],
+) -> Places:
+    """Rows and columns of the entries `which` ("dy" or "dyd") of a block.
+
+    shapes: of row families and unknown families; tables: `to` and `at`.
+    """
+    all_rows: list[Longs] = []
+    all_columns: list[Longs] = []
+    for kernel in kernels:
+        entries = kernel.dy if which == "dy" else kernel.dyd
+        if not entries:
+            continue
+        loops = _iterations(kernel, ix)
+        number = loops[0].size if kernel.loops else 1
+        for side, into in ((0, all_rows), (1, all_columns)):
+            found = [
+                int(tables[side][pair[side].family])
+                + _positions(pair[side], shapes[side][pair[side].family], loops, number, ix)
+                for pair in entries
+            ]
+            into.append(np.stack(found, axis=1).ravel())
+    empty = np.zeros(0, dtype=np.int64)
+    return Places(
+        np.concatenate(all_rows) if all_rows else empty, np.concatenate(all_columns) if all_columns else empty
+    )
+
+
+def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern, list[Ints]]:
+    """One pattern that holds all parts, and for each part the place of each of its entries (int32)."""
+    row = np.concatenate([part.row for part in parts]) if parts else np.zeros(0, dtype=np.int64)
+    column = np.concatenate([part.column for part in parts]) if parts else np.zeros(0, dtype=np.int64)
+    if row.size and (row.min() < 0 or row.max() >= rows or column.min() < 0 or column.max() >= unknowns):
+        raise ContractError("an entry lies outside the matrix")
+    keys, inverse = np.unique(column * max(rows, 1) + row, return_inverse=True)
+    starts = np.searchsorted(keys, np.arange(unknowns + 1, dtype=np.int64) * max(rows, 1))
+    pattern = Pattern(rows, unknowns, starts.astype(np.int32), (keys % max(rows, 1)).astype(np.int32))
+    cuts = np.cumsum([part.row.size for part in parts])[:-1]
+    slots = [np.ascontiguousarray(piece, dtype=np.int32) for piece in np.split(inverse.ravel(), cuts)]
+    return pattern, slots

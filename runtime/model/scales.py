@@ -1,0 +1,216 @@
+"""Magnitudes of the unknowns: what relative tolerances and scaled matrices refer to.
+
+A magnitude is the nominal value of the manifest where it names one.  Else the largest of |y| at the start, |y'| times
+the time scale of the start (never the span alone: a long run would call everything small), and a thousandth of these
+among unknowns of the same kind and unit.
+Unknowns that are zero with all of that take the magnitude that balances the rows they stand in: the other terms
+of the row, and how far the row itself moves with t over the span (sources that start at zero).
+During a run magnitudes grow with max |y|; a second run starts with the maxima of the first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+
+ROUND_OFF = 1e-12
+"""Of the largest quantity of the same unit: smaller ones are what is left of a zero."""
+GROUP = 1e-3
+SPAN = 1e-2
+NOISE = 1e-6
+"""Values below this part of what balances their rows are round-off, or zero by chance."""
+QUIET = 1e-9
+"""Efforts below this part of (largest energy) / q are round-off."""
+_SAMPLES = 16
+_SWEEPS = 8
+
+
+def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
+    """How far each row moves with t alone over the span [rows]; shortest time in which one does so [s]."""
+    base = system.residual(t0, y, yd)
+    span = t_end - t0
+    moves = []
+    for part in (1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)):
+        moved = np.abs(system.residual(t0 + span * part, y, yd) - base)
+        moves.append(np.where(np.isfinite(moved), moved, 0.0))
+    most, early = np.max(moves, axis=0, initial=0.0), moves[0]
+    quick = early > NOISE * most
+    return most, float((1e-6 * span * most[quick] / early[quick]).min(initial=np.inf))
+
+
+def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: float) -> float:
+    """Shortest of: a hundredth of the span, y / y', sqrt(q / f'), the time scale of what moves with t (s)."""
+    found = min(SPAN * span, excited)
+    state = np.isin(system.kinds, ("q", "f", "p", "s"))
+    form, size, rate = system.form, group_maximum(system, np.abs(y)), np.abs(yd)
+    # values that are nothing beside what their rate makes of them are round-off
+    real = state & (size > 1e-9 * rate * span) & (rate > 0.0)
+    found = min(found, float((size[real] / rate[real]).min(initial=np.inf)))
+    both = (size[form.k_q] > 0.0) & (rate[form.k_f] > 0.0)
+    return min(found, float(np.sqrt(size[form.k_q][both] / rate[form.k_f][both]).min(initial=np.inf)))
+
+
+def _flows(system: System, found: Floats, span: float) -> Floats:
+    """Flows at rest, and not accelerated but by round-off: a small part of what would move their q in the span."""
+    form = system.form
+    least = 0.1 * found[form.k_q] / (span or 1.0)
+    result = found.copy()
+    quiet = found[form.k_f] < NOISE * least
+    result[form.k_f[quiet]] = GROUP * least[quiet]
+    return result
+
+
+def propagate(
+    magnitude: Floats,
+    rows: NDArray[np.integer],
+    columns: NDArray[np.integer],
+    size: Floats,
+    excited: Floats,
+    alike: NDArray[np.int64],
+    *,
+    largest: bool = False,
+    capped: bool = False,
+) -> Floats:
+    """Fills zeros of `magnitude` [unknowns] so that their terms balance the others of their rows.
+
+    rows, columns, size [entries]: |coefficient| of each place; excited [rows]: magnitude of the rows' free terms;
+    alike [unknowns]: number of the kind and unit.  A coefficient that is small beside those of its like proposes much:
+    it is asked only where no other is left.
+    Of several rows' proposals the least counts, or the largest; capped: none above the largest of its like that is
+    known, for along a chain each overestimates the next, and a run mends what is too small alone.
+    """
+    found = magnitude.copy()
+    places = size > 0.0
+    rows, columns, size = rows[places], columns[places], size[places]
+    _, group = np.unique(rows.astype(np.int64) * (1 + int(alike.max(initial=0))) + alike[columns], return_inverse=True)
+    leading = np.zeros(int(group.max(initial=-1)) + 1)
+    np.maximum.at(leading, group, size)
+    small = size < GROUP * leading[group]
+    for _ in range(_SWEEPS):
+        missing = found == 0.0
+        if not missing.any():
+            break
+        row = excited.copy()
+        np.maximum.at(row, rows, size * found[columns])
+        wanted = missing[columns] & (row[rows] > 0.0)
+        if (wanted & ~small).any():
+            wanted &= ~small
+        best = np.zeros(found.size) if largest else np.full(found.size, np.inf)
+        pick = np.maximum if largest else np.minimum
+        with np.errstate(over="ignore"):  # a proposal without bound is none
+            pick.at(best, columns[wanted], row[rows[wanted]] / size[wanted])
+        if capped:
+            known = _group_maximum(alike, found)
+            best = np.where(known > 0.0, np.minimum(best, known), best)
+        found = np.where(missing & np.isfinite(best), best, found)
+    return found
+
+
+def _efforts(system: System, found: Floats, row: Floats) -> Floats:
+    """Least effort that counts in each row of dynamics [rows]: a tiny part of the largest energy over its q."""
+    form, description = system.form, system.description
+    places = {description.families[k].owner: k for k in description.families_of("q")}
+    rows: list[NDArray[np.int64]] = []
+    columns: list[NDArray[np.int64]] = []
+    for group, family, first in form.groups:
+        owner = description.rows[family].owner
+        number = description.rows[family].size
+        if group == "dynamics" and owner in places and description.families[places[owner]].size == number:
+            rows.append(first + np.arange(number))
+            columns.append(form.at[places[owner]] + np.arange(number))
+    least = np.zeros(system.rows)
+    if rows:
+        i, q = np.concatenate(rows), found[np.concatenate(columns)]
+        least[i] = QUIET * (row[i] * q).max(initial=0.0) / np.where(q > 0.0, q, np.inf)
+    return least
+
+
+def alike(system: System) -> NDArray[np.int64]:
+    """Number of the kind and unit of each unknown [unknowns]."""
+    families = system.description.families
+    keys: dict[tuple[str, str], int] = {}
+    number = np.empty(len(families) + 1, dtype=np.int64)
+    for k, family in enumerate(families):
+        number[k] = keys.setdefault((family.kind, family.unit), len(keys))
+    number[-1] = len(keys)
+    return number[system.family_of]
+
+
+def group_maximum(system: System, values: Floats) -> Floats:
+    """Largest value among the unknowns of the same kind and unit."""
+    return _group_maximum(alike(system), values)
+
+
+def _group_maximum(group: NDArray[np.int64], values: Floats) -> Floats:
+    largest = np.zeros(int(group.max(initial=0)) + 1)
+    np.maximum.at(largest, group, values)
+    return largest[group]
+
+
+def balanced(system: System, y: Floats, jy: Floats) -> Floats:
+    """Size of each unknown at a point [unknowns], all positive: |y|, or what balances its rows."""
+    rows, columns = system.pattern.row.astype(np.int64), system.pattern.columns_of()
+    size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
+    found = propagate(np.abs(y), rows, columns, size, np.zeros(system.rows), alike(system), largest=True)
+    found = np.maximum(found, GROUP * group_maximum(system, found))
+    return np.where(found > 0.0, found, 1.0)
+
+
+def _with_momentum(system: System) -> NDArray[np.bool_]:
+    """Unknowns of coordinates whose momenta are unknowns [unknowns]."""
+    families = system.description.families
+    owners = {family.owner for family in families if family.kind == "p"}
+    member = np.array([*(family.owner in owners for family in families), False])
+    return np.asarray(member[system.family_of])
+
+
+def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
+    """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s]."""
+    span = max(t_end - t0, 0.0) or 1.0
+    y, yd = (np.where(np.isfinite(item), item, 0.0) for item in (y, yd))
+    state = np.isin(system.kinds, ("q", "f", "p", "s"))
+    excited, quick = excitation(system, t0, t0 + span, y, yd)
+    tau = time_scale(system, span, y, yd, quick)
+    jy, jyd = system.jacobian(t0, y, yd)
+    # flows without inertia follow from the rest
+    carries = state & ((system.kinds != "f") | system.differential(jyd) | _with_momentum(system))
+    moves = np.where(carries, tau * np.abs(yd), 0.0)
+    known = np.maximum(np.abs(y), moves)
+    form = system.form
+    flows = np.maximum(known, GROUP * group_maximum(system, known))[form.k_f]
+    moves[form.k_q[np.abs(y[form.k_f]) < QUIET * flows]] = 0.0  # rates that are round-off
+    known = np.maximum(np.abs(y), moves)
+    known = np.maximum(known, GROUP * group_maximum(system, known))
+    found = np.where(system.nominal > 0.0, system.nominal, known)
+    found = _flows(system, found, span)
+    size = np.abs(jy) + np.abs(jyd) / tau
+    size = np.where(np.isfinite(size), size, 0.0)
+    pattern = system.pattern
+    rows, columns, kinds = pattern.row.astype(np.int64), pattern.columns_of(), alike(system)
+    # momenta and dynamic variables are balanced against flows, what follows from the state against all of it: so
+    # round-off of a start does not pass for a magnitude
+    kept = np.where(np.isin(system.kinds, ("q", "f")) & carries, found, 0.0)
+    balanced = propagate(kept, rows, columns, size, excited, kinds, largest=True, capped=True)
+    found = np.where(~np.isin(system.kinds, ("p", "s")) | (found > NOISE * balanced), found, balanced)
+    kept = np.where(carries, found, 0.0)
+    row = excited.copy()
+    np.maximum.at(row, rows, size * kept[columns])
+    excited = np.maximum(excited, _efforts(system, found, row))
+    balanced = propagate(kept, rows, columns, size, excited, kinds, capped=True)
+    found = np.where(found > NOISE * balanced, found, balanced)
+    found = np.where(found == 0.0, group_maximum(system, found), found)
+    found[form.k_q] = np.where(found[form.k_q] == 0.0, tau * found[form.k_f], found[form.k_q])
+    tiny = np.finfo(np.float64).tiny * 1e30
+    return np.where(found > tiny, found, 1.0), tau
+
+
+def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Floats:
+    """Magnitudes after a run [unknowns]: the largest |y| it met and a thousandth of that among unknowns of the same
+    kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
+    round-off altogether.
+    """
+    found = _flows(system, np.maximum(met, GROUP * group_maximum(system, met)), span)
+    free = np.isin(system.kinds, ("q", "f", "p", "s")) & (system.nominal == 0.0)
+    return np.where(free, np.clip(found, NOISE * magnitude, magnitude), magnitude)

@@ -1,0 +1,284 @@
+"""One index form of a compiled model: residual F(t, y, yd), Jacobian, observed quantities, names.
+
+Made of a `Description`, a carrier and the name of a form (forms.py); evaluated by the core's assembly.c, so that
+what Python sees is what the stepper integrates.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.carrier import Carrier, Extent, Failure, Tables
+from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, describe
+from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
+from sysdyn.runtime.model.held_rows import LeftOut, held_rows
+from sysdyn.runtime.model.patterns import Pattern, Places, compress, places
+
+Mask = NDArray[np.bool_]
+
+
+class System:
+    """A model in one index form.  y, yd [unknowns], r [rows]; all in SI units."""
+
+    def __init__(
+        self, manifest: Mapping[str, Any], binding: Mapping[str, Any], carrier: Carrier, index_form: str = "3"
+    ) -> None:
+        self._make(describe(manifest, binding), carrier, index_form)
+
+    @classmethod
+    def of(
+        cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
+    ) -> System:
+        """The same from a description; left_out: multipliers (family, position) of constraints that do not count."""
+        self = cls.__new__(cls)
+        self._make(description, carrier, index_form, left_out)
+        return self
+
+    def another(self, index_form: str) -> System:
+        """The same model in another form."""
+        return System.of(self.description, self.carrier, index_form, self.left_out)
+
+    def without(self, left_out: LeftOut) -> System:
+        """The same form, these constraints left out."""
+        return System.of(self.description, self.carrier, self.form.name, left_out)
+
+    def _make(
+        self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
+    ) -> None:
+        self.left_out = left_out
+        self.description = description
+        self.carrier = carrier
+        self.form: Form = plan(description, index_form)
+        self.failure = Failure()
+        self._keep: list[Any] = []
+        self._assemble()
+
+    @property
+    def unknowns(self) -> int:
+        """Length of y."""
+        return self.form.unknowns
+
+    @property
+    def rows(self) -> int:
+        """Length of r."""
+        return self.form.rows
+
+    # --- the core's structure -------------------------------------------------------------------------------
+
+    def _places(self, call: Planned) -> tuple[Places, Places]:
+        """Where the entries of one call stand: dy, dyd."""
+        kernels = self.description.blocks[call.block]
+        shapes = (
+            [row.shape for row in self.description.rows],
+            [item.shape for item in self.description.families],
+        )
+        dy, dyd = (
+            places(kernels, which, self.description.ix, shapes, (call.to, call.at)) for which in ("dy", "dyd")
+        )
+        return dy, dyd
+
+    def _assemble(self) -> None:
+        form = self.form
+        number = np.asarray(form.k_row, dtype=np.int64)
+        parts = [Places(number, form.k_q.astype(np.int64)), Places(number, form.k_f.astype(np.int64))]
+        found = [self._places(call) for call in form.calls]
+        for pair in found:
+            parts += pair
+        held = held_rows(self.description, form, self.left_out)
+        parts.append(Places(*held))
+        self.pattern: Pattern
+        self.pattern, slots = compress(form.rows, form.unknowns, parts)
+        entries = max([part.row.size for part in parts] + [1])
+        calls = (lib.Call * max(len(form.calls), 1))()
+        for k, call in enumerate(form.calls):
+            calls[k] = self.call(
+                call.block, call.at, call.to, form.rows, dy=slots[2 * k + 2], dyd=slots[2 * k + 3]
+            )
+        self.calls, self._slots = calls, slots
+        self.kinematic_scale = np.ones(form.k_row.size)
+        self._scratch = np.zeros(entries)
+        cleared = np.flatnonzero(np.isin(self.pattern.row, held[0])).astype(np.int32)
+        held_row, held_unknown = (item.astype(np.int32) for item in held)
+        self._keep += [calls, slots, cleared, held_row, held_unknown]
+        self.core = lib.System(
+            unknowns=form.unknowns,
+            rows=form.rows,
+            entries=self.pattern.entries,
+            calls=len(form.calls),
+            kinematics=form.k_row.size,
+            column=lib.pointer(self.pattern.column),
+            row=lib.pointer(self.pattern.row),
+            call=c.addressof(calls),
+            k_row=lib.pointer(form.k_row),
+            k_q=lib.pointer(form.k_q),
+            k_f=lib.pointer(form.k_f),
+            k_slot_q=lib.pointer(slots[0]),
+            k_slot_f=lib.pointer(slots[1]),
+            k_scale=lib.pointer(self.kinematic_scale),
+            held=held_row.size,
+            clear=cleared.size,
+            held_row=lib.pointer(held_row),
+            held_unknown=lib.pointer(held_unknown),
+            held_slot=lib.pointer(slots[-1]),
+            cleared=lib.pointer(cleared),
+            v=lib.pointer(self._scratch),
+            stop=lib.pointer(self.failure.flag),
+        )
+
+    def call(
+        self, block: str, at: Ints, to: Ints, rows: int, *, dy: Ints | None = None, dyd: Ints | None = None
+    ) -> lib.Call:
+        """The core's structure for one block with its tables; slots of its entries or None."""
+        tables = Tables(self.description.p, self.description.ix, at, to)
+        n_dy, n_dyd = (0 if slots is None else int(slots.size) for slots in (dy, dyd))
+        made = self.carrier.bind(block, tables, Extent(self.form.extended, rows, n_dy, n_dyd), self.failure)
+        self._keep.append((tables, made, dy, dyd))
+        frame = lib.Frame(*(lib.pointer(item) for item in (tables.p, tables.ix, at, to)))
+        return lib.Call(
+            rows=made.rows,
+            dy=made.dy,
+            dyd=made.dyd,
+            frame=frame,
+            n_dy=n_dy,
+            n_dyd=n_dyd,
+            slot_dy=lib.pointer(dy),
+            slot_dyd=lib.pointer(dyd),
+        )
+
+    def slots_dy(self, call: int) -> Ints:
+        """Places in the pattern of the entries that a call adds to dF/dy."""
+        return self._slots[2 * call + 2]
+
+    def structural(self) -> tuple[Mask, Mask]:
+        """Which places of the pattern [entries] some block writes in dF/dy, in dF/dyd (rows q' - f left out)."""
+        in_y, in_rate = np.zeros(self.pattern.entries, dtype=bool), np.zeros(self.pattern.entries, dtype=bool)
+        for k in range(len(self.form.calls)):
+            in_y[self._slots[2 * k + 2]] = True
+            in_rate[self._slots[2 * k + 3]] = True
+        in_y[self._slots[-1]] = True
+        return in_y, in_rate
+
+    def observer(self, block: str) -> lib.Call | None:
+        """A call of observe, observe_rate, observe_scale or audit whose rows begin at 0."""
+        if block not in self.description.blocks:
+            return None
+        table, number = self.observed_rows(block)
+        return self.call(block, self.form.at, table, max(number, 1))
+
+    def observed_rows(self, block: str) -> tuple[Ints, int]:
+        """First row of each row family of an observing block, and their number."""
+        table = np.full(len(self.description.rows), -1, dtype=np.int32)
+        number = 0
+        for k in self.description.rows_of(BASE.get(block, block)):
+            table[k] = number
+            number += self.description.rows[k].size
+        return table, number
+
+    # --- evaluation -----------------------------------------------------------------------------------------
+
+    def _buffer(self, x: Floats) -> Floats:
+        """X with room for the audit families behind."""
+        buffer = np.zeros(self.form.extended)
+        buffer[: len(x)] = x
+        return buffer
+
+    def residual(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """F(t, y, yd) [rows]."""
+        r = np.zeros(max(self.rows, 1))
+        a, b = self._buffer(y), self._buffer(yd)
+        lib.core.sd_residual(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), lib.pointer(r))
+        self.failure.check()
+        return r[: self.rows]
+
+    def jacobian(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
+        """Values of dF/dy and dF/dyd [entries] on the pattern."""
+        jy, jyd = np.zeros(self.pattern.entries + 1), np.zeros(self.pattern.entries + 1)
+        a, b = self._buffer(y), self._buffer(yd)
+        lib.core.sd_jacobian(c.byref(self.core), t, *(lib.pointer(item) for item in (a, b, jy, jyd)))
+        self.failure.check()
+        return jy[:-1], jyd[:-1]
+
+    def dense(self, values: Floats) -> Floats:
+        """Values on the pattern as a full matrix [rows, unknowns]."""
+        full = np.zeros((self.rows, self.unknowns))
+        full[self.pattern.row, self.pattern.columns_of()] = values
+        return full
+
+    def _evaluate(self, block: str, t: float, y: Floats, yd: Floats) -> Floats:
+        call = self.observer(block)
+        number = self.observed_rows(block)[1]
+        if call is None:
+            return np.zeros(number)
+        out = np.zeros(max(number, 1))
+        function = lib.ROWS(call.rows)
+        function(c.addressof(call.frame), t, lib.pointer(y), lib.pointer(yd), lib.pointer(out))
+        self.failure.check()
+        return out[:number]
+
+    def observe(self, t: float, y: Floats, yd: Floats, audit: Mapping[str, float] | None = None) -> Floats:
+        """Traced quantities (and sides of expects) at a point, in the order of their rows."""
+        a, b = self._buffer(y[: self.form.written]), self._buffer(yd[: self.form.written])
+        for k in self.description.families_of("audit"):
+            family = self.description.families[k]
+            a[self.form.at[k]] = (audit or {}).get(family.name.removeprefix("audit."), 0.0)
+        return self._evaluate("observe", t, a, b)
+
+    def observe_rate(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """Derivatives of the traced quantities at a point, in the order of their rows; 0 where there is none."""
+        buffers = (self._buffer(item[: self.form.written]) for item in (y, yd))
+        return self._evaluate("observe_rate", t, *buffers)
+
+    def audit(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """[kinetic energy, potential energy (J), power dissipated, power supplied (W)]."""
+        values = self._evaluate(
+            "audit", t, self._buffer(y[: self.form.written]), self._buffer(yd[: self.form.written])
+        )
+        return np.concatenate([values, np.zeros(4)])[:4]
+
+    # --- facts about the unknowns ---------------------------------------------------------------------------
+
+    @cached_property
+    def unknown_names(self) -> tuple[str, ...]:
+        """Name of each unknown."""
+        return tuple(unknown_name(self.description, self.form, k) for k in range(self.unknowns))
+
+    def name(self, place: int) -> str:
+        """Name of one unknown."""
+        return unknown_name(self.description, self.form, place)
+
+    def row_label(self, row: int) -> RowLabel:
+        """Label of one row."""
+        return self.form.row_label(self.description, row)
+
+    @cached_property
+    def kinds(self) -> NDArray[np.str_]:
+        """Kind of each unknown: q f p s e kappa mu nu."""
+        return np.array(self.form.kind, dtype="<U5") if self.form.kind else np.zeros(0, dtype="<U5")
+
+    @cached_property
+    def family_of(self) -> Ints:
+        """Number of the family of each unknown (nu: -1)."""
+        found = np.full(self.unknowns, -1, dtype=np.int32)
+        for k, family in enumerate(self.description.families):
+            if family.kind != "audit":
+                found[self.form.at[k] : self.form.at[k] + family.size] = k
+        return found
+
+    @cached_property
+    def nominal(self) -> Floats:
+        """Nominal magnitudes from the manifest; 0 where it names none."""
+        values = [0.0 if family.nominal is None else family.nominal for family in self.description.families]
+        return np.append(np.array(values, dtype=np.float64), 0.0)[self.family_of]
+
+    def differential(self, jyd: Floats) -> Mask:
+        """Unknowns whose derivative occurs with a nonzero coefficient."""
+        mask = np.zeros(self.unknowns, dtype=bool)
+        mask[self.pattern.columns_of()[jyd != 0.0]] = True
+        return mask

@@ -1,0 +1,236 @@
+"""Nonlinear equations with more unknowns than rows: the solution nearest to a guess.
+
+Gauss-Newton: with u = W (x - guess) / scale, each step takes the minimum-norm u of the linearised rows
+A u = A u_k - r, by singular values (dense) or the saddle-point system [I A^T; A -eps] (sparse, SciPy, lazily),
+with halving of the step while the rows grow or are not finite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+
+Mask = NDArray[np.bool_]
+SINGULAR_VALUES = 120
+"""Unknowns up to which singular values are used."""
+DENSE = 400
+"""Unknowns up to which matrices are full (no SciPy)."""
+EPS = 1e-13
+"""Of redundant rows, relative to rows of size one."""
+RANK = 1e-11
+"""Singular values below this part of the largest belong to redundant rows."""
+_LIGHT = 1e-9
+"""The same of unknowns without magnitudes."""
+_ITERATIONS = 60
+_HALVINGS = 12
+_ROUND_OFF = 2e-15
+_BESIDE = 1e-8
+"""Scaled rows below which round-off alone can keep them from shrinking."""
+_PROXIMAL = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Rows `use` of residual(x) [number] in the unknowns `free` of x.
+
+    jacobian(x): values at (rows, columns); guess, scale, weight [unknowns].
+    """
+
+    residual: Callable[[Floats], Floats]
+    jacobian: Callable[[Floats], Floats]
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    number: int
+    use: Mask
+    free: Mask
+    guess: Floats
+    scale: Floats
+    weight: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """x, its largest scaled row and all scaled rows [number]."""
+
+    x: Floats
+    residual: float
+    scaled: Floats
+
+
+class _Linear:
+    """The linearised rows at a point: A [used rows, free unknowns] in scaled unknowns and rows."""
+
+    def __init__(self, problem: Problem, x: Floats) -> None:
+        unit = problem.scale / problem.weight
+        values = problem.jacobian(x)
+        take = problem.use[problem.rows] & problem.free[problem.columns]
+        rows, columns = problem.rows[take], problem.columns[take]
+        values = np.where(np.isfinite(values[take]), values[take], 0.0)
+        # a row is as large as its terms are, in magnitudes
+        size = np.zeros(problem.number)
+        np.add.at(size, rows, np.abs(values) * problem.scale[columns])
+        self.row_scale = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
+        self.unit, self.problem = unit, problem
+        number = np.cumsum(problem.use) - 1, np.cumsum(problem.free) - 1
+        self.entries = (number[0][rows], number[1][columns], values * unit[columns] * self.row_scale[rows])
+        self.shape = int(problem.use.sum()), int(problem.free.sum())
+
+    def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
+        """The u of least norm with A u = A u_now - r; beside it, the step of least norm: its round-off is its own."""
+        i, j, v = self.entries
+        aim = -r
+        if beside:
+            return u + least_norm(self.shape, (i, j, v), aim)
+        np.add.at(aim, i, v * u[j])
+        return least_norm(self.shape, (i, j, v), aim)
+
+
+def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value)."""
+    i, j, v = entries
+    # rows of equal size: a row of small coefficients must not pass for a redundant one
+    size = np.zeros(shape[0])
+    np.add.at(size, i, v * v)
+    size = np.where(size > 0.0, np.sqrt(size), 1.0)
+    v, aim = v / size[i], aim / size
+    if max(shape) <= SINGULAR_VALUES:
+        a = np.zeros(shape)
+        np.add.at(a, (i, j), v)
+        return np.asarray(np.linalg.lstsq(a, aim, rcond=RANK)[0], dtype=np.float64)
+    return _saddle_point(shape, (i, j, v), aim)
+
+
+def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    """The u of least norm with A u = aim from [I A^T; A -eps], dense up to DENSE unknowns."""
+    rows, unknowns = shape
+    i, j, v = entries
+    here = np.arange(unknowns), unknowns + np.arange(rows)
+    places = (
+        np.concatenate([here[0], j, unknowns + i, here[1]]),
+        np.concatenate([here[0], unknowns + i, j, here[1]]),
+    )
+    values = np.concatenate([np.ones(unknowns), v, v, np.full(rows, -EPS)])
+    apply: Callable[[Floats], Floats]
+    back: Callable[[Floats], Floats]
+    if max(shape) <= DENSE:
+        full = np.zeros((unknowns + rows, unknowns + rows))
+        np.add.at(full, places, values)
+        inverse = np.linalg.inv(full)
+        apply, back = full.dot, inverse.dot
+    else:
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        matrix = csc_array((values, places), shape=(unknowns + rows, unknowns + rows))
+        apply, back = matrix.dot, splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1).solve
+    found = np.zeros(unknowns + rows)
+    for _ in range(_PROXIMAL):
+        # eps acts on the change of the multipliers only, so that it leaves no trace in the solution
+        right = np.concatenate([np.zeros(unknowns), aim - EPS * found[unknowns:]])
+        found = found + back(right - apply(found))
+    return found[:unknowns]
+
+
+def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
+    """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
+    with np.errstate(all="ignore"):  # what overflows is seen as not finite
+        return _solve(problem, x, most)
+
+
+def _solve(problem: Problem, x: Floats, most: int) -> Solution:
+    x = x.copy()
+    best = Solution(x, np.inf, np.full(problem.number, np.inf))
+    stale = 0
+    for _ in range(most):
+        linear = _Linear(problem, x)
+
+        def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:
+            scaled = np.where(problem.use, problem.residual(z) * linear.row_scale, 0.0)
+            largest = float(np.abs(scaled).max(initial=0.0))
+            return (largest if np.isfinite(largest) else np.inf), scaled
+
+        size, scaled = measure(x)
+        if size < best.residual:
+            stale = stale if size > 0.5 * best.residual else 0
+            best = Solution(x.copy(), size, np.abs(scaled))
+        stale += 1
+        if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
+            break
+        u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
+        target = linear.nearest(u, scaled[problem.use], beside=size < _BESIDE and stale > 1)
+        if not np.isfinite(target).all():
+            break
+        norm = float(np.linalg.norm(scaled))
+        step, tried = 1.0, x
+        for _ in range(_HALVINGS):
+            tried = x.copy()
+            tried[problem.free] += step * (target - u) * linear.unit[problem.free]
+            now = float(np.linalg.norm(measure(tried)[1]))
+            if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
+                break
+            step *= 0.5
+        if best.residual >= 1e-12 and now <= 0.5 * norm:
+            stale = 0  # rows that shrink as fast as their terms do (a junction far above its voltage)
+        if not np.isfinite(problem.residual(tried)[problem.use]).all():
+            break
+        x = tried
+    return best
+
+
+def where_light(problem: Problem, x: Floats, light: Mask) -> Floats:
+    """The point nearest to problem.guess by the rows linearised at x, full matrices; moves of the light unknowns cost
+    nothing, and these stay as in x.
+    """
+    linear, light = _Linear(problem, x), light[problem.free]
+    a = np.zeros(linear.shape)
+    i, j, v = linear.entries
+    np.add.at(a, (i, j), v)
+    u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
+    aim = a[:, ~light] @ u[~light] - (problem.residual(x) * linear.row_scale)[problem.use]
+    size = np.abs(a[:, light]).max(axis=0, initial=0.0)
+    left, sigma, _ = np.linalg.svd(a[:, light] / np.where(size > 0.0, size, 1.0))
+    rest = left[:, int((sigma > _LIGHT * sigma.max(initial=0.0)).sum()) :].T
+    heavy = np.flatnonzero(problem.free)[~light]
+    moved = np.linalg.lstsq(rest @ a[:, ~light], rest @ aim, rcond=RANK)[0]
+    found = x.copy()
+    found[heavy] = problem.guess[heavy] + moved * linear.unit[heavy]
+    return found
+
+
+def least_residual(problem: Problem, x: Floats) -> Floats:
+    """Where the rows cannot vanish: the x near which they are least (Levenberg-Marquardt, rows scaled once, dense)."""
+    with np.errstate(all="ignore"):
+        problem = replace(problem, weight=np.ones_like(problem.weight))
+        linear = _Linear(problem, x)
+        scale, damping = linear.row_scale, 1e-3
+
+        def measure(z: Floats) -> Floats:
+            return (problem.residual(z) * scale)[problem.use]
+
+        r = measure(x)
+        for _ in range(_ITERATIONS):
+            linear = _Linear(problem, x)
+            i, j, v = linear.entries
+            a = np.zeros(linear.shape)
+            np.add.at(a, (i, j), v / linear.row_scale[problem.use][i] * scale[problem.use][i])
+            for _ in range(2 * _HALVINGS):
+                full = np.vstack([a, np.sqrt(damping) * np.eye(a.shape[1])])
+                step = np.linalg.lstsq(full, np.concatenate([-r, np.zeros(a.shape[1])]), rcond=None)[0]
+                tried = x.copy()
+                tried[problem.free] += step * linear.unit[problem.free]
+                now = measure(tried)
+                if np.isfinite(now).all() and now @ now < r @ r:
+                    break
+                damping *= 8.0
+            else:
+                return x
+            gain = 1.0 - (now @ now) / (r @ r)
+            x, r, damping = tried, now, damping / 4.0
+            if gain < 1e-12:
+                break
+    return x

@@ -1,0 +1,1 @@
+"""Consistent points: the start, restarts after jumps, impulses."""

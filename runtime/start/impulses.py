@@ -1,0 +1,100 @@
+"""Flows and momenta after a jump of the constraints: the least change in the metric of the inertia.
+
+A constraint that steps in time (a velocity source switched on) asks for flows that differ from those before.  The
+impulses Lambda of the constraints bring them about:
+
+    M (f+ - f-) + Phi_q^T Lambda_phi + Psi_f^T Lambda_psi = 0,    Phi_q f+ + Phi_t = 0,    Psi(f+) = 0
+
+with the displacements held (Gauss's principle for impulses).  The rows are those of the settled system, so that the
+same lines serve p = M f, stores given as f(p) and flows without inertia, which take no impulse.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import Mask, System
+from sysdyn.runtime.numerics.least_change import least_norm
+
+BROKEN = 1e-10
+"""Scaled residual of a constraint row above which its constraint has jumped."""
+_ITERATIONS = 3
+
+
+def group_rows(system: System, *names: str) -> Mask:
+    """Rows of the named groups."""
+    mask = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        if group in names:
+            mask[first : first + system.description.rows[family].size] = True
+    return mask
+
+
+class Impulses:
+    """settled: the System in form "settled"; magnitude [unknowns] of y; rate [unknowns] of yd."""
+
+    def __init__(self, settled: System) -> None:
+        self.system = settled
+        self._flow_rows = group_rows(settled, "phi_rate", "psi")
+        self._state_rows = group_rows(settled, "momentum", "gamma")
+        self._balance = group_rows(settled, "dynamics")
+        kinds = settled.kinds
+        self._moving = np.isin(kinds, ("f", "p", "e"))
+        self._impulse = np.isin(kinds, ("kappa", "mu"))
+        self._columns = settled.pattern.columns_of()
+        self._rows = settled.pattern.row.astype(np.int64)
+
+    def broken(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
+        """Whether a constraint on flows does not hold at the point."""
+        if not self._flow_rows.any():
+            return False
+        jy, _ = self.system.jacobian(t, y, yd)
+        size = np.zeros(self.system.rows)
+        np.add.at(size, self._rows, np.abs(jy) * np.maximum(magnitude, np.abs(y))[self._columns])
+        r = np.abs(self.system.residual(t, y, yd))
+        with np.errstate(all="ignore"):
+            return bool((r[self._flow_rows] > BROKEN * size[self._flow_rows]).any())
+
+    def after(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
+        """Y with flows, momenta and implicit efforts after the impulses at t."""
+        y, start = y.copy(), y.copy()
+        impulse = np.zeros(y.size)
+        use = self._flow_rows | self._state_rows | self._balance
+        number = np.cumsum(use) - 1
+        for _ in range(_ITERATIONS):
+            jy, jyd = self.system.jacobian(t, y, yd)
+            balance = self._balance[self._rows]
+            value = np.where(
+                balance,
+                np.where(self._impulse[self._columns], jy, np.where(self._moving[self._columns], jyd, 0.0)),
+                np.where(self._moving[self._columns], jy, 0.0),
+            )
+            value = np.where(use[self._rows] & np.isfinite(value), value, 0.0)
+            r = self.system.residual(t, y, yd)
+            moved = np.where(self._impulse, impulse, y - start)
+            r[self._balance] = 0.0
+            np.add.at(r, self._rows[balance], (value * moved[self._columns])[balance])
+            step = self._solve(value, -r[use], number, magnitude)
+            y[self._moving] += step[self._moving]
+            impulse[self._impulse] += step[self._impulse]
+        return y
+
+    def _solve(self, value: Floats, aim: Floats, number: NDArray[np.int64], magnitude: Floats) -> Floats:
+        """Least change of the columns that take part."""
+        take = value != 0.0
+        columns = np.unique(self._columns[take])
+        if not columns.size:
+            return np.zeros(self.system.unknowns)
+        place = np.searchsorted(columns, self._columns[take])
+        scale = np.where(self._impulse, 1.0, magnitude)[columns]
+        v = value[take] * scale[place]
+        largest = np.zeros(columns.size)
+        np.maximum.at(largest, place, np.abs(v))
+        own = self._impulse[columns]
+        shrink = np.where(own & (largest > 0.0), 1.0 / np.where(largest > 0.0, largest, 1.0), 1.0)
+        shape = aim.size, columns.size
+        found = least_norm(shape, (number[self._rows[take]], place, v * shrink[place]), aim)
+        step = np.zeros(self.system.unknowns)
+        step[columns] = found * scale * shrink
+        return step

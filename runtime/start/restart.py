@@ -1,0 +1,65 @@
+"""Across an instant at which the text of the model jumps: the state is kept, what follows from it is found anew.
+
+Displacements, momenta, flows with inertia and dynamic variables keep their values unless a constraint forces them
+(impulses.py); multipliers, implicit efforts, flows without inertia and rates are solved for on the far side.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.least_change import Problem, solve
+from sysdyn.runtime.start.impulses import Impulses, group_rows
+from sysdyn.runtime.start.settled import Settler
+from sysdyn.runtime.start.starter import Starter
+
+EXACT = 1e-9
+"""Scaled residual with which the slower search is content."""
+
+
+class Restart:
+    """state [unknowns as written]: the unknowns that keep their values."""
+
+    def __init__(self, settler: Settler, state: NDArray[np.bool_]) -> None:
+        self.settler, self.state = settler, state
+        self.impulses = Impulses(settler.system)
+        self._starter: Starter | None = None
+
+    def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
+        """y, yd [unknowns as written] on the far side at t; None where none was found."""
+        magnitude = lib.reader(self.settler.core.contents.scale, y.size).copy()
+        if self.impulses.broken(t, y, yd, magnitude):
+            y = self.impulses.after(t, y, yd, magnitude)
+        self.settler.core.contents.ready = 0
+        found, rate, done = self.settler.settle(t, y, yd)
+        if done:
+            return found, rate
+        return self._search(t, y, yd, magnitude)
+
+    def _search(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
+        """The same by Gauss-Newton with shortened steps: first with the state held, then with everything free."""
+        if self._starter is None:
+            self._starter = Starter(self.settler.system.another("3"))
+        starter = self._starter
+        guess = np.concatenate([y, yd[starter.rates]])
+        rate = lib.reader(self.settler.core.contents.scale, self.settler._moves)[y.size :]
+        follows = np.concatenate([~self.state, np.ones(starter.rates.size, dtype=bool)])
+        for free in (follows, np.ones_like(follows)):
+            problem = Problem(
+                residual=lambda z: starter.residual(t, z),
+                jacobian=lambda z: starter.jacobian(t, z),
+                rows=starter.rows,
+                columns=starter.columns,
+                number=starter.settled.rows,
+                use=~group_rows(starter.settled, "initial"),
+                free=free,
+                guess=guess,
+                scale=np.concatenate([magnitude, rate]),
+                weight=np.where(follows, 1e-6, 1.0),
+            )
+            best = solve(problem, guess)
+            if best.residual < EXACT:
+                return starter.expand(best.x)
+        return None

@@ -1,0 +1,147 @@
+"""The settled system: every row that holds at a consistent point, and its least-change projection in the core.
+
+Unknowns x = (y as written, the derivatives that occur); see core/settle.h.  `Settler` owns the core's structure.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.patterns import Pattern, Places, compress
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import column_order
+
+LIGHT = 1e-3
+"""Weight (of squares) of displacements without inertia: they follow those that have some."""
+FREE = 1e-4
+"""Weight (of squares: its square) of unknowns that follow from the state."""
+
+
+def rates_of(settled: System) -> Ints:
+    """Places of y whose derivatives occur in the settled rows."""
+    used = np.zeros(settled.unknowns, dtype=bool)
+    pattern = settled.pattern
+    for call in settled.form.calls:
+        used[settled._places(call)[1].column] = True
+    assert pattern.unknowns == settled.unknowns
+    return np.flatnonzero(used).astype(np.int32)
+
+
+class Settler:
+    """Moves points onto the settled rows.
+
+    settled: the System in form "settled"; magnitude [unknowns] of y; rate_magnitude [rates];
+    state [unknowns] bool: unknowns that carry the state and should move least; light [unknowns] bool: displacements
+    without inertia among others that have some, which move more easily.
+    """
+
+    def __init__(
+        self,
+        settled: System,
+        kinematics: tuple[Ints, Ints],
+        magnitude: Floats,
+        time_scale: float,
+        state: NDArray[np.bool_],
+        light: NDArray[np.bool_] | None = None,
+    ) -> None:
+        self.system = settled
+        self.rates = rates_of(settled)
+        n, k = settled.unknowns, int(self.rates.size)
+        self._n, self._moves = n, n + k
+        self.pattern: Pattern
+        self.pattern, self._slots = self._saddle()
+        self._weight = np.ones(self._moves)
+        if light is not None:
+            self._weight[:n][light] = LIGHT
+        self._weight[:n][~state] = FREE**2
+        self._weight[n:] = FREE**2
+        self._sort = self._sorts()
+        self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
+        self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
+        self._allocate()
+
+    def _saddle(self) -> tuple[Pattern, list[Ints]]:
+        """Pattern of [D G^T; G -eps] and the places of the parts."""
+        pattern, n = self.system.pattern, self._n
+        number = self._moves + self.system.rows
+        columns, rows = pattern.columns_of(), pattern.row.astype(np.int64)
+        rate_at = np.full(n, -1, dtype=np.int64)
+        rate_at[self.rates] = n + np.arange(self.rates.size)
+        self._with_rate = rate_at[columns] >= 0
+        x, r = rows + self._moves, columns
+        xd, rd = rows[self._with_rate] + self._moves, rate_at[columns[self._with_rate]]
+        diagonal_x, diagonal_r = np.arange(self._moves), self._moves + np.arange(self.system.rows)
+        parts = [
+            Places(x, r),
+            Places(r, x),
+            Places(xd, rd),
+            Places(rd, xd),
+            Places(diagonal_x, diagonal_x),
+            Places(diagonal_r, diagonal_r),
+        ]
+        found, slots = compress(number, number, parts)
+        for k in (2, 3):
+            full = np.full(pattern.entries, -1, dtype=np.int32)
+            full[self._with_rate] = slots[k]
+            slots[k] = full
+        return found, slots
+
+    def _sorts(self) -> Ints:
+        """Of the rows, as core/settle.h names them: constraints, rates of other rows, others."""
+        found = np.zeros(max(self.system.rows, 1), dtype=np.int32)
+        for group, family, first in self.system.form.groups:
+            sort = 1 if group in ("phi", "phi_rate", "psi") else 2 if group in ("momentum_rate", "gamma_rate") else 0
+            found[first : first + self.system.description.rows[family].size] = sort
+        return found
+
+    def _typical(self) -> Floats:
+        """Values for the choice of an elimination order: ones in G, weights on the diagonal."""
+        values = np.random.default_rng(1).uniform(0.5, 1.5, self.pattern.entries)
+        values[self._slots[4]] = self._weight
+        values[self._slots[5]] = -1e-14
+        return values
+
+    def _allocate(self) -> None:
+        order = column_order(self.pattern, self._typical())
+        self._order = order
+        self.linear = lib.core.sd_linear_new(
+            self.pattern.unknowns,
+            *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order)),
+        )
+        if not self.linear:
+            raise MemoryError
+        self.core = lib.core.sd_settle_new(c.byref(self.system.core), self.linear, int(self.rates.size))
+        if not self.core:
+            raise MemoryError
+        core = self.core.contents
+        core.rate = lib.pointer(self.rates)
+        names = ("slot_y", "slot_y_t", "slot_yd", "slot_yd_t", "slot_x", "slot_r")
+        for name, slot in zip(names, self._slots, strict=True):
+            setattr(core, name, lib.pointer(slot))
+        core.weight = lib.pointer(self._weight)
+        core.sort = lib.pointer(self._sort)
+        core.k_q, core.k_f = (lib.pointer(item) for item in self._k)
+        core.kinematics = self._k[0].size
+        lib.reader(core.scale, self._moves)[:] = self.scale
+
+    @property
+    def address(self) -> int:
+        """Of the core's structure."""
+        return c.addressof(self.core.contents)
+
+    def settle(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
+        """y, yd [unknowns as written] moved onto the rows; False where that failed (then they are as given)."""
+        a, b = self.system._buffer(y), self.system._buffer(yd)
+        failed = lib.core.sd_settle_point(self.core, t, lib.pointer(a), lib.pointer(b))
+        self.system.failure.check()
+        return a[: self._n], b[: self._n], not failed
+
+    def __del__(self) -> None:
+        if getattr(self, "core", None):
+            lib.core.sd_settle_free(self.core)
+        if getattr(self, "linear", None):
+            lib.core.sd_linear_free(self.linear)

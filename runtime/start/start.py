@@ -1,0 +1,318 @@
+"""A consistent state at t0 from fixed values and guesses.
+
+Unknowns and equations: see starter.py.  Fixed values never move.  Guesses move least: each step is the minimum-norm
+solution of the linearised rows around the *guess* (Gauss-Newton, in unknowns scaled by magnitude, rank-deficient rows
+tolerated).  Stages: positions onto phi and what else holds between them, then flows and momenta onto the first
+derivatives, then everything.  Where the rows are singular at the guess (a valve C f|f| at rest), seeded perturbations
+of the free unknowns are tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, least_residual, solve, where_light
+from sysdyn.runtime.start.starter import STATE, WEIGHT, Mask, Starter, problem_of, row_scale
+
+_AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
+_RESCALINGS = 6
+_FEW = 3
+"""Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
+EXACT = 1e-9
+OWN = 1e-6
+BACK = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class ConsistentState:
+    """y, yd [unknowns as written] at t; residual: largest scaled row.
+
+    moved: (name, guess, value, "asked for by ...") of written guesses that moved.  freedom: how many more
+    fixed values the state would take, guesses: names of the free unknowns among which.
+    """
+
+    t: float
+    y: Floats
+    yd: Floats
+    moved: tuple[tuple[str, float, float, str], ...]
+    residual: float
+    freedom: int
+    guesses: tuple[str, ...]
+
+    def for_form(self, system: System) -> tuple[Floats, Floats]:
+        """y, yd in the layout of an index form: new multipliers are zero."""
+        y, yd = np.zeros(system.unknowns), np.zeros(system.unknowns)
+        y[: self.y.size], yd[: self.y.size] = self.y, self.yd
+        return y, yd
+
+
+def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
+    """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
+    written = starter.guessed & ~starter.unsaid
+    if not written.any():
+        return guess
+    rows = written | starter.groups("phi", "psi")
+    free = free & (np.arange(free.size) < starter.n)
+    found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
+    return found.x if np.isfinite(found.residual) else guess
+
+
+def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
+    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held.
+
+    What follows from the state moves alone where that is enough.
+    """
+    for groups, moving in (
+        (("phi",), ("q",)),
+        (("phi_rate", "psi"), ("f",)),
+        (("momentum",), ("p",)),
+        (("phi", "phi_rate", "psi", "momentum"), STATE),
+    ):
+        rows, may = starter.groups(*groups), free & np.isin(starter.moving, moving)
+        for use in (rows | starter.between(moving), rows):
+            if not use.any() or not may.any():
+                continue
+            problem = problem_of(starter, t, x, guess, rows=use, free=may)
+            gentle = replace(problem, free=may & starter.following(t, x))
+            found = next((s for s in _trials(gentle, problem, x) if s.residual < EXACT), None)
+            if found is not None:
+                x = starter.without_noise(found.x, problem.scale)
+                break
+    return x
+
+
+def _trials(gentle: Problem, problem: Problem, x: Floats) -> Iterator[Solution]:
+    """From x in the unknowns of the gentle problem, then in all, then from points around."""
+    yield solve(gentle, x, _FEW)
+    yield solve(problem, x)
+    for z in _shaken(x, problem.free, problem.scale):
+        yield solve(problem, z)
+
+
+def _shaken(x: Floats, free: Mask, scale: Floats) -> Iterator[Floats]:
+    """Points around x, always the same: where a guess lies on a singular point."""
+    random = np.random.default_rng(20)
+    for amplitude in _AMPLITUDES:
+        yield x + np.where(free, amplitude * scale * random.standard_normal(x.size), 0.0)
+
+
+def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Everything at once, and whether it holds.
+
+    Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
+    in the magnitudes of the solution too.
+    """
+    at, best = x, Solution(x, np.inf, np.zeros(0))
+    empty = None
+    for _ in range(_RESCALINGS):
+        scale = starter.scale(t, at)
+        found = solve(problem_of(starter, t, at, guess, rows=starter.every, free=free), best.x)
+        if empty is not None and found.residual >= EXACT and not found.residual < best.residual:
+            if at is empty:
+                break
+            at = empty
+            continue
+        best = found
+        if not np.isfinite(best.residual):
+            break
+        at = starter.without_noise(best.x, scale)
+        # what is far below its magnitude may be zero, which has none of its own
+        empty = np.where(free & (np.abs(at) < OWN * scale), 0.0, at)
+        for candidate in (at, empty) if best.residual < EXACT else ():
+            if _own(starter, t, candidate, candidate) < OWN:
+                return Solution(candidate, best.residual, best.scaled), True
+            if candidate is at and _own(starter, t, at, best.x) < OWN:
+                return best, True
+    return best, False
+
+
+def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
+    """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution."""
+    size = row_scale(starter, t, magnitudes, starter.scale(t, magnitudes))[starter.every]
+    return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
+
+
+def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
+    """X with everything else as the implicit unknowns at their guesses make it: of two roots of a gamma the iteration
+    then begins at that of the guess.
+
+    Left out are gammas that are not linear, held what their text guesses of implicit unknowns (all that stand in them,
+    where it guesses none).
+    """
+    implicit = starter.moving == "e"
+    gammas = starter.groups("gamma")
+    if not gammas.any() or not implicit.any():
+        return x
+    bent = _bent(starter, t, x) & gammas
+    own = bent[starter.rows] & implicit[starter.columns]
+    own_rows, own_columns = starter.rows[own], starter.columns[own]
+    said = np.zeros(starter.settled.rows, dtype=bool)
+    said[own_rows[starter.written[own_columns]]] = True
+    held = np.zeros(x.size, dtype=bool)
+    held[own_columns[starter.written[own_columns] | ~said[own_rows]]] = True
+    if not held.any():
+        return x
+    rows = starter.every & ~bent & ~starter.groups("gamma_rate")
+    may = free & ~held & starter.following(t, x)
+    found = solve(problem_of(starter, t, x, guess, rows=rows, free=may), x)
+    return found.x if found.residual < EXACT else x
+
+
+def _bent(starter: Starter, t: float, x: Floats) -> Mask:
+    """Rows that are not linear."""
+    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * starter.scale(t, x)))
+    bent = np.zeros(starter.settled.rows, dtype=bool)
+    bent[starter.rows[here != there]] = True
+    return bent
+
+
+def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: Mask) -> Solution:
+    """The solution without what guesses of the state moved for the sake of what follows from it: that costs nothing.
+
+    Guesses that can stay do so exactly.  Positions in curved constraints are left alone, and what is too large for full
+    matrices.
+    """
+    x = best.x
+    follows = starter.following(t, x) | starter.idle
+    follows[starter.carried()] = True
+    curved = np.zeros(x.size, dtype=bool)
+    bent = _bent(starter, t, x) & starter.groups("phi")
+    curved[starter.columns[bent[starter.rows]]] = True
+    free = free & ~(curved & (starter.moving == "q"))
+    state = free & ~follows
+    if x.size > DENSE or not (x != guess)[state].any():
+        return best
+    problem = problem_of(starter, t, x, guess, rows=starter.every, free=free)
+    by_content = starter.by_content(t, x, problem.scale)
+    problem = replace(problem, weight=np.where(state & ~starter.written, by_content, problem.weight))
+    aim = where_light(problem, x, follows)
+    moved = np.abs(aim - guess) * problem.weight / problem.scale
+    aim = np.where(moved > BACK * WEIGHT["unwritten"], aim, guess)
+    for held in (state, state & (aim == guess)):
+        z = np.where(held, aim, x)
+        found = solve(replace(problem, free=free & ~held), z)
+        if found.residual < EXACT:
+            z = starter.without_noise(found.x, problem.scale)
+            if _own(starter, t, z, z) < OWN:
+                return replace(found, x=z)
+    return best
+
+
+def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """What follows from the staged state; where nothing does, everything at once, then from perturbed points."""
+    x = _beside_gammas(starter, t, _stages(starter, t, guess.copy(), guess, free), guess, free)
+    best, holds = _rescaled(starter, t, x, guess, free & starter.following(t, x))
+    if holds:
+        return best, True
+    best, holds = _rescaled(starter, t, x, guess, free)
+    for shaken in _shaken(x, free, starter.scale(t, x)):
+        if holds:
+            break
+        found, holds = _rescaled(starter, t, shaken, guess, free)
+        if holds or found.residual < best.residual:
+            best = found
+    return best, holds
+
+
+def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
+    """Labels of the constraint rows that an unknown stands in."""
+    found: list[str] = []
+    values = starter.jacobian(t, x)
+    hit = np.unique(starter.rows[(starter.columns == place) & (values != 0.0)])
+    for row in hit[~starter.unsaid[hit]]:
+        label = starter.settled.row_label(int(row))
+        base = label.kind.split("_")[0]
+        text = f"{base} {label.label}"
+        if base in ("phi", "psi", "gamma", "momentum", "initial") and text not in found:
+            found.append(text)
+    return "asked for by " + ", ".join(found[:4]) if found else "asked for by the balance of efforts"
+
+
+def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[str, float, float, str], ...]:
+    given = starter.given
+    change = np.abs(x[: starter.n] - given.guess)
+    places = np.flatnonzero(
+        given.written & ~given.fixed & (change > 1e-9 * np.maximum(np.abs(given.guess), 1e-3 * scale[: starter.n]))
+    )
+    return tuple(
+        (starter.system.name(int(k)), float(given.guess[k]), float(x[k]), _asked(starter, t, x, int(k)))
+        for k in places[:100]
+    )
+
+
+def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
+    """Why there is no consistent state: rows in the way, and the fixed values that would have to move."""
+    if not np.isfinite(best.residual):
+        bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
+        rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
+        return InconsistentStart("nonfinite", float("inf"), rows)
+    x, scaled = best.x, best.scaled
+    if x.size <= DENSE:
+        problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
+        x = least_residual(problem, x)
+        scaled = np.abs(starter.residual(t, x)) * row_scale(starter, t, x, problem.scale)
+    raw, scaled = (np.where(starter.every, item, 0.0) for item in (np.abs(starter.residual(t, x)), scaled))
+    order = np.argsort(-scaled)
+    worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]
+    rows = tuple(dict.fromkeys(starter.settled.row_label(row) for row in worst))
+    freed, holds = _attempt(starter, t, guess, np.ones_like(free))
+    candidates: tuple[RowLabel, ...] = ()
+    if holds:
+        scale = starter.scale(t, freed.x)
+        change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
+        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
+        candidates = tuple(dict.fromkeys(starter.given.label[k] for k in places))
+    kind = "fixed"
+    if not candidates:
+        kind = "gamma" if rows and rows[0].kind.startswith("gamma") else "stuck"
+        if rows and rows[0].kind.startswith(("phi", "psi", "initial")):
+            kind = "fixed"
+    return InconsistentStart(kind, float(raw[order[0]]), rows, candidates)
+
+
+def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tuple[str, ...]]:
+    """How many fixed values are missing, and the free unknowns that could take them (dense; else unknown: 0)."""
+    if x.size > 400:
+        return 0, ()
+    scale = starter.scale(t, x)
+    full = np.zeros((starter.settled.rows, x.size))
+    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(t, x) * scale[starter.columns])
+    size = np.abs(full).max(axis=1, initial=0.0)
+    full = (full / np.where(size > 0.0, size, 1.0)[:, None])[starter.every]
+    carries = ~starter.following(t, x) & free
+    follows = free & ~carries
+    if not carries.any():
+        return 0, ()
+    inner = np.linalg.matrix_rank(full[:, follows], tol=1e-9) if follows.any() else 0
+    missing = int(carries.sum()) - (int(np.linalg.matrix_rank(full[:, free], tol=1e-9)) - int(inner))
+    names = tuple(starter.system.name(int(k)) for k in np.flatnonzero(carries)) if missing > 0 else ()
+    return missing, names
+
+
+def consistent_start(system: System, t0: float, near: ConsistentState | None = None) -> ConsistentState:
+    """A state at t0 that satisfies all rows and their hidden derivatives.
+
+    system: any index form of the model; near: a state to stay close to, else the guesses.  Raises InconsistentStart.
+    """
+    system = system if system.form.name == "3" else system.another("3")
+    starter = Starter(system, measuring=True)
+    guess = np.concatenate([starter.given.guess, np.zeros(starter.moving.size - starter.n)])
+    if near is not None:  # but for its multipliers, which redundant rows make as large as they like
+        guess[: starter.n] = np.where(np.isin(starter.kinds, (*STATE, "e")), near.y, guess[: starter.n])
+        guess[starter.first :] = starter.residual(t0, guess)[starter.missed]
+    free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
+    guess = _guess(starter, t0, guess, free)
+    best, holds = _attempt(starter, t0, guess, free)
+    if not holds:
+        raise _explain(starter, t0, guess, free, best)
+    best = _steadied(starter, t0, best, guess, free)
+    y, yd = starter.expand(best.x)
+    counted = Starter(system) if starter.missed.size else starter
+    freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
+    moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
+    return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)

@@ -1,0 +1,1 @@
+"""Rank, redundancy, index: what the blocks say of the model."""

@@ -1,0 +1,72 @@
+"""Whether the gammas determine the implicit unknowns at a state (language, E505).
+
+A gamma may leave out its own unknown (a controlled flow source does), and its slope may vanish at a point (a valve at
+rest): then the rest of the model must determine the unknown.  Where it does not, the matrix of Newton's iteration is
+singular there and regular beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import balanced
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+
+NUDGES = (1e-3, 1e-6, 1e-9)
+"""Moves of an implicit unknown, as parts of its size: the least is small enough for the exponential of a diode."""
+VANISHING = 1e-7
+"""A slope below this part of the one beside it vanishes."""
+
+DENSE = 600
+"""Rows up to which the matrix is looked at."""
+
+
+def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
+    """Implicit unknowns whose gammas have no slope in them at the state; system: the form as written."""
+    y, yd = state.for_form(system)
+    implicit = np.flatnonzero(system.kinds == "e")
+    if not implicit.size:
+        return ()
+    gamma = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        if group == "gamma":
+            gamma[first : first + system.description.rows[family].size] = True
+    columns = system.pattern.columns_of()
+
+    def slopes(point: Floats) -> Floats:
+        values = np.where(gamma[system.pattern.row], np.abs(system.jacobian(state.t, point, yd)[0]), 0.0)
+        largest = np.zeros(system.unknowns)
+        np.maximum.at(largest, columns, values)
+        return np.asarray(largest[implicit])
+
+    size = balanced(system, y, system.jacobian(state.t, y, yd)[0])[implicit]
+    here = slopes(y)
+    found = np.ones(implicit.size, dtype=bool)
+    for nudge in NUDGES:
+        beside = y.copy()
+        beside[implicit] += nudge * size
+        there = slopes(beside)
+        found &= np.isfinite(there) & (there > 0.0) & (here <= VANISHING * there)
+    if not found.any() or system.rows > DENSE:
+        return ()
+    at, off = _conditions([_matrix(system, state.t, point, yd) for point in (y, beside)])
+    if at > VANISHING * off:
+        return ()
+    return tuple(system.name(int(k)) for k in implicit[found])
+
+
+def _matrix(system: System, t: float, y: Floats, yd: Floats) -> Floats:
+    """The iteration's matrix dF/dy + dF/dy'."""
+    jy, jyd = system.jacobian(t, y, yd)
+    matrix = np.zeros((system.rows, system.unknowns))
+    np.add.at(matrix, (system.pattern.row, system.pattern.columns_of()), jy + jyd)
+    return matrix
+
+
+def _conditions(matrices: list[Floats]) -> list[float]:
+    """The smallest singular value of each, rows and columns scaled alike."""
+    for axis in (1, 0):
+        size = np.max([np.abs(m).max(axis=axis, keepdims=True, initial=0.0) for m in matrices], axis=0)
+        matrices = [m / np.where(size > 0.0, size, 1.0) for m in matrices]
+    return [float(np.linalg.svd(m, compute_uv=False)[-1]) for m in matrices]

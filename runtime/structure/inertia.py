@@ -1,0 +1,70 @@
+"""The inertia matrix at a state: whether T* has a minimum (language, E321).
+
+M = d2T*/df2 stands in the rows of dynamics as the coefficient of f' (Lagrange), or in those of momentum as minus the
+coefficient of f (Hamilton, p - dT*/df).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+
+DENSE = 300
+NEGATIVE = 1e-9
+"""Eigenvalues below minus this part of the largest are negative."""
+
+
+def negative_inertia(system: System, state: ConsistentState) -> tuple[str, float] | None:
+    """The flow along which the inertia is negative, and its eigenvalue (SI); None where there is none.
+
+    system: the form as written.  Models of more than DENSE flows are judged by their diagonal.
+    """
+    jy, jyd = system.jacobian(state.t, *state.for_form(system))
+    flows = np.flatnonzero(system.kinds == "f")
+    if not flows.size:
+        return None
+    place = np.full(system.unknowns, -1, dtype=np.int64)
+    place[flows] = np.arange(flows.size)
+    rows = np.full(system.rows, -1, dtype=np.int64)
+    sign = np.ones(system.rows)
+    values = np.zeros(jy.size)
+    columns = system.pattern.columns_of()
+    for group, family, first in system.form.groups:
+        row = system.description.rows[family]
+        owner = next(
+            (k for k, f in enumerate(system.description.families) if (f.kind, f.owner) == ("f", row.owner)), None
+        )
+        if group not in ("dynamics", "momentum") or owner is None:
+            continue
+        rows[first : first + row.size] = place[system.form.at[owner] + np.arange(row.size)]
+        sign[first : first + row.size] = -1.0 if group == "momentum" else 1.0
+        mine = (system.pattern.row >= first) & (system.pattern.row < first + row.size)
+        values[mine] = (jy if group == "momentum" else jyd)[mine]
+    take = (rows[system.pattern.row] >= 0) & (place[columns] >= 0)
+    i, j = rows[system.pattern.row[take]], place[columns[take]]
+    v = values[take] * sign[system.pattern.row[take]]
+    return _least(system, flows, (i, j, v))
+
+
+def _least(
+    system: System, flows: np.ndarray, entries: tuple[np.ndarray, np.ndarray, Floats]
+) -> tuple[str, float] | None:
+    i, j, v = entries
+    if flows.size > DENSE:
+        diagonal = np.zeros(flows.size)
+        np.add.at(diagonal, i[i == j], v[i == j])
+        k = int(np.argmin(diagonal))
+        return (system.name(int(flows[k])), float(diagonal[k])) if diagonal[k] < 0.0 else None
+    m = np.zeros((flows.size, flows.size))
+    np.add.at(m, (i, j), v)
+    if not np.isfinite(m).all():
+        return None
+    # scaled to a unit diagonal, so that grams and tons are judged alike
+    scale = 1.0 / np.sqrt(np.where(np.abs(np.diag(m)) > 0.0, np.abs(np.diag(m)), 1.0))
+    found, vectors = np.linalg.eigh(0.5 * (m + m.T) * scale[:, None] * scale[None, :])
+    if found[0] >= -NEGATIVE * max(abs(found[-1]), NEGATIVE):
+        return None
+    k = int(np.argmax(np.abs(vectors[:, 0])))
+    return system.name(int(flows[k])), float(m[k, k])

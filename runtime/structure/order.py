@@ -1,0 +1,60 @@
+"""How many initial values a model takes (language, section 5, Counting).
+
+The consistent states near a point form a manifold; its tangent space is the null space of all rows and their hidden
+derivatives.  `manifold` is its dimension in the differential unknowns; `order` that of its projection onto contents:
+displacements that something depends on, momenta or flows with inertia, dynamic variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set as AbstractSet
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.start.starter import Starter
+
+DENSE = 600
+"""Unknowns and rates up to which the null space is taken."""
+RANK = 1e-9
+SWEEPS = 10
+
+
+def order_and_manifold(system: System, state: ConsistentState, tangible: AbstractSet[str]) -> tuple[int, int] | None:
+    """(order, manifold) at a state; None for models too large.
+
+    system: the form as written; tangible: coordinates whose displacement something depends on.
+    """
+    starter = Starter(system)
+    x = np.concatenate([state.y, state.yd[starter.rates]])
+    if x.size > DENSE:
+        return None
+    full = np.zeros((starter.settled.rows, x.size))
+    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
+    full = _balanced(full[~starter.groups("initial")])
+    _, sigma, vectors = np.linalg.svd(full)
+    rank = int((sigma > RANK * sigma.max(initial=RANK)).sum())
+    tangent = vectors[rank:].T  # [unknowns and rates, freedoms]
+    kinds = system.kinds[: starter.n]
+    _, jyd = system.jacobian(state.t, state.y, state.yd)
+    moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd)[: starter.n])
+    owners = np.array([system.description.families[int(k)].owner in tangible for k in system.family_of[: starter.n]])
+    content = moving & ((kinds != "q") | owners)
+    return _rank(tangent[: starter.n][content]), _rank(tangent[: starter.n][moving])
+
+
+def _balanced(matrix: Floats) -> Floats:
+    """Rows and columns of largest entry about one (Ruiz 2001)."""
+    for _ in range(SWEEPS):
+        for axis in (1, 0):
+            size = np.sqrt(np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0))
+            matrix = matrix / np.where(size > 0.0, size, 1.0)
+    return matrix
+
+
+def _rank(part: Floats) -> int:
+    if not part.size:
+        return 0
+    sigma = np.linalg.svd(part, compute_uv=False)
+    return int((sigma > RANK).sum())

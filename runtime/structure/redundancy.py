@@ -1,0 +1,158 @@
+"""Redundant constraints: found at several consistent points, left out, or given the least multipliers.
+
+The rows of J = [Phi_q; Psi_f] are looked at in the order written: one that depends on those kept before it is left out.
+A row is redundant where it depends on them at the start and at three seeded consistent points nearby; where the rank is
+smaller at the start alone, the configuration is singular (language, section 5).
+In a system a left-out row reads "its multiplier = 0": the motion is that of the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.least_change import solve
+from sysdyn.runtime.start.start import EXACT, ConsistentState
+from sysdyn.runtime.start.starter import Starter, weighted
+
+Longs = NDArray[np.int64]
+DENSE = 300
+"""Constraints up to which matrices are full."""
+RANK = 1e-9
+"""A row whose part outside the rows before it is smaller than this part of it depends on them."""
+NOISE = 1e-11
+"""Entries below this part of the largest of their row are what is left of a zero."""
+POINTS = 3
+AMPLITUDES = (3e-2, 1e-3, 1e-5)
+"""Of the displacements, to come to a nearby point."""
+NEAR = 10.0
+"""Amplitudes: what the way back onto phi leads farther than this may be another singular point."""
+_EPS = 1e-13
+
+
+@dataclass(frozen=True, slots=True)
+class Reactions:
+    """J of the form as written by its entries: which constraint (place in `multipliers`), which row of dynamics
+    (place in `rows`), value; rows and columns scaled to one, the rows with `scale` [multipliers].  multipliers: places
+    in y.
+    """
+
+    which: Longs
+    place: Longs
+    value: Floats
+    multipliers: Longs
+    rows: Longs
+    scale: Floats
+
+
+def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu")) -> Reactions:
+    """J from the reactions of the multipliers of those kinds (virtual displacements)."""
+    pattern = system.pattern
+    columns = pattern.columns_of()
+    multipliers = np.flatnonzero(np.isin(system.kinds, kinds))
+    dynamics = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        if group == "dynamics":
+            dynamics[first : first + system.description.rows[family].size] = True
+    take = np.flatnonzero(np.isin(columns, multipliers) & dynamics[pattern.row] & (jy != 0.0))
+    which, value = np.searchsorted(multipliers, columns[take]), jy[take]
+    largest = np.zeros(multipliers.size)
+    np.maximum.at(largest, which, np.abs(value))
+    real = np.abs(value) > NOISE * largest[which]
+    take, which, value = take[real], which[real], value[real]
+    rows, place = np.unique(pattern.row[take].astype(np.int64), return_inverse=True)
+    scale = np.ones(multipliers.size)
+    for _ in range(4):
+        for number, index in ((multipliers.size, which), (rows.size, place)):
+            size = np.zeros(number)
+            np.maximum.at(size, index, np.abs(value))
+            shrink = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+            value = value * shrink[index]
+            scale *= shrink if index is which else 1.0
+    return Reactions(which, place, value, multipliers, rows, scale)
+
+
+def dependent(found: Reactions) -> Ints:
+    """Constraints (places in `multipliers`) that depend on those before them."""
+    m, n = found.multipliers.size, found.rows.size
+    if m == 0:
+        return np.zeros(0, dtype=np.int32)
+    if m > DENSE or n > 4 * DENSE:
+        return _sparse_dependent(found)
+    rows = np.zeros((m, n))
+    np.add.at(rows, (found.which, found.place), found.value)
+    basis = np.zeros((0, n))
+    left = []
+    for k, row in enumerate(rows):
+        size = float(np.linalg.norm(row))
+        rest = row
+        for _ in range(2):  # twice is enough (Kahan)
+            rest = rest - basis.T @ (basis @ rest)
+        if float(np.linalg.norm(rest)) <= RANK * size or size == 0.0:
+            left.append(k)
+        else:
+            basis = np.vstack([basis, rest / np.linalg.norm(rest)])
+    return np.asarray(left, dtype=np.int32)
+
+
+def _sparse_dependent(found: Reactions) -> Ints:
+    """The same from the pivots of [I J^T; J -eps]: those of the order of eps.  In any order they count the dependent
+    rows; eliminated in the order written they name them.
+    """
+    from scipy.sparse import block_array, csc_array, eye_array
+    from scipy.sparse.linalg import splu
+
+    m, n = found.multipliers.size, found.rows.size
+    j = csc_array((found.value, (found.which, found.place)), shape=(m, n))
+    matrix = block_array([[eye_array(n), j.T], [j, -_EPS * eye_array(m)]], format="csc")
+    pivots = np.abs(splu(matrix, permc_spec="COLAMD").U.diagonal())
+    if not (pivots < 1e3 * _EPS).any():
+        return np.zeros(0, dtype=np.int32)
+    lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return np.flatnonzero(np.abs(lu.U.diagonal())[n:] < 1e3 * _EPS).astype(np.int32)
+
+
+def nearby(system: System, state: ConsistentState) -> list[Floats]:
+    """Y at up to POINTS seeded points near the state, displacements consistent with phi."""
+    starter = Starter(system)
+    x = np.concatenate([state.y, state.yd[starter.rates]])
+    q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
+    size = np.where(q, starter.scale(state.t, x), 0.0)
+    random = np.random.default_rng(12)
+    found = []
+    for _ in range(POINTS):
+        direction = random.standard_normal(x.size)
+        for amplitude in AMPLITUDES:
+            shaken = x + amplitude * size * direction
+            rows = starter.groups("phi")
+            if rows.any() and q.any():
+                scale, weight = starter.scale(state.t, shaken), np.ones(shaken.size)
+                problem = weighted(starter, state.t, shaken, rows=rows, free=q, scale=scale, weight=weight)
+                solution = solve(problem, shaken)
+                if not solution.residual < EXACT or np.any(np.abs(solution.x - x) > NEAR * amplitude * size):
+                    continue
+                shaken = solution.x
+            found.append(starter.expand(shaken)[0])
+            break
+    return found
+
+
+def combination(found: Reactions, left: Ints) -> Floats:
+    """Coefficients [multipliers] of a vanishing combination of rows as written: the first left-out one and those before
+    it; () where there is none.
+    """
+    m, n = found.multipliers.size, found.rows.size
+    if not left.size or m > DENSE or n > 4 * DENSE:
+        return np.zeros(0)
+    rows = np.zeros((m, n))
+    np.add.at(rows, (found.which, found.place), found.value)
+    last = int(left[0])
+    weights = np.zeros(m)
+    weights[:last] = -np.linalg.lstsq(rows[:last].T, rows[last], rcond=RANK)[0]
+    weights[last] = 1.0
+    weights *= found.scale
+    weights /= weights[np.argmax(np.abs(weights))]
+    return weights

@@ -1,0 +1,188 @@
+"""Structural facts at a consistent point, after the parameters are bound.
+
+Differential index of the form as written, from the pencil dF/dyd yd' + dF/dy y at the point: rows without yd are
+differentiated until dF/dyd is nonsingular (shuffle algorithm, Luenberger 1978); ranks by singular values of the
+equilibrated matrices.  Larger models: the inverse of dF/dy + cj dF/dyd grows like cj^(index - 1) with cj.
+Freedom: rank of [Phi_q; Psi_f], taken from the reactions of the multipliers (virtual displacements).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.scales import balanced
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions
+
+DENSE = 300
+MAX_INDEX = 6
+RANK = 1e-9
+"""Singular values of equilibrated matrices below this part of the largest count as zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """index: of the form as written, None where the pencil is singular (undetermined: names of unknowns in its null
+    vector).  coordinates n, m1, m2: coordinates and constraint rows; rank of [Phi_q; Psi_f]; dof, redundant,
+    configuration_dof as the language defines them; dependent: labels of a dependent group with its coefficients.
+    singular: rank that the start lacks and points near it have; left_out: (family, position) of the multipliers of
+    constraints that depend on those written before them.
+    """
+
+    index: int | None
+    undetermined: tuple[str, ...]
+    coordinates: int
+    m1: int
+    m2: int
+    rank: int
+    dof: int
+    configuration_dof: int
+    redundant: int
+    dependent: tuple[tuple[RowLabel, float], ...]
+    singular: int = 0
+    left_out: tuple[tuple[int, int], ...] = ()
+
+
+def _equilibrate(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Rows and columns of the pair scaled so that the larger of both is near 1 everywhere (Ruiz 2001)."""
+    a, b = a.copy(), b.copy()
+    for _ in range(8):
+        for axis in (1, 0):
+            size = np.maximum(np.abs(a).max(axis=axis, initial=0.0), np.abs(b).max(axis=axis, initial=0.0))
+            root = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+            scale = root[:, None] if axis == 1 else root[None, :]
+            a *= scale
+            b *= scale
+    return a, b
+
+
+def _rows_to_one(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    size = np.maximum(np.abs(a).max(axis=1, initial=0.0), np.abs(b).max(axis=1, initial=0.0))
+    size = np.where(size > 0.0, size, 1.0)[:, None]
+    return a / size, b / size
+
+
+def pencil_index(e: Floats, b: Floats) -> int | None:
+    """Index of e x' + b x = 0 [n, n]; None where the pencil is singular (or the index above MAX_INDEX)."""
+    e, b = _equilibrate(e, b)
+    n = e.shape[0]
+    for index in range(MAX_INDEX + 1):
+        u, sigma, _ = np.linalg.svd(e)
+        rank = int((sigma > RANK * max(sigma.max(initial=0.0), RANK)).sum())
+        if rank == n:
+            return index
+        top, bottom = u[:, :rank].T, u[:, rank:].T
+        # the rows without derivatives are differentiated
+        e = np.vstack([top @ e, bottom @ b])
+        b = np.vstack([top @ b, np.zeros((n - rank, n))])
+        e, b = _rows_to_one(e, b)
+    return None
+
+
+def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...], int]:
+    """Unknowns in the null vector of dF/dy + cj dF/dyd at a generic cj, () where it is regular; its row."""
+    e, b = _equilibrate(system.dense(jyd), system.dense(jy))
+    u, sigma, vt = np.linalg.svd(b + 0.7310585786300049 * e)
+    if sigma.size == 0 or sigma[-1] > 1e-12 * sigma[0]:
+        return (), -1
+    null = np.abs(vt[sigma <= 1e-12 * sigma[0]]).max(axis=0)
+    names = tuple(system.name(int(k)) for k in np.flatnonzero(null > 1e-6 * null.max()))
+    return names, int(np.argmax(np.abs(u[:, -1])))
+
+
+def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
+    """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models)."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    pattern = system.pattern
+    shape = (pattern.rows, pattern.unknowns)
+    columns = pattern.columns_of()
+    row, column = np.ones(pattern.rows), np.ones(pattern.unknowns)
+    for _ in range(8):
+        for places, scale in ((pattern.row, row), (columns, column)):
+            size = np.zeros(scale.size)
+            np.maximum.at(size, places, (np.abs(jy) + np.abs(jyd)) * row[pattern.row] * column[columns])
+            scale *= 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+    scale = row[pattern.row] * column[columns]
+    b = np.random.default_rng(3).standard_normal((pattern.rows, 4))
+    sizes = []
+    for cj in (1e4, 1e5):
+        matrix = csc_array(((jy + cj * jyd) * scale, pattern.row, pattern.column), shape=shape)
+        try:
+            sizes.append(float(np.abs(splu(matrix).solve(b)).max()))
+        except RuntimeError:
+            return None
+    slope = np.log10(sizes[1] / sizes[0])
+    index = round(float(slope)) + 1
+    return index if 0 <= index <= MAX_INDEX else None
+
+
+def _place(system: System, multiplier: int) -> tuple[int, int]:
+    """Family of a multiplier and its position there."""
+    family = int(system.family_of[multiplier])
+    return family, multiplier - int(system.form.at[family])
+
+
+def _label(system: System, multiplier: int) -> RowLabel:
+    """Label of the constraint of a multiplier."""
+    number, position = _place(system, multiplier)
+    family = system.description.families[number]
+    block = "phi" if family.kind == "kappa" else "psi"
+    for k in system.description.rows_of(block):
+        row = system.description.rows[k]
+        if family.owner in (row.owner, row.label):
+            return row.at(position)
+    return RowLabel(family.owner, block)
+
+
+def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
+    """Index of the form as written, and the undetermined unknowns where there is none."""
+    y, yd = state.for_form(system)
+    jy, jyd = system.jacobian(state.t, y, yd)
+    if system.unknowns == 0:
+        return 0, ()
+    if system.unknowns > DENSE:
+        return _growth_index(system, jy, jyd), ()
+    names = null_place(system, jy, jyd)[0]
+    if names:
+        # equilibration may end where one unit makes the others tiny: asked again in sizes of the unknowns
+        size = balanced(system, y, jy)[system.pattern.columns_of()]
+        jy, jyd = jy * size, jyd * size
+        if null_place(system, jy, jyd)[0]:
+            return None, names
+    return pencil_index(system.dense(jyd), system.dense(jy)), ()
+
+
+def structure(system: System, state: ConsistentState) -> Structure:
+    """Facts of a model at a consistent state; system: any form."""
+    system = system if system.form.name == "3" else system.another("3")
+    y, yd = state.for_form(system)
+    jy, _ = system.jacobian(state.t, y, yd)
+    index, undetermined = index_of(system, state)
+    found = reactions(system, jy)
+    left = dependent(found)
+    lost = 0
+    if left.size:
+        # a rank that is smaller here alone is the configuration's, not the constraints'
+        for point in nearby(system, state):
+            there = reactions(system, system.jacobian(state.t, point, yd)[0])
+            fewer = dependent(there)
+            if fewer.size < left.size:
+                lost += int(left.size - fewer.size)
+                found, left = there, fewer
+    n = int((system.kinds == "f").sum())
+    m1, m2 = (int((system.kinds == kind).sum()) for kind in ("kappa", "mu"))
+    rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())
+    weights = combination(found, left)
+    group = tuple(
+        (_label(system, int(found.multipliers[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8)
+    )
+    names = tuple(_place(system, int(found.multipliers[k])) for k in left)
+    return Structure(
+        index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names
+    )

@@ -1,0 +1,260 @@
+"""The trace: HDF5 as CONTRACT.md lays it down, streamed, readable after kill -9 at any moment; reading it again.
+
+Rows wait in memory and go to the file together once a second (or when there are many).  Measured: a kill within an
+HDF5 flush leaves a file whose chunks lie behind its end, so no file is ever written under the trace's own name: see
+TraceWriter.  The layout of the file is trace_store.py's.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import secrets
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.trace_store import Column, Layout, Parameter, Store, clear, columns_of, input_output
+
+__all__ = ["Column", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
+
+UNCHANGED = 1e-9
+"""Part of the stored energy that is no energy turned over: its balance is round-off."""
+FLUSH_SECONDS = 0.8
+"""Flushed at least every second of wall time: rows arrive about every 50 ms."""
+MANY = 1 << 20
+"""Numbers that may wait in memory."""
+
+
+class TraceWriter:
+    """A trace being written.  rows: [k, 8 + 2 observed] as core/run.h lays them down.
+
+    Two stores stand beside the trace (.NAME.<token>.a, .b).  Each flush brings the one that is not visible up to date
+    and then gives it the trace's name (hard link, rename): what bears the name is never being written.  What a killed
+    run leaves of them the next run of that trace removes.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        columns: Sequence[Column],
+        observed: int,
+        attributes: Mapping[str, str | float | int],
+        parameters: Sequence[Parameter] = (),
+    ) -> None:
+        self.path = Path(path)
+        self._layout = Layout(tuple(columns), observed, dict(attributes), tuple(parameters))
+        self._waiting: list[Floats] = []
+        self._late: list[Floats] = []  # rows that the hidden store lacks
+        self._energies: Floats | None = None
+        self._turned_over = 0.0
+        self._numbers, self._flushed = 0, time.monotonic()
+        self._visible: Store | None = None
+        self._hidden: Store | None = None
+        self.closed = False
+        with input_output(self.path):
+            self.path = self.path.resolve()
+            if self.path.exists() and not self.path.is_file():
+                raise OSError(f"{self.path} is no regular file")
+            clear(self.path)
+            self._token = secrets.token_hex(4)
+            self._visible = self._store("a")
+            self._publish(self._visible)
+
+    def _store(self, which: str) -> Store:
+        return Store(self.path.with_name(f".{self.path.name}.{self._token}.{which}"), self._layout)
+
+    def _publish(self, store: Store) -> None:
+        """The trace's name for this store, in one step."""
+        link = store.path.with_name(store.path.name + ".link")
+        with contextlib.suppress(FileNotFoundError):
+            link.unlink()
+        link.hardlink_to(store.path)
+        link.replace(self.path)
+
+    def append(self, rows: Floats) -> None:
+        """Takes rows; writes and flushes when it is time."""
+        if rows.size:
+            self._waiting.append(rows)
+            self._numbers += rows.size
+            self._energy(rows[:, 2:6])
+        if self._numbers > MANY or time.monotonic() - self._flushed > FLUSH_SECONDS:
+            self.flush()
+
+    def _energy(self, rows: Floats) -> None:
+        """Largest of kinetic energy, change of potential energy, energy dissipated and supplied (J).
+
+        At least what round-off is beside the stored energy.
+        """
+        if self._energies is None:
+            self._energies = np.array([0.0, rows[0, 1], 0.0, 0.0])
+        most = max(np.abs(rows - self._energies).max(), UNCHANGED * np.abs(rows[:, :2]).max())
+        if np.isfinite(most):
+            self._turned_over = max(self._turned_over, float(most))
+
+    def flush(self) -> None:
+        """All rows so far stand in the trace."""
+        self._flushed = time.monotonic()
+        if self._waiting:
+            self._turn(None)
+
+    def _turn(self, last: Mapping[str, Mapping[str, Any]] | None) -> None:
+        """The hidden store takes all rows (and last attributes, after which it is closed) and becomes visible."""
+        new, self._waiting, self._numbers = self._waiting, [], 0
+        try:
+            with input_output(self.path):
+                if self._hidden is None:
+                    self._hidden = self._store(
+                        "b" if self._visible and self._visible.path.suffix == ".a" else "a"
+                    )
+                rows = [*self._late, *new]
+                if rows:
+                    self._hidden.append(np.concatenate(rows))
+                if last is not None:
+                    self._hidden.close_with(last)
+                self._publish(self._hidden)
+        except TraceError:
+            if self._hidden is not None:
+                self._hidden.abandon()
+            self.discard()
+            raise
+        self._visible, self._hidden, self._late = self._hidden, self._visible, new
+
+    def finish(
+        self,
+        nominal: Mapping[str, float],
+        attributes: Mapping[str, str | float | int],
+        final: bool,
+    ) -> None:
+        """Nominal values, last attributes, `final`; closes the file."""
+        sizes = {
+            column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns
+        }
+        sizes["/audit/energy"] = {"nominal": self._turned_over}
+        self._turn({**sizes, "/": {**attributes, "final": np.int64(final)}})
+        self.discard()
+
+    def discard(self) -> None:
+        """Closes without more ado; the trace stays as it was last flushed."""
+        self.closed = True
+        for store in (self._visible, self._hidden):
+            if store is not None:
+                store.close()
+                with contextlib.suppress(OSError):
+                    store.path.unlink()
+        self._visible = self._hidden = None
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A traced quantity: an array with its unit, nominal magnitude and derivative (None: not known)."""
+
+    name: str
+    values: Floats
+    units: str
+    nominal: float | None
+    derivative: Floats | None
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.values, dtype=dtype, copy=True) if copy or dtype is not None else self.values
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.values[key]
+
+    def __iter__(self) -> Iterator[float]:
+        return iter(self.values)
+
+
+@contextlib.contextmanager
+def _damaged(path: Path) -> Iterator[None]:
+    """What h5py raises of a file whose layout makes no sense as TraceError."""
+    try:
+        yield
+    except (KeyError, TypeError, AttributeError, OverflowError, MemoryError) as error:
+        raise TraceError(f"{path}: not readable as a trace: {error}") from error
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes | np.bytes_):
+        return value.decode("utf-8")
+    return value.item() if isinstance(value, np.generic) else value
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A trace read from a file: trace["q1"], trace.time [s], trace.names, trace.attributes."""
+
+    path: str
+    time: Floats
+    attributes: dict[str, Any]
+    parameters: dict[str, tuple[float, str]]
+    _data: dict[str, Quantity]
+
+    @classmethod
+    def open(cls, file: str | Path) -> Trace:
+        """Reads a whole trace, also of a run that was killed.  Raises TraceError."""
+        import h5py
+
+        path = Path(file)
+        with _damaged(path), input_output(path), h5py.File(path, "r") as source:
+            data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
+            if "time" not in data:
+                raise ValueError("no data set 'time': not a trace")
+            group = {
+                f"{key}.{name}": item
+                for key in ("audit",)
+                for name, item in source.get(key, {}).items()
+                if isinstance(item, h5py.Dataset)
+            }
+            rates = {n: item for n, item in source.get("derivatives", {}).items() if isinstance(item, h5py.Dataset)}
+            length = min(
+                item.shape[0] for item in (*data.values(), *group.values(), *rates.values()) if item.ndim == 1
+            )
+            quantities = {}
+            for name, item in (*data.items(), *group.items()):
+                if name == "time" or item.ndim != 1:
+                    continue
+                path_of = _plain(item.attrs.get("derivative", ""))
+                rate = np.asarray(source[path_of][:length]) if path_of and path_of in source else None
+                quantities[name] = Quantity(
+                    name,
+                    np.asarray(item[:length]),
+                    str(_plain(item.attrs.get("units", "1"))),
+                    _plain(item.attrs["nominal"]) if "nominal" in item.attrs else None,
+                    rate,
+                )
+            parameters = {
+                name: (float(item[()]), str(_plain(item.attrs.get("units", "1"))))
+                for name, item in source.get("parameters", {}).items()
+            }
+            attributes = {name: _plain(value) for name, value in source.attrs.items()}
+            return cls(str(path), np.asarray(data["time"][:length]), attributes, parameters, quantities)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Traced quantities (without the audit)."""
+        return tuple(name for name in self._data if not name.startswith("audit."))
+
+    def __getitem__(self, name: str) -> Quantity:
+        return self._data[name.removeprefix("/").replace("audit/", "audit.") if "audit" in name else name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._data
+
+    @property
+    def final(self) -> bool:
+        """The run ended as asked."""
+        return bool(self.attributes.get("final", 1))
+
+    @property
+    def statistics(self) -> dict[str, Any]:
+        """Counters of the run."""
+        return dict(json.loads(self.attributes.get("statistics", "{}")))

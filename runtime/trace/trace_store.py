@@ -1,0 +1,240 @@
+"""One HDF5 file of a trace: its layout, rows appended in raw float64 blocks.
+
+/time (a dimension scale), one data set a traced quantity, /derivatives/<name>, /audit/energy, /audit/constraints, links
+/audit/<member> to what else of the audit is traced, /parameters/<name>, root attributes with `final`.  A disk that
+fills up raises: the handle is turned to memory before HDF5 closes the file, which otherwise ends in SIGSEGV at exit.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import gc
+import os
+import re
+import resource
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sysdyn.runtime.model.description import Description, Floats, element
+from sysdyn.runtime.model.failures import TraceError
+
+BLOCK = 1024
+HEAD = 1 << 16
+"""Bytes for what is not numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One traced quantity.  place: its element of block observe; derivative: it has one."""
+
+    name: str
+    place: int
+    unit: str
+    long_name: str
+    derivative: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter as the trace keeps it."""
+
+    name: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What a trace holds before its first row; observed: elements of block observe."""
+
+    columns: tuple[Column, ...]
+    observed: int
+    attributes: dict[str, str | float | int]
+    parameters: tuple[Parameter, ...]
+
+
+def columns_of(description: Description) -> tuple[Column, ...]:
+    """Stored quantities in the order of the rows of block observe."""
+    found: list[Column] = []
+    place = 0
+    for k in description.rows_of("observe"):
+        row = description.rows[k]
+        for position in range(row.size):
+            if row.stored:
+                name = element(row.name, row.shape, position).replace("/", "\u2215")
+                label = element(row.label or row.name, row.shape, position)
+                found.append(Column(name, place, row.unit, label, row.rate))
+            place += 1
+    return tuple(found)
+
+
+@contextlib.contextmanager
+def input_output(path: Path) -> Iterator[None]:
+    """Faults of the operating system and of HDF5 as TraceError."""
+    try:
+        yield
+    except (OSError, RuntimeError, ValueError) as error:
+        raise TraceError(f"{path}: {error}") from error
+
+
+def _text(value: str) -> Any:
+    """A fixed-length UTF-8 string for an attribute."""
+    import h5py
+
+    data = value.encode("utf-8") or b" "
+    return np.array(data, dtype=h5py.string_dtype("utf-8", len(data)))
+
+
+def _set(attributes: Any, values: Mapping[str, Any]) -> None:
+    for name, value in values.items():
+        attributes[name] = _text(value) if isinstance(value, str) else value
+
+
+def clear(path: Path) -> None:
+    """Remove the stores that killed runs left beside a trace: those that nobody holds locked.
+
+    A run's stores are locked while it lives; where locks do not work nothing is removed.
+    """
+    name = re.compile(re.escape(f".{path.name}.") + r"[0-9a-f]{8}\.[ab](\.link)?")
+    with contextlib.suppress(OSError), os.scandir(path.parent) as items:
+        left = [item.path for item in items if name.fullmatch(item.name) and item.is_file(follow_symlinks=False)]
+        for item in left:
+            with contextlib.suppress(OSError):
+                handle = os.open(item, os.O_RDONLY)
+                try:
+                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    Path(item).unlink()
+                finally:
+                    os.close(handle)
+
+
+class Store:
+    """A file of the trace's layout.  Raises OSError, RuntimeError, ValueError where it cannot be written."""
+
+    def __init__(self, path: Path, layout: Layout) -> None:
+        import h5py
+
+        self.path = path
+        self._length = 0
+        self._closed = False
+        self._sets: list[tuple[Any, int]] = []
+        self._room(0)
+        self._file = h5py.File(path, "x", libver=("earliest", "v110"))
+        with contextlib.suppress(OSError):  # HDF5 does, but for HDF5_USE_FILE_LOCKING=FALSE
+            fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            _set(self._file.attrs, {**layout.attributes, "final": np.int64(0)})
+            self._create(layout)
+            self._file.flush()
+        except (OSError, RuntimeError, ValueError):
+            self.abandon()
+            raise
+
+    def _create(self, layout: Layout) -> None:
+        time = self._data("time", "s", "time", None)
+        time.make_scale("time")
+        self._sets = [(time, 0)]
+        for column in layout.columns:
+            data = self._data(column.name, column.unit, column.long_name, time)
+            data.attrs["nominal"] = 0.0
+            self._sets.append((data, 8 + column.place))
+            group, _, member = column.name.partition(".")
+            if group == "audit" and member not in ("energy", "constraints"):
+                self._file[f"/audit/{member}"] = data
+            if column.derivative:
+                path = f"/derivatives/{column.name}"
+                unit = f"({column.unit})/s" if column.unit != "1" else "1/s"
+                rate = self._data(path, unit, f"time derivative of {column.long_name}", time)
+                data.attrs["derivative"] = _text(path)
+                self._sets.append((rate, 8 + layout.observed + column.place))
+        for path, unit, name, place in (
+            ("/audit/energy", "J", "balance of stored, dissipated and supplied energy since the start", 6),
+            ("/audit/constraints", "1", "norm of the scaled constraint equations", 7),
+        ):
+            self._sets.append((self._data(path, unit, name, time), place))
+        for parameter in layout.parameters:
+            name = f"/parameters/{parameter.name.replace('/', chr(0x2215))}"
+            data = self._file.create_dataset(name, data=parameter.value, track_times=False)
+            data.attrs["units"] = _text(parameter.unit)
+
+    def _data(self, name: str, unit: str, long_name: str, scale: Any) -> Any:
+        data = self._file.create_dataset(
+            name,
+            shape=(0,),
+            maxshape=(None,),
+            chunks=(BLOCK,),
+            dtype="f8",
+            fillvalue=np.nan,
+            track_times=False,
+        )
+        _set(data.attrs, {"units": unit, "long_name": long_name})
+        if scale is not None:
+            data.dims[0].attach_scale(scale)
+        return data
+
+    def append(self, rows: Floats) -> None:
+        """Appends rows and flushes."""
+        self._room(rows.shape[0])
+        first, self._length = self._length, self._length + rows.shape[0]
+        for data, place in self._sets:
+            data.resize((self._length,))
+            data[first:] = rows[:, place]
+        self._file.flush()
+
+    def _room(self, rows: int) -> None:
+        """Refuses to begin what the disk, or a limit on the size of files, cannot hold."""
+        blocks = rows // BLOCK + 2
+        whole = len(self._sets) * blocks * BLOCK * 8
+        need = whole // (1 if rows >= BLOCK else 4) + HEAD
+        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+        size = self.path.stat().st_size if self.path.exists() else 0
+        if limit != resource.RLIM_INFINITY and limit < size + whole + HEAD:
+            raise OSError(27, "the trace would outgrow the limit on the size of files")
+        disk = os.statvfs(self.path.parent)
+        if disk.f_bavail * disk.f_frsize < need:
+            raise OSError(28, "no space left on the disk for the trace")
+
+    def close_with(self, attributes: Mapping[str, Mapping[str, Any]]) -> None:
+        """Attributes by data set ("/": the root), then closes the file."""
+        for name, values in attributes.items():
+            _set(self._file[name].attrs, values)
+        self._file.flush()
+        self._file.close()
+        self._closed = True
+
+    def close(self) -> None:
+        """Closes a file to which nothing was added since it was flushed."""
+        if not self._closed:
+            self._closed = True
+            with contextlib.suppress(Exception):
+                self._file.close()
+
+    def abandon(self) -> None:
+        """Closes a file that perhaps can no longer be written: the handle is turned to memory first."""
+        if self._closed:
+            return
+        self._closed = True
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+        with contextlib.suppress(Exception):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limits[1], limits[1]))
+            handle = self._file.id.get_vfd_handle()
+            copy = os.memfd_create("sysdyn-trace")
+            size, offset = os.fstat(handle).st_size, 0
+            while offset < size:
+                sent = os.sendfile(copy, handle, offset, size - offset)
+                if sent == 0:
+                    break
+                offset += sent
+            os.dup2(copy, handle)
+            os.close(copy)
+        with contextlib.suppress(Exception):
+            self._file.close()
+        # every handle of the file dies while its writes still succeed
+        self._sets = []
+        gc.collect()
+        with contextlib.suppress(Exception):
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
