@@ -34,9 +34,9 @@ CHANGES = {
     "raise E(x[0])": [],
 }
 SIGNS = (
-    ("lowering.py", "works", "neg left out", "seed/dc_motor"),
-    ("kane.py", "_column", "neg left out", "seed/knife_edge"),
-    ("reflection.py", "_coupling", "neg left out", "seed/dc_motor"),
+    ("forms/lowering.py", "works", "neg left out", "seed/dc_motor"),
+    ("forms/kane.py", "_column", "neg left out", "seed/knife_edge"),
+    ("network/reflection.py", "_coupling", "neg left out", "seed/dc_motor"),
 )
 
 

@@ -1,0 +1,76 @@
+"""The rooms' READMEs say what is there: files that exist, and the way of one parameter as it is really called."""
+
+import inspect
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from sysdyn.cli.main import run
+
+ROOT = Path(__file__).resolve().parents[1]
+TOPS = ("dsl", "compiler", "runtime", "cli")
+ROOMS = sorted(init.parent for top in TOPS for init in (ROOT / top).rglob("__init__.py"))
+STEP = re.compile(r"`([a-z_/]+\.py)`: `([\w.]+)`")
+
+MODEL = """
+model spring {
+  param m = 1.13 kg
+  param k = 4 N/m
+  coord x: translation = 1 m
+  energy T* = 1/2*m*x'^2
+  energy V = 1/2*k*x^2
+}
+scene swing of spring { time 0 s to 1 s; trace x every 0.1 s }
+"""
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.relative_to(ROOT).as_posix())
+def test_every_room_has_a_page_of_files_that_exist(room):
+    text = (room / "README.md").read_text(encoding="utf-8")
+    assert text.startswith(f"# {room.name}: ")
+    assert len(text.splitlines()) <= 60, "one page"
+    places = [room, *room.parents[: len(room.relative_to(ROOT).parts)]]
+    for name in re.findall(r"`([a-z_/]+\.(?:py|c|h|lark|toml|js))`", text):
+        assert any((place / name).is_file() for place in places), name
+    for name in re.findall(r"`([a-z_/]+/)`", text):
+        assert (room / name).is_dir(), name
+
+
+def test_every_room_stands_on_the_page_of_its_house():
+    for room in ROOMS:
+        if room.parent in {ROOT / top for top in TOPS}:
+            assert f"`{room.name}/`" in (room.parent / "README.md").read_text(encoding="utf-8"), room
+
+
+def test_the_way_of_a_parameter_is_the_one_that_is_taken(tmp_path, monkeypatch):
+    """The steps of cli/README.md are called, each for the first time after the one before it."""
+    page = (ROOT / "cli" / "README.md").read_text(encoding="utf-8")
+    steps = STEP.findall(page.partition("## The way of one parameter")[2])
+    assert len(steps) > 15
+    called: dict[tuple[str, str], int] = {}
+    package = re.compile(rf"({'|'.join(TOPS)})(/\w+)*/\w+\.py$")
+
+    def note(frame, event, argument):
+        if event == "call" and frame.f_code.co_flags & inspect.CO_OPTIMIZED:  # no bodies of modules and classes
+            found = package.search(frame.f_code.co_filename)
+            if found:
+                called.setdefault((found[0], frame.f_code.co_qualname), len(called))
+
+    model = tmp_path / "spring.sd"
+    model.write_text(MODEL)
+    monkeypatch.chdir(tmp_path)
+    sys.setprofile(note)
+    try:
+        assert run(["simulate", "spring.sd", "--quiet"]) == 0
+    finally:
+        sys.setprofile(None)
+    when = [_first(called, file, name) for file, name in steps]
+    assert when == sorted(when), [f"{file}: {name}" for _, (file, name) in sorted(zip(when, steps, strict=True))]
+
+
+def _first(called: dict[tuple[str, str], int], file: str, name: str) -> int:
+    """When a function was first called, or any method of a class."""
+    found = [n for (f, q), n in called.items() if f == file and (q == name or q.startswith(f"{name}."))]
+    assert found, f"{file}: {name} is never called"
+    return min(found)
