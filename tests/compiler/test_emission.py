@@ -12,6 +12,7 @@ from catalogue import PLACE, load, network
 from chains import chain
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program import build as build_
+from sysdyn.compiler.program import cache as cache_
 from sysdyn.compiler.program.emit_c import emit_c
 from sysdyn.compiler.program.emit_numpy import emit_numpy
 from sysdyn.dsl.model import expression as x
@@ -153,10 +154,10 @@ def test_a_folder_that_others_write_is_not_used(tmp_path, monkeypatch):
     shared.mkdir()
     shared.chmod(0o777)
     monkeypatch.setenv("SYSDYN_CACHE", str(shared))
-    assert build_.cache_folder() != shared
+    assert cache_.folder() != shared
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "file"))
     (tmp_path / "file").write_text("")
-    folder = build_.cache_folder()
+    folder = cache_.folder()
     assert folder.stat().st_mode & 0o777 == 0o700
     assert build_.build("int sd_x;").parent == folder
 
