@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 import click
-from sysdyn.cli.failures import envelope, plain
+from sysdyn.cli.failures import envelope, plain, shown
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
@@ -35,17 +35,18 @@ class Console:
     def say(self, message: str) -> None:
         """A message for the person at the terminal."""
         if not (self.quiet or self.as_json):
-            print(message, file=sys.stderr)
+            print(shown(message), file=sys.stderr)
 
     def complain(self, message: str, code: int) -> None:
         """A finding that has no place in a text, with the exit code that it leads to; --quiet does not silence it."""
         self._plain.append(plain(message, code))
         if not self.as_json:
-            print(f"sysdyn: {message}", file=sys.stderr)
+            print(shown(f"sysdyn: {message}"), file=sys.stderr)
 
-    def data(self, text: str) -> None:
-        """Data that was asked for."""
+    def data(self, text: str, *, verbatim: bool = False) -> None:
+        """Data that was asked for; verbatim: the user's own text, which may go to a file."""
         if not self.as_json:
+            text = text if verbatim and not sys.stdout.isatty() else shown(text)
             sys.stdout.write(text if text.endswith("\n") else text + "\n")
 
     def finish(self, code: int = 0) -> int:

@@ -31,7 +31,7 @@ def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
     elif code == INTERRUPTED:
         print("interrupted", file=sys.stderr)
     else:
-        print(f"sysdyn: {message}", file=sys.stderr)
+        print(shown(f"sysdyn: {message}"), file=sys.stderr)
         if isinstance(error, click.UsageError) and error.ctx is not None:
             print(f"try '{error.ctx.command_path} --help'", file=sys.stderr)
     if code == FAULT and os.environ.get("SYSDYN_DEBUG"):
@@ -58,6 +58,13 @@ def classify(error: BaseException) -> tuple[int, str]:
     if type(error).__name__ == "TraceError":
         return INPUT_OUTPUT, str(error)
     return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} (SYSDYN_DEBUG=1 shows where; please report it)"
+
+
+def shown(message: str) -> str:
+    """A message for a terminal: names of files, models and data sets may hold control characters."""
+    from sysdyn.dsl.text.render import printable
+
+    return "\n".join(printable(line) for line in message.split("\n"))
 
 
 def _silence() -> None:

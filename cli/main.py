@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 
 import click
 
@@ -74,10 +77,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        code = group.main(given, prog_name="sysdyn", standalone_mode=False)
-        return code if isinstance(code, int) else 0
-    except BaseException as error:
-        from sysdyn.cli.failures import report_failure
+    with _ended_like_an_interruption():
+        try:
+            code = group.main(given, prog_name="sysdyn", standalone_mode=False)
+            return code if isinstance(code, int) else 0
+        except BaseException as error:
+            from sysdyn.cli.failures import report_failure
 
-        return report_failure(error, given)
+            return report_failure(error, given)
+
+
+@contextlib.contextmanager
+def _ended_like_an_interruption() -> Iterator[None]:
+    """SIGTERM and SIGHUP end a command as Ctrl-C does: what was computed is kept, what was hidden is removed.
+
+    Those that somebody ignores (nohup) or handles already stay so.
+    """
+    mine = threading.current_thread() is threading.main_thread()
+    sent = [s for s in (signal.SIGTERM, signal.SIGHUP) if mine and signal.getsignal(s) is signal.SIG_DFL]
+    for one in sent:
+        signal.signal(one, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for one in sent:
+            signal.signal(one, signal.SIG_DFL)

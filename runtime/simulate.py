@@ -22,6 +22,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
+from sysdyn.runtime.trace.claim import claimed
 
 FINEST_RADAU = 1e-17
 """Smallest tolerance of Radau: its error test works with a tenth of the power 2/3 of it (core/radau.h)."""
@@ -144,7 +145,13 @@ def simulate(
         )
     name = {"3": str(facts.index), "2": "2"}.get(form, form)
     options = replace(options, attributes={**options.attributes, "index": name})
-    runs = Runs(system, start, options, index, method)
+    with claimed(Path(options.output).resolve()):
+        return _runs(Runs(system, start, options, index, method), written, name, facts, warnings)
+
+
+def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tuple[str, ...]) -> Outcome:
+    """The runs of one simulation, whose trace is claimed."""
+    options, start = runs.options, runs.start
     known = determined(written, start)
     runs.columns = tuple(
         replace(column, derivative=column.derivative and bool(known[column.place])) for column in runs.columns

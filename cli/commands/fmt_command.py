@@ -50,9 +50,9 @@ def _one(console: Console, name: str, *, check: bool, diff: bool) -> bool:
         return False
     text = format_text(tree)
     if diff:
-        console.data("".join(_difference(source, text)))
+        console.data("".join(_difference(source, text)), verbatim=True)
     elif name == "-" and not check:
-        console.data(text)
+        console.data(text, verbatim=True)
     elif text != source.text and not check:
         _replace(Path(name), text)
     return text != source.text

@@ -84,10 +84,11 @@ def _target(trace: str, output: str | None, console: Console) -> Path:
 
 
 def _open(file: str) -> Trace:
+    from sysdyn.runtime.trace.opening import regular
     from sysdyn.runtime.trace.trace import Trace
 
     if file != "-":
-        Path(file).open("rb").close()  # a plainer message than HDF5's where there is none
+        regular(file)  # a plainer message than HDF5's where there is none
         return Trace.open(file)
     with tempfile.NamedTemporaryFile(suffix=".h5") as copy:
         copy.write(sys.stdin.buffer.read())

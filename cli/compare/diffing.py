@@ -9,7 +9,6 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
@@ -19,6 +18,7 @@ from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import About, Compared, Event, Source, Tolerance, Verdict
+from sysdyn.runtime.trace.opening import regular
 
 SHOWN = 20
 """Quantities within their limit that the table lists."""
@@ -28,7 +28,7 @@ SHOWN = 20
 def opened(file: str) -> Iterator[Recorded]:
     """A trace of a file, or of standard input where it is '-'.  Raises TraceError, OSError, Incomparable."""
     if file != "-":
-        Path(file).open("rb").close()  # a plainer message than HDF5's where there is none
+        regular(file)  # a plainer message than HDF5's where there is none
         with Recorded(file) as trace:
             yield trace
         return

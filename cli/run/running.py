@@ -28,6 +28,7 @@ from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.runtime.integrate.options import Options, Progress
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.simulate import Outcome, simulate
+from sysdyn.runtime.trace.opening import replaceable
 from sysdyn.runtime.trace.trace import Parameter
 
 ACCURACY = 1e-4
@@ -85,6 +86,9 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     target = targets.one(document, request.file, request.model, request.scene, report)
     if target is None:
         return None
+    output = request.output or _default_output(request.file, target.scene.name.name if target.scene else "")
+    if Path(output).is_file() and not replaceable(output):
+        raise UsageError(f"-o {output} exists and is no trace of sysdyn: give another name, or remove it")
     with ex.fresh():
         prepared = ready(request, target, report)
         options = None if prepared is None else options_of(request, target, prepared, report, began, progress)

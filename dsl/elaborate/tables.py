@@ -6,6 +6,7 @@ that begin with '#' are passed over.  It must lie inside the folder of the text 
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -83,7 +84,10 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
         report.error("E206", f"table {item.name.name}: '{item.file}' is outside the model's folder", place, help=help_)
         raise Failed
     try:
-        if path.stat().st_size > MAX_BYTES:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(22, "it is no regular file")
+        if found.st_size > MAX_BYTES:
             raise OSError(27, "the file is too large")
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -13,6 +13,7 @@ import numpy as np
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.verdict import About, Event, Incomparable
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.opening import opened
 
 CACHE = 1 << 16
 """Bytes of chunks that HDF5 keeps of each open data set: its own default is 8 MB, and a trace has hundreds."""
@@ -24,11 +25,9 @@ class Recorded:
     """A trace of CONTRACT's layout, open for reading.  Raises TraceError (unreadable) and Incomparable (no trace)."""
 
     def __init__(self, path: str | Path, name: str | None = None) -> None:
-        import h5py
-
         self.path = name or str(path)
         with self._faults():
-            self._file: Any = h5py.File(path, "r", rdcc_nbytes=CACHE)
+            self._file: Any = opened(path, rdcc_nbytes=CACHE)
         try:
             with self._faults():
                 self._layout()

@@ -24,6 +24,7 @@ from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.trace.trace import Column, TraceWriter, columns_of
+from sysdyn.runtime.trace.trace_store import clear
 
 LONG = 1000
 """Steps of the bdf after which method auto tries radau, and of a stiff dopri."""
@@ -57,6 +58,8 @@ class Runs:
         self.instants, self.kinds = instants(options)
         self.path = Path(options.output)
         self.target = self.path.resolve()
+        for place in (self.target, self._part):
+            clear(place)
         self.statistics, self.last_statistics = Statistics(), Statistics()
         self.cpu = self.wall = 0.0
         self.number = 0
@@ -93,6 +96,11 @@ class Runs:
         )
 
     @property
+    def _part(self) -> Path:
+        """Where a finer run writes before it takes the trace's place."""
+        return self.target.with_name(f".{self.target.name}.part")
+
+    @property
     def most_steps(self) -> int | None:
         """The steps of a run: of the options, or of the patience with a method on trial."""
         return min((n for n in (self.options.max_steps, self.patience) if n is not None), default=None)
@@ -102,7 +110,9 @@ class Runs:
         traced = rows[(kind & TRACE) > 0]
         assert self.writer is not None
         self.writer.append(traced)
-        self.rows.append(rows[(kind & COMPARED) > 0])
+        compared = rows[(kind & COMPARED) > 0]
+        if compared.size:
+            self.rows.append(compared)
         taken = rows[(kind & (TRACE | STEP)) > 0]
         if self._keeps:
             self.samples.append(taken)
@@ -126,7 +136,7 @@ class Runs:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
         self.number += 1
         first = self.done is None
-        target = self.target if first else self.target.with_name(f".{self.target.name}.part")
+        target = self.target if first else self._part
         attributes: dict[str, str | float | int] = {
             **self.options.attributes,
             "method": self.method,

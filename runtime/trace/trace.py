@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.trace_store import Column, Layout, Parameter, Store, clear, columns_of, input_output
+from sysdyn.runtime.trace.opening import opened
+from sysdyn.runtime.trace.trace_store import Column, Layout, Parameter, Store, columns_of, input_output
 
 __all__ = ["Column", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
 
@@ -35,8 +36,8 @@ class TraceWriter:
     """A trace being written.  rows: [k, 8 + 2 observed] as core/run.h lays them down.
 
     Two stores stand beside the trace (.NAME.<token>.a, .b).  Each flush brings the one that is not visible up to date
-    and then gives it the trace's name (hard link, rename): what bears the name is never being written.  What a killed
-    run leaves of them the next run of that trace removes.
+    and then gives it the trace's name (hard link, rename): what bears the name is never being written.  Nor is what a
+    reader still has open: a copy of the visible one takes its place.
     """
 
     def __init__(
@@ -61,13 +62,12 @@ class TraceWriter:
             self.path = self.path.resolve()
             if self.path.exists() and not self.path.is_file():
                 raise OSError(f"{self.path} is no regular file")
-            clear(self.path)
             self._token = secrets.token_hex(4)
             self._visible = self._store("a")
             self._publish(self._visible)
 
-    def _store(self, which: str) -> Store:
-        return Store(self.path.with_name(f".{self.path.name}.{self._token}.{which}"), self._layout)
+    def _store(self, which: str, like: Store | None = None) -> Store:
+        return Store(self.path.with_name(f".{self.path.name}.{self._token}.{which}"), self._layout, like)
 
     def _publish(self, store: Store) -> None:
         """The trace's name for this store, in one step."""
@@ -108,22 +108,53 @@ class TraceWriter:
         new, self._waiting, self._numbers = self._waiting, [], 0
         try:
             with input_output(self.path):
+                if self._hidden is not None and self._hidden.is_read():
+                    self._drop_hidden()
                 if self._hidden is None:
-                    self._hidden = self._store(
-                        "b" if self._visible and self._visible.path.suffix == ".a" else "a"
-                    )
+                    self._hidden, self._late = self._store(self._other, like=self._visible), []
                 rows = [*self._late, *new]
                 if rows:
                     self._hidden.append(np.concatenate(rows))
                 if last is not None:
                     self._hidden.close_with(last)
                 self._publish(self._hidden)
-        except TraceError:
-            if self._hidden is not None:
-                self._hidden.abandon()
+        except TraceError as error:
+            self._drop_hidden()
+            kept = self._keep_what_fits(np.concatenate(new)) if new else 0
             self.discard()
+            if kept:
+                raise TraceError(f"{error} (the trace holds what fitted)") from error
             raise
         self._visible, self._hidden, self._late = self._hidden, self._visible, new
+
+    @property
+    def _other(self) -> str:
+        """The suffix of the store that is not visible."""
+        return "b" if self._visible and self._visible.path.suffix == ".a" else "a"
+
+    def _drop_hidden(self) -> None:
+        """The hidden store goes, and the room that it took with it."""
+        if self._hidden is not None:
+            self._hidden.abandon()
+            with contextlib.suppress(OSError):
+                self._hidden.path.unlink()
+            self._hidden = None
+
+    def _keep_what_fits(self, rows: Floats) -> int:
+        """On a disk that is full: the first rows for which there is room reach the trace; their number."""
+        count = int(rows.shape[0])
+        while count:
+            store: Store | None = None
+            try:
+                with input_output(self.path):
+                    store = self._hidden = self._store(self._other, like=self._visible)
+                    store.append(rows[:count])
+                    self._publish(store)
+                return count
+            except TraceError:
+                self._drop_hidden()
+                count //= 2
+        return 0
 
     def finish(
         self,
@@ -131,7 +162,9 @@ class TraceWriter:
         attributes: Mapping[str, str | float | int],
         final: bool,
     ) -> None:
-        """Nominal values, last attributes, `final`; closes the file."""
+        """Nominal values, last attributes, `final`; closes the file.  A trace that was given up stays as it is."""
+        if self.closed:
+            return
         sizes = {
             column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns
         }
@@ -204,7 +237,7 @@ class Trace:
         import h5py
 
         path = Path(file)
-        with _damaged(path), input_output(path), h5py.File(path, "r") as source:
+        with _damaged(path), input_output(path), opened(path) as source:
             data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
             if "time" not in data:
                 raise ValueError("no data set 'time': not a trace")

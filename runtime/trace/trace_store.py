@@ -13,6 +13,7 @@ import gc
 import os
 import re
 import resource
+import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,44 +96,59 @@ def _set(attributes: Any, values: Mapping[str, Any]) -> None:
 
 
 def clear(path: Path) -> None:
-    """Remove the stores that killed runs left beside a trace: those that nobody holds locked.
-
-    A run's stores are locked while it lives; where locks do not work nothing is removed.
-    """
+    """Remove the stores that killed runs left beside a trace, which is claimed: no living run has any."""
     name = re.compile(re.escape(f".{path.name}.") + r"[0-9a-f]{8}\.[ab](\.link)?")
     with contextlib.suppress(OSError), os.scandir(path.parent) as items:
         left = [item.path for item in items if name.fullmatch(item.name) and item.is_file(follow_symlinks=False)]
         for item in left:
             with contextlib.suppress(OSError):
-                handle = os.open(item, os.O_RDONLY)
-                try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    Path(item).unlink()
-                finally:
-                    os.close(handle)
+                Path(item).unlink()
 
 
 class Store:
-    """A file of the trace's layout.  Raises OSError, RuntimeError, ValueError where it cannot be written."""
+    """A file of the trace's layout.  Raises OSError, RuntimeError, ValueError where it cannot be written.
 
-    def __init__(self, path: Path, layout: Layout) -> None:
+    HDF5's lock is taken off it, so that others may read the trace of a living run; a reader's own lock shows.
+    """
+
+    def __init__(self, path: Path, layout: Layout, like: Store | None = None) -> None:
+        """Empty, or a copy of another store, of which all is on the disk."""
         import h5py
 
         self.path = path
         self._length = 0
         self._closed = False
         self._sets: list[tuple[Any, int]] = []
-        self._room(0)
-        self._file = h5py.File(path, "x", libver=("earliest", "v110"))
-        with contextlib.suppress(OSError):  # HDF5 does, but for HDF5_USE_FILE_LOCKING=FALSE
-            fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        self._room(0 if like is None else like._length)
+        if like is not None:
+            shutil.copyfile(like.path, path)
+        mode = "x" if like is None else "r+"
+        self._file = h5py.File(path, mode, libver=("earliest", "v110"))
+        with contextlib.suppress(OSError):
+            fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_UN)
         try:
-            _set(self._file.attrs, {**layout.attributes, "final": np.int64(0)})
-            self._create(layout)
-            self._file.flush()
+            if like is None:
+                _set(self._file.attrs, {**layout.attributes, "final": np.int64(0)})
+                self._create(layout)
+                self._file.flush()
+            else:
+                self._length = like._length
+                self._sets = [(self._file[data.name], place) for data, place in like._sets]
         except (OSError, RuntimeError, ValueError):
             self.abandon()
             raise
+
+    def is_read(self) -> bool:
+        """Somebody opened it while it was the trace, and has not closed it: what is read must not change."""
+        handle = self._file.id.get_vfd_handle()
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False  # locks do not work here: HDF5 took none either
+        fcntl.flock(handle, fcntl.LOCK_UN)
+        return False
 
     def _create(self, layout: Layout) -> None:
         time = self._data("time", "s", "time", None)

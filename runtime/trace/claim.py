@@ -1,0 +1,52 @@
+"""One run at a time writes a trace: `.NAME.lock` beside it, locked by the process that writes and gone when it ends."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from sysdyn.runtime.model.failures import TraceError
+
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL)
+
+
+@contextlib.contextmanager
+def claimed(path: Path) -> Iterator[None]:
+    """Holds the trace at `path` (resolved) for this process.  TraceError where a living run holds it.
+
+    A lock dies with its process, so a killed run leaves none; where locks do not work nothing is refused.
+    """
+    lock = path.with_name(f".{path.name}.lock")
+    try:
+        handle = _locked(lock)
+    except BlockingIOError as error:
+        raise TraceError(f"{path}: another run is writing this trace: wait for it, or give -o another name") from error
+    except OSError as error:
+        raise TraceError(f"{path}: {error.strerror or error}") from error
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            lock.unlink()
+        os.close(handle)
+
+
+def _locked(lock: Path) -> int:
+    """A handle of the lock's file; that of a run which just ended may have lost its name meanwhile, then once more."""
+    while True:
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                os.close(handle)
+                raise
+            return handle
+        with contextlib.suppress(FileNotFoundError):
+            if lock.stat().st_ino == os.fstat(handle).st_ino:
+                return handle
+        os.close(handle)

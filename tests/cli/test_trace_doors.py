@@ -1,0 +1,256 @@
+"""Doors of a trace: what a foreign file may make us read, who may write and read while a run lives, how it ends."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from sysdyn.cli.main import run
+from sysdyn.runtime.trace.trace import Trace
+from texts import ENDLESS, PENDULUM, write
+
+SECRET = b"the reader's own file, which nobody shall see\n" * 40
+
+
+@pytest.fixture
+def trace(tmp_path, monkeypatch):
+    path = write(tmp_path, PENDULUM)
+    monkeypatch.chdir(tmp_path)
+    assert run(["simulate", "-q", path, "-o", "good.h5"]) == 0
+    (tmp_path / "secret.txt").write_bytes(SECRET)
+    return tmp_path / "good.h5"
+
+
+def _external_link(file):
+    with h5py.File("other.h5", "w") as other:
+        other["stolen"] = np.arange(file["time"].shape[0], dtype=float)
+    file["x_stolen"] = h5py.ExternalLink("other.h5", "/stolen")
+
+
+def _external_link_in_a_group(file):
+    _external_link(file)
+    file.move("x_stolen", "derivatives/x_stolen")
+    file["x"].attrs["derivative"] = "/derivatives/x_stolen"
+
+
+def _raw_storage(file):
+    size = len(SECRET) // 8
+    file.create_dataset("x_stolen", shape=(size,), dtype="f8", external=[(b"secret.txt", 0, 8 * size)])
+
+
+def _virtual(file):
+    with h5py.File("other.h5", "w") as other:
+        other["stolen"] = np.arange(file["time"].shape[0], dtype=float)
+    layout = h5py.VirtualLayout(shape=file["time"].shape, dtype="f8")
+    layout[:] = h5py.VirtualSource("other.h5", "stolen", shape=file["time"].shape)
+    file.create_virtual_dataset("x_stolen", layout)
+
+
+def _hidden_deep(file):
+    group = file.create_group("a/b/c")
+    group["link"] = h5py.ExternalLink("other.h5", "/")
+
+
+LEADING_OUT = (_external_link, _external_link_in_a_group, _raw_storage, _virtual, _hidden_deep)
+
+
+@pytest.mark.parametrize("plant", LEADING_OUT, ids=lambda plant: plant.__name__.strip("_"))
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["plot", "bad.h5", "-o", "bad.html"],
+        ["plot", "bad.h5"],
+        ["diff", "good.h5", "bad.h5"],
+        ["diff", "bad.h5", "good.h5"],
+    ],
+    ids=["plot html", "plot", "diff test", "diff reference"],
+)
+def test_a_trace_that_leads_to_another_file_is_refused(trace, capsys, plant, command):
+    Path("bad.h5").write_bytes(trace.read_bytes())
+    with h5py.File("bad.h5", "a") as file:
+        plant(file)
+    assert run(command) == 5
+    said = capsys.readouterr()
+    assert "leads to another file" in said.err
+    assert not Path("bad.html").exists()
+    assert not Path("bad.png").exists()
+
+
+def test_soft_links_inside_a_trace_are_its_own(trace):
+    with h5py.File("good.h5", "a") as file:
+        file["again"] = h5py.SoftLink("/x")
+    assert run(["plot", "-q", "good.h5", "again", "-o", "again.svg"]) == 0
+
+
+@pytest.mark.parametrize("command", [["plot", "pipe"], ["diff", "good.h5", "pipe"], ["diff", "pipe", "good.h5"]])
+def test_a_pipe_is_no_trace(trace, capsys, command):
+    os.mkfifo("pipe")
+    assert run(command) == 5
+    assert "no regular file" in capsys.readouterr().err
+
+
+def test_a_pipe_is_no_table(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("rows.csv")
+    text = PENDULUM.replace("model pendulum", 'table f(x: m) -> N linear clamp file "rows.csv"\nmodel pendulum', 1)
+    assert run(["check", write(tmp_path, text)]) == 1
+    assert "E206" in capsys.readouterr().err
+
+
+def test_what_is_no_trace_of_ours_is_not_overwritten(trace, tmp_path, capsys):
+    with h5py.File("measured.h5", "w") as file:
+        file["time"], file["x"] = np.arange(3.0), np.arange(3.0)
+    kept = {name: Path(name).read_bytes() for name in ("secret.txt", "measured.h5", "model.sd")}
+    for name, content in kept.items():
+        assert run(["simulate", "-q", "model.sd", "-o", name]) == 2
+        assert name in capsys.readouterr().err
+        assert Path(name).read_bytes() == content
+    Path("empty.h5").touch()
+    for name in ("good.h5", "empty.h5", "new.h5"):
+        assert run(["simulate", "-q", "model.sd", "-o", name]) == 0
+
+
+def living(path, output, *more):
+    """A run that has written some rows."""
+    command = [sys.executable, "-m", "sysdyn.cli", "simulate", "-q", path, "-o", output, "--max-wall", "60", *more]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        if Path(output).exists() and Trace.open(output).time.size:
+            return child
+        time.sleep(0.05)
+    raise AssertionError(child.communicate())
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_every_polite_end_keeps_the_rows_and_removes_what_was_hidden(tmp_path, monkeypatch, sent):
+    monkeypatch.chdir(tmp_path)
+    child = living(write(tmp_path, ENDLESS), "out.h5")
+    rows = Trace.open("out.h5").time.size
+    child.send_signal(sent)
+    _, err = child.communicate(timeout=60)
+    assert child.returncode == 130, err
+    assert "Traceback" not in err
+    trace = Trace.open("out.h5")
+    assert trace.time.size >= rows > 0
+    assert not trace.final
+    assert {p.name for p in tmp_path.iterdir()} == {"model.sd", "out.h5"}
+
+
+def test_a_command_that_shall_not_be_hung_up_is_not(tmp_path, monkeypatch):
+    """nohup: SIGHUP ignored stays ignored."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, ENDLESS)
+    code = (
+        "import signal, sys; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "from sysdyn.cli.main import main; main(sys.argv[1:])"
+    )
+    command = [sys.executable, "-c", code, "simulate", "-q", "model.sd", "-o", "out.h5", "--max-wall", "4"]
+    child = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    while not Path("out.h5").exists():
+        time.sleep(0.05)
+    child.send_signal(signal.SIGHUP)
+    child.communicate(timeout=60)
+    assert child.returncode == 3, "it ran on to its limit of time"
+
+
+def test_a_second_run_of_one_trace_is_refused_while_the_first_lives(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = write(tmp_path, ENDLESS)
+    child = living(path, "out.h5")
+    before = Trace.open("out.h5").time.size
+    (tmp_path / "elsewhere").mkdir()
+    Path("elsewhere/link.h5").symlink_to("../out.h5")
+    for name in ("out.h5", "./out.h5", "elsewhere/link.h5"):
+        assert run(["simulate", "-q", path, "-o", name, "--max-wall", "1"]) == 5
+        assert "another run is writing" in capsys.readouterr().err
+    assert Trace.open("out.h5").time.size >= before
+    child.send_signal(signal.SIGINT)
+    child.communicate(timeout=60)
+    assert run(["simulate", "-q", path, "-o", "out.h5", "--until", "0.1"]) == 0
+
+
+READER = """
+import sys, time, h5py, numpy as np
+with h5py.File(sys.argv[1], "r") as file:
+    first = {name: file[name][:] for name in ("time", "x")}
+    print(first["time"].size, flush=True)
+    sys.stdin.readline()
+    for data in file.values():
+        if hasattr(data, "id") and hasattr(data, "refresh"):
+            data.refresh()
+    assert all(np.array_equal(file[name][:], first[name]) for name in first)
+print("same", flush=True)
+"""
+
+
+def test_a_running_trace_is_read_and_does_not_change_under_its_reader(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    child = living(write(tmp_path, ENDLESS), "out.h5")
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    reader = subprocess.Popen([sys.executable, "-c", READER, "out.h5"], **pipes)
+    rows = int(reader.stdout.readline())
+    assert rows > 0
+    deadline = time.monotonic() + 60
+    sizes = {rows}
+    while len(sizes) < 5 and time.monotonic() < deadline:  # four flushes go by: both stores were written
+        sizes.add(Trace.open("out.h5").time.size)
+        time.sleep(0.1)
+    assert len(sizes) >= 5
+    assert reader.communicate("\n", timeout=60)[0].strip() == "same"
+    assert run(["plot", "-q", "out.h5", "-o", "out.svg"]) == 0
+    child.send_signal(signal.SIGINT)
+    child.communicate(timeout=60)
+
+
+def test_control_characters_of_names_do_not_reach_the_terminal(trace, tmp_path, capsys):
+    evil = "x\x1b]0;owned\x07\x1b[2Jy"
+    Path("bad.h5").write_bytes(trace.read_bytes())
+    with h5py.File("bad.h5", "a") as file:
+        file[evil] = file["x"]
+        file.attrs["title"] = "t\x1b[31m"
+    (tmp_path / f"{evil.replace(']', '')}.sd").write_text("model m {\n  coord\n}\n")
+    commands = (
+        ["plot", "bad.h5"],
+        ["plot", "bad.h5", evil],
+        ["plot", "bad.h5", "none\x1b[2J"],
+        ["diff", "good.h5", "bad.h5"],
+        ["diff", "bad.h5", "good.h5"],
+        ["diff", "good.h5", f"missing{evil}.h5"],
+        ["check", f"{evil.replace(']', '')}.sd"],
+        ["simulate", f"{evil.replace(']', '')}.sd"],
+        ["simulate", "model.sd", "--set", f"{evil}=1"],
+        ["simulate", "model.sd", "--scene", evil],
+        ["explain", evil],
+        [evil],
+    )
+    for command in commands:
+        run(command)
+        said = capsys.readouterr()
+        for text in (said.out, said.err):
+            assert not {c for c in text if ord(c) < 32 or ord(c) == 127} - {"\n"}, (command, text)
+
+
+def test_the_same_names_are_whole_in_json(trace, capsys):
+    evil = "x\x1b[2Jy"
+    with h5py.File("good.h5", "a") as file:
+        file[evil] = file["x"]
+    run(["plot", "--json", "good.h5", evil, "-o", "p.svg"])
+    assert json.loads(capsys.readouterr().out)["result"]["quantities"] == [evil]
+
+
+def test_a_thread_may_call_the_command_line(tmp_path, monkeypatch):
+    """Signals are the main thread's: elsewhere they are left alone."""
+    monkeypatch.chdir(tmp_path)
+    path, codes = write(tmp_path, PENDULUM), []
+    worker = threading.Thread(target=lambda: codes.append(run(["check", "-q", path])))
+    worker.start()
+    worker.join()
+    assert codes == [0]
