@@ -18,13 +18,13 @@ from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.forms import Planned
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import column_order
+from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 
 DENSE = 300
 """Unknowns up to which the matrix is judged by its singular values."""
-SINGULAR = 1e-12
-_SWEEPS = 8
 _DERIVED = {"phi": "phi_acceleration", "phi_rate": "phi_acceleration", "psi": "psi_rate", "momentum": "momentum_rate"}
 """Block of a constraint -> block of form 0 in whose rows its residual stands in a projection."""
 
@@ -140,8 +140,8 @@ class Underlying:
         full[self.pattern.row, self.pattern.columns_of()] = matrix
         if not np.isfinite(full).all():
             return ()
-        _, sigma, vectors = np.linalg.svd(full)
-        null = vectors[sigma <= SINGULAR * sigma[0]]
+        _, sigma, vectors = decomposed(full)
+        null = vectors[count(sigma, CERTAIN) :]
         return self._largest(np.abs(null).max(axis=0) if null.size else np.zeros(number))
 
     def _largest(self, null: Floats) -> tuple[str, ...]:
@@ -184,14 +184,10 @@ def obstacle(system: System, state: ConsistentState) -> tuple[str, ...]:
 
 
 def _balanced(pattern: Pattern, values: Floats) -> Floats:
-    """Rows and columns of largest entry about one (Ruiz 2001)."""
-    columns, values = pattern.columns_of(), values.copy()
-    for _ in range(_SWEEPS):
-        for places in (pattern.row, columns):
-            size = np.zeros(pattern.unknowns)
-            np.maximum.at(size, places, np.abs(values))
-            values = values / np.sqrt(np.where(size > 0.0, size, 1.0))[places]
-    return values
+    """The entries of the equilibrated matrix."""
+    columns = pattern.columns_of()
+    row, column = sparse_factors(pattern.row, columns, np.abs(values), (pattern.rows, pattern.unknowns))
+    return values * row[pattern.row] * column[columns]
 
 
 def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:
@@ -208,4 +204,4 @@ def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:
     x = factors.solve(factors.solve(np.ones(pattern.unknowns)), trans="T")
     x = factors.solve(x / np.abs(x).max())
     large = np.abs(x).max()
-    return np.abs(x) / large if large * SINGULAR > 1.0 or not np.isfinite(large) else np.zeros(pattern.unknowns)
+    return np.abs(x) / large if large * CERTAIN > 1.0 or not np.isfinite(large) else np.zeros(pattern.unknowns)

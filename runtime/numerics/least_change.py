@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
 
 Mask = NDArray[np.bool_]
 SINGULAR_VALUES = 120
@@ -24,8 +25,6 @@ EPS = 1e-13
 """Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
-_LIGHT = 1e-9
-"""The same of unknowns without magnitudes."""
 _ITERATIONS = 60
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
@@ -101,7 +100,7 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
     if max(shape) <= SINGULAR_VALUES:
         a = np.zeros(shape)
         np.add.at(a, (i, j), v)
-        return np.asarray(np.linalg.lstsq(a, aim, rcond=RANK)[0], dtype=np.float64)
+        return least_squares(a, aim, RANK)
     return _saddle_point(shape, (i, j, v), aim)
 
 
@@ -162,7 +161,10 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
             break
         u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
-        target = linear.nearest(u, scaled[problem.use], beside=size < _BESIDE and stale > 1)
+        try:
+            target = linear.nearest(u, scaled[problem.use], beside=size < _BESIDE and stale > 1)
+        except NotFiniteError:
+            break
         if not np.isfinite(target).all():
             break
         norm = float(np.linalg.norm(scaled))
@@ -193,10 +195,10 @@ def where_light(problem: Problem, x: Floats, light: Mask) -> Floats:
     u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
     aim = a[:, ~light] @ u[~light] - (problem.residual(x) * linear.row_scale)[problem.use]
     size = np.abs(a[:, light]).max(axis=0, initial=0.0)
-    left, sigma, _ = np.linalg.svd(a[:, light] / np.where(size > 0.0, size, 1.0))
-    rest = left[:, int((sigma > _LIGHT * sigma.max(initial=0.0)).sum()) :].T
+    left, sigma, _ = decomposed(a[:, light] / np.where(size > 0.0, size, 1.0))
+    rest = left[:, count(sigma) :].T
     heavy = np.flatnonzero(problem.free)[~light]
-    moved = np.linalg.lstsq(rest @ a[:, ~light], rest @ aim, rcond=RANK)[0]
+    moved = least_squares(rest @ a[:, ~light], rest @ aim, RANK)
     found = x.copy()
     found[heavy] = problem.guess[heavy] + moved * linear.unit[heavy]
     return found
@@ -220,7 +222,7 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
             np.add.at(a, (i, j), v / linear.row_scale[problem.use][i] * scale[problem.use][i])
             for _ in range(2 * _HALVINGS):
                 full = np.vstack([a, np.sqrt(damping) * np.eye(a.shape[1])])
-                step = np.linalg.lstsq(full, np.concatenate([-r, np.zeros(a.shape[1])]), rcond=None)[0]
+                step = least_squares(full, np.concatenate([-r, np.zeros(a.shape[1])]), 1e-15)
                 tried = x.copy()
                 tried[problem.free] += step * linear.unit[problem.free]
                 now = measure(tried)

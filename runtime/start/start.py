@@ -16,7 +16,9 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, least_residual, solve, where_light
+from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import STATE, WEIGHT, Mask, Starter, problem_of, row_scale
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
@@ -282,14 +284,12 @@ def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tu
     scale = starter.scale(t, x)
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(t, x) * scale[starter.columns])
-    size = np.abs(full).max(axis=1, initial=0.0)
-    full = (full / np.where(size > 0.0, size, 1.0)[:, None])[starter.every]
+    (full,) = equilibrated(full[starter.every])
     carries = ~starter.following(t, x) & free
     follows = free & ~carries
     if not carries.any():
         return 0, ()
-    inner = np.linalg.matrix_rank(full[:, follows], tol=1e-9) if follows.any() else 0
-    missing = int(carries.sum()) - (int(np.linalg.matrix_rank(full[:, free], tol=1e-9)) - int(inner))
+    missing = int(carries.sum()) - (rank(full[:, free]) - rank(full[:, follows]))
     names = tuple(starter.system.name(int(k)) for k in np.flatnonzero(carries)) if missing > 0 else ()
     return missing, names
 

@@ -19,6 +19,7 @@ from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.scales import alike, group_maximum, propagate
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem
+from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.settled import rates_of
 
 Mask = NDArray[np.bool_]
@@ -201,8 +202,8 @@ class Starter:
         if not np.isfinite(matrix).all():
             return None
         size = np.abs(matrix).max(axis=0)
-        left, sigma, _ = np.linalg.svd(matrix / np.where(size > 0.0, size, 1.0))
-        weights = left[:, int((sigma > 1e-10 * sigma.max(initial=0.0)).sum()) :].T
+        left, sigma, _ = decomposed(matrix / np.where(size > 0.0, size, 1.0))
+        weights = left[:, count(sigma) :].T
         if not weights.size:
             return None
         number = np.full(self.settled.rows, -1, dtype=np.int64)

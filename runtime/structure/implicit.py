@@ -11,6 +11,8 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.rank import decomposed
 from sysdyn.runtime.start.start import ConsistentState
 
 NUDGES = (1e-3, 1e-6, 1e-9)
@@ -66,7 +68,4 @@ def _matrix(system: System, t: float, y: Floats, yd: Floats) -> Floats:
 
 def _conditions(matrices: list[Floats]) -> list[float]:
     """The smallest singular value of each, rows and columns scaled alike."""
-    for axis in (1, 0):
-        size = np.max([np.abs(m).max(axis=axis, keepdims=True, initial=0.0) for m in matrices], axis=0)
-        matrices = [m / np.where(size > 0.0, size, 1.0) for m in matrices]
-    return [float(np.linalg.svd(m, compute_uv=False)[-1]) for m in matrices]
+    return [float(decomposed(m)[1][-1]) for m in equilibrated(*matrices)]

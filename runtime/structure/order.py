@@ -12,13 +12,13 @@ from collections.abc import Set as AbstractSet
 import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.rank import TOLERANCE, decomposed, null_space
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 
 DENSE = 600
 """Unknowns and rates up to which the null space is taken."""
-RANK = 1e-9
-SWEEPS = 10
 
 
 def order_and_manifold(system: System, state: ConsistentState, tangible: AbstractSet[str]) -> tuple[int, int] | None:
@@ -32,10 +32,8 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
         return None
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
-    full = _balanced(full[~starter.groups("initial")])
-    _, sigma, vectors = np.linalg.svd(full)
-    rank = int((sigma > RANK * sigma.max(initial=RANK)).sum())
-    tangent = vectors[rank:].T  # [unknowns and rates, freedoms]
+    (full,) = equilibrated(full[~starter.groups("initial")])
+    tangent = null_space(full)  # [unknowns and rates, freedoms]
     kinds = system.kinds[: starter.n]
     _, jyd = system.jacobian(state.t, state.y, state.yd)
     moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd)[: starter.n])
@@ -44,17 +42,6 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     return _rank(tangent[: starter.n][content]), _rank(tangent[: starter.n][moving])
 
 
-def _balanced(matrix: Floats) -> Floats:
-    """Rows and columns of largest entry about one (Ruiz 2001)."""
-    for _ in range(SWEEPS):
-        for axis in (1, 0):
-            size = np.sqrt(np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0))
-            matrix = matrix / np.where(size > 0.0, size, 1.0)
-    return matrix
-
-
 def _rank(part: Floats) -> int:
-    if not part.size:
-        return 0
-    sigma = np.linalg.svd(part, compute_uv=False)
-    return int((sigma > RANK).sum())
+    """Rank of some rows of orthonormal columns: their size is known, so what is small beside one is zero."""
+    return int((decomposed(part)[1] > TOLERANCE).sum()) if part.size else 0

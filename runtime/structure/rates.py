@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import factors
+from sysdyn.runtime.numerics.rank import TOLERANCE, null_space
 from sysdyn.runtime.start.start import ConsistentState
 
 LARGE = 400
 """Unknowns coupled by their derivatives: of more all count as determined, the null space would cost too much."""
-RANK = 1e-10
-"""Of the largest singular value of the scaled coupling."""
 MOVED = 1e-3
 """Relative move of the start: a coefficient that vanishes there by chance does not vanish beside it."""
 
@@ -41,11 +41,10 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     rows, where = np.unique(row[left], return_inverse=True)
     matrix = np.zeros((rows.size, columns.size))
     matrix[where, at] = jyd[jyd != 0.0][left]
-    matrix /= np.max(np.abs(matrix), axis=1, keepdims=True)
-    size = np.max(np.abs(matrix), axis=0)
-    _, values, vectors = np.linalg.svd(matrix / size)
-    null = vectors[np.count_nonzero(values > RANK * values[0]) :] / size
-    found[columns[np.any(np.abs(null) > np.sqrt(RANK) * np.max(np.abs(null), initial=0.0), axis=0)]] = False
+    by_row, by_column = factors(matrix)
+    null = null_space(by_row[:, None] * matrix * by_column) * by_column[:, None]
+    moves = np.abs(null) > np.sqrt(TOLERANCE) * np.max(np.abs(null), initial=0.0)
+    found[columns[np.any(moves, axis=1)]] = False
     return found
 
 

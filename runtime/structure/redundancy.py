@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import solve
+from sysdyn.runtime.numerics.rank import TOLERANCE, least_squares
 from sysdyn.runtime.start.start import EXACT, ConsistentState
 from sysdyn.runtime.start.starter import Starter, weighted
 
 Longs = NDArray[np.int64]
 DENSE = 300
 """Constraints up to which matrices are full."""
-RANK = 1e-9
-"""A row whose part outside the rows before it is smaller than this part of it depends on them."""
 NOISE = 1e-11
 """Entries below this part of the largest of their row are what is left of a zero."""
 POINTS = 3
@@ -91,7 +90,8 @@ def dependent(found: Reactions) -> Ints:
         rest = row
         for _ in range(2):  # twice is enough (Kahan)
             rest = rest - basis.T @ (basis @ rest)
-        if float(np.linalg.norm(rest)) <= RANK * size or size == 0.0:
+        # a row depends on those kept before it where next to nothing of it lies outside them
+        if float(np.linalg.norm(rest)) <= TOLERANCE * size or size == 0.0:
             left.append(k)
         else:
             basis = np.vstack([basis, rest / np.linalg.norm(rest)])
@@ -151,7 +151,7 @@ def combination(found: Reactions, left: Ints) -> Floats:
     np.add.at(rows, (found.which, found.place), found.value)
     last = int(left[0])
     weights = np.zeros(m)
-    weights[:last] = -np.linalg.lstsq(rows[:last].T, rows[last], rcond=RANK)[0]
+    weights[:last] = -least_squares(rows[:last].T, rows[last])
     weights[last] = 1.0
     weights *= found.scale
     weights /= weights[np.argmax(np.abs(weights))]

@@ -15,13 +15,13 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
+from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions
 
 DENSE = 300
 MAX_INDEX = 6
-RANK = 1e-9
-"""Singular values of equilibrated matrices below this part of the largest count as zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,19 +47,6 @@ class Structure:
     left_out: tuple[tuple[int, int], ...] = ()
 
 
-def _equilibrate(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Rows and columns of the pair scaled so that the larger of both is near 1 everywhere (Ruiz 2001)."""
-    a, b = a.copy(), b.copy()
-    for _ in range(8):
-        for axis in (1, 0):
-            size = np.maximum(np.abs(a).max(axis=axis, initial=0.0), np.abs(b).max(axis=axis, initial=0.0))
-            root = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
-            scale = root[:, None] if axis == 1 else root[None, :]
-            a *= scale
-            b *= scale
-    return a, b
-
-
 def _rows_to_one(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     size = np.maximum(np.abs(a).max(axis=1, initial=0.0), np.abs(b).max(axis=1, initial=0.0))
     size = np.where(size > 0.0, size, 1.0)[:, None]
@@ -68,11 +55,11 @@ def _rows_to_one(a: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 def pencil_index(e: Floats, b: Floats) -> int | None:
     """Index of e x' + b x = 0 [n, n]; None where the pencil is singular (or the index above MAX_INDEX)."""
-    e, b = _equilibrate(e, b)
+    e, b = equilibrated(e, b)
     n = e.shape[0]
     for index in range(MAX_INDEX + 1):
-        u, sigma, _ = np.linalg.svd(e)
-        rank = int((sigma > RANK * max(sigma.max(initial=0.0), RANK)).sum())
+        u, sigma, _ = decomposed(e)
+        rank = count(sigma) if sigma.max(initial=0.0) > TOLERANCE else 0
         if rank == n:
             return index
         top, bottom = u[:, :rank].T, u[:, rank:].T
@@ -85,11 +72,11 @@ def pencil_index(e: Floats, b: Floats) -> int | None:
 
 def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...], int]:
     """Unknowns in the null vector of dF/dy + cj dF/dyd at a generic cj, () where it is regular; its row."""
-    e, b = _equilibrate(system.dense(jyd), system.dense(jy))
-    u, sigma, vt = np.linalg.svd(b + 0.7310585786300049 * e)
-    if sigma.size == 0 or sigma[-1] > 1e-12 * sigma[0]:
+    e, b = equilibrated(system.dense(jyd), system.dense(jy))
+    u, sigma, vt = decomposed(b + 0.7310585786300049 * e)
+    if count(sigma, CERTAIN) == sigma.size:
         return (), -1
-    null = np.abs(vt[sigma <= 1e-12 * sigma[0]]).max(axis=0)
+    null = np.abs(vt[count(sigma, CERTAIN) :]).max(axis=0)
     names = tuple(system.name(int(k)) for k in np.flatnonzero(null > 1e-6 * null.max()))
     return names, int(np.argmax(np.abs(u[:, -1])))
 
@@ -102,12 +89,7 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     pattern = system.pattern
     shape = (pattern.rows, pattern.unknowns)
     columns = pattern.columns_of()
-    row, column = np.ones(pattern.rows), np.ones(pattern.unknowns)
-    for _ in range(8):
-        for places, scale in ((pattern.row, row), (columns, column)):
-            size = np.zeros(scale.size)
-            np.maximum.at(size, places, (np.abs(jy) + np.abs(jyd)) * row[pattern.row] * column[columns])
-            scale *= 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+    row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), shape)
     scale = row[pattern.row] * column[columns]
     b = np.random.default_rng(3).standard_normal((pattern.rows, 4))
     sizes = []

@@ -1,0 +1,65 @@
+"""One decision of rank: which singular values of an equilibrated matrix count as zero.
+
+A Jacobian of a model in SI units mixes nano-farads and mega-pascals.  Scaled so that the largest entry of every row
+and column is near one (`equilibrate`), what is left of an exact zero is round-off of the entries' own computation and
+of the factorisation: 1e-16, times the dimension, times the growth where entries are differences.  TOLERANCE stands well
+above that, and below the conditioning of a model that a double can be trusted with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+
+TOLERANCE = 1e-9
+"""Singular values below this part of the largest count as zero."""
+CERTAIN = 1e-12
+"""The same where a model is refused for it: what is above may be a true, if bad, conditioning."""
+
+
+class NotFiniteError(ArithmeticError):
+    """A matrix holds what is no number: nothing can be said of its rank."""
+
+
+def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
+    """U [m, m], singular values [min(m, n)] (falling), v^T [n, n] of a matrix [m, n].  NotFiniteError."""
+    if not np.isfinite(matrix).all():
+        raise NotFiniteError
+    try:
+        u, sigma, vt = np.linalg.svd(matrix)
+    except np.linalg.LinAlgError:  # LAPACK's fast algorithm gives up on a few finite matrices
+        from scipy.linalg import svd
+
+        u, sigma, vt = svd(matrix, lapack_driver="gesvd")
+    return u, sigma, vt
+
+
+def count(sigma: Floats, smallest: float = TOLERANCE) -> int:
+    """How many singular values [k] are not zero: above `smallest` of the largest."""
+    return int((sigma > smallest * sigma.max(initial=0.0)).sum())
+
+
+def rank(matrix: Floats) -> int:
+    """Rank of an equilibrated matrix.  NotFiniteError."""
+    return count(decomposed(matrix)[1]) if matrix.size else 0
+
+
+def null_space(matrix: Floats) -> Floats:
+    """Orthonormal columns [n, n - rank] that an equilibrated matrix [m, n] maps to zero.  NotFiniteError."""
+    _, sigma, vt = decomposed(matrix)
+    return np.asarray(vt[count(sigma) :].T)
+
+
+def least_squares(matrix: Floats, aim: Floats, smallest: float = TOLERANCE) -> Floats:
+    """The x [n] of least norm with the least |A x - aim|; singular values below `smallest` of the largest are zero.
+
+    NotFiniteError.
+    """
+    if not (np.isfinite(matrix).all() and np.isfinite(aim).all()):
+        raise NotFiniteError
+    try:
+        return np.asarray(np.linalg.lstsq(matrix, aim, rcond=smallest)[0], dtype=np.float64)
+    except np.linalg.LinAlgError:
+        u, sigma, vt = decomposed(matrix)
+        k = count(sigma, smallest)
+        return np.asarray(vt[:k].T @ ((u[:, :k].T @ aim) / sigma[:k]))

@@ -1,0 +1,103 @@
+"""Rank, null space, least squares and equilibration against closed forms."""
+
+import numpy as np
+import pytest
+from sysdyn.runtime.numerics.equilibrate import equilibrated, factors, sparse_factors
+from sysdyn.runtime.numerics.rank import TOLERANCE, NotFiniteError, count, decomposed, least_squares, null_space, rank
+
+
+def orthogonal(random, n):
+    return np.linalg.qr(random.standard_normal((n, n)))[0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_rank_of_a_product_is_that_of_its_factors_in_any_units(seed):
+    """A [m, r] B [r, n] of random factors has rank r, also where rows and columns are in units from 1e-9 to 1e9."""
+    random = np.random.default_rng(seed)
+    m, n = random.integers(2, 12, 2)
+    r = int(random.integers(1, min(m, n) + 1))
+    matrix = random.standard_normal((m, r)) @ random.standard_normal((r, n))
+    rows, columns = 10.0 ** random.uniform(-9, 9, m), 10.0 ** random.uniform(-9, 9, n)
+    (scaled,) = equilibrated(rows[:, None] * matrix * columns)
+    assert rank(scaled) == r
+    null = null_space(scaled)
+    assert null.shape == (n, n - r)
+    assert np.abs(scaled @ null).max(initial=0.0) < 1e-13
+    assert np.abs(null.T @ null - np.eye(n - r)).max(initial=0.0) < 1e-13
+
+
+def test_what_counts_as_zero_lies_between_round_off_and_bad_conditioning():
+    random = np.random.default_rng(1)
+    u, v = orthogonal(random, 6), orthogonal(random, 6)
+    for small, found in ((1e-7, 6), (2 * TOLERANCE, 6), (0.5 * TOLERANCE, 5), (1e-13, 5), (0.0, 5)):
+        assert rank(u @ np.diag([1.0, 1.0, 0.5, 0.1, 0.01, small]) @ v) == found
+    assert rank(np.zeros((3, 4))) == 0
+    assert rank(np.zeros((0, 4))) == 0
+    assert count(np.zeros(0)) == 0
+
+
+def test_factors_do_not_see_the_units():
+    """A matrix in other units is scaled to the same one; the largest entry of each line is near one."""
+    random = np.random.default_rng(2)
+    matrix = random.standard_normal((7, 5)) * (random.random((7, 5)) < 0.6)
+    matrix[3] = 0.0
+    (plain,) = equilibrated(matrix)
+    other = 10.0 ** random.uniform(-30, 30, 7)[:, None] * matrix * 10.0 ** random.uniform(-30, 30, 5)
+    (scaled,) = equilibrated(other)
+    for found in (plain, scaled):
+        assert np.abs(np.log10(np.abs(found).max(axis=1)[[0, 1, 2, 4, 5, 6]])).max() < 0.3
+        assert np.abs(np.log10(np.abs(found).max(axis=0))).max() < 0.3
+    assert not scaled[3].any()
+
+
+def test_a_pair_keeps_its_pencil():
+    """Both matrices of a pencil take the same factors: their generalised eigenvalues stay."""
+    a, b = np.diag([1e6, 2e-6]), np.diag([2e6, 1e-6])
+    one, two = equilibrated(a, b)
+    assert np.sort(np.diag(one) / np.diag(two)) == pytest.approx([0.5, 2.0], rel=1e-14)
+    row, column = factors(a, b)
+    assert np.abs(row[:, None] * a * column - one).max() < 1e-15
+
+
+def test_entries_and_full_matrices_take_the_same_factors():
+    random = np.random.default_rng(4)
+    matrix = random.standard_normal((9, 9)) * 10.0 ** random.uniform(-9, 9, (9, 9)) * (random.random((9, 9)) < 0.5)
+    i, j = np.nonzero(matrix)
+    row, column = sparse_factors(i, j, np.abs(matrix[i, j]), matrix.shape)
+    full_row, full_column = factors(matrix)
+    assert row == pytest.approx(full_row, rel=1e-12)
+    assert column == pytest.approx(full_column, rel=1e-12)
+
+
+def test_least_squares_is_the_pseudo_inverse():
+    """x = V S^+ U^T b of a matrix whose singular values are known, one of them zero."""
+    random = np.random.default_rng(5)
+    u, v = orthogonal(random, 5), orthogonal(random, 4)
+    sigma = np.array([3.0, 1.0, 0.1, 0.0])
+    matrix = (u[:, :4] * sigma) @ v.T
+    aim = random.standard_normal(5)
+    exact = v[:, :3] @ ((u[:, :3].T @ aim) / sigma[:3])
+    assert least_squares(matrix, aim) == pytest.approx(exact, rel=1e-13)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_no_number_has_no_rank(bad, capfd):
+    matrix = np.eye(3)
+    matrix[1, 2] = bad
+    for ask in (lambda: rank(matrix), lambda: decomposed(matrix), lambda: least_squares(matrix, np.ones(3))):
+        with pytest.raises(NotFiniteError):
+            ask()
+    with pytest.raises(NotFiniteError):
+        least_squares(np.eye(3), matrix[1])
+    assert capfd.readouterr() == ("", ""), "LAPACK prints nothing"
+
+
+def test_where_the_fast_algorithm_gives_up_the_slow_one_answers(monkeypatch):
+    def gives_up(*_, **__):
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(np.linalg, "svd", gives_up)
+    monkeypatch.setattr(np.linalg, "lstsq", gives_up)
+    matrix = np.array([[2.0, 0.0], [0.0, 1e-12]])
+    assert rank(matrix) == 1
+    assert least_squares(matrix, np.array([4.0, 1.0])) == pytest.approx([2.0, 0.0])
