@@ -37,7 +37,8 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     kinds = system.kinds[: starter.n]
     _, jyd = system.jacobian(state.t, state.y, state.yd)
     moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd)[: starter.n])
-    owners = np.array([system.description.families[int(k)].owner in tangible for k in system.family_of[: starter.n]])
+    families = system.description.families
+    owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: starter.n]], dtype=bool)
     content = moving & ((kinds != "q") | owners)
     return _rank(tangent[: starter.n][content]), _rank(tangent[: starter.n][moving])
 
