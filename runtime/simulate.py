@@ -79,9 +79,11 @@ def _controlled(runs: Runs, options: Options) -> tuple[Achieved | None, tuple[st
     achieved = _chosen(runs, options) if options.method == "auto" else _achieved(runs, options)
     if achieved.met:
         return achieved, ()
+    estimate = "no estimate of the error"
+    if achieved.error_estimate is not None:
+        estimate = f"estimated error {achieved.error_estimate:.1e}"
     return achieved, (
-        f"the accuracy asked for was not reached: estimated error {achieved.error_estimate:.1e} "
-        f"at the finest tolerance {achieved.tolerance:.0e}",
+        f"the accuracy asked for was not reached: {estimate} at the finest tolerance {achieved.tolerance:.0e}",
     )
 
 
