@@ -1,0 +1,108 @@
+"""Before the first step: do the rows of the compiled module say what the text says?
+
+The module's blocks are compared with the interpreted nodes at the start and at points nearby (families by sample).  It
+is there for faults of the generation, of the C compiler and of a damaged cache: those that conserve energy too.
+Received: a prepared model and its start; raises ModuleFault.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.starting import Started
+from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
+from sysdyn.compiler.forms.descriptor import Block
+from sysdyn.runtime.model.scales import magnitudes
+from sysdyn.runtime.model.system import System
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""Difference allowed, of the terms of a row: sums are ordered apart, and functions differ in their last digits."""
+CANCELLED = 1e-12
+"""Difference allowed, of the largest terms among rows of the block that have the same unit."""
+NEARBY = (1e-2, 0.3)
+"""Distances of the points from the start, of the unknowns' magnitudes."""
+
+
+class ModuleFault(Exception):  # noqa: N818 (a fault in sysdyn, exit 4)
+    """The compiled module does not say what the text says; the message names the row."""
+
+
+def check_module(prepared: Prepared, started: Started, until: float) -> None:
+    """Compare every block at the start and nearby, up to `until` [s].  Raises ModuleFault."""
+    system = started.system
+    oracle = SampledRows(prepared.compiled.form, prepared.binding)
+    points = _points(system, started, oracle, until)
+    for block in prepared.compiled.form.blocks:
+        sample = oracle.sample(block, points)
+        module = _module_rows(system, oracle, block, points)[:, sample.rows]
+        # terms may themselves be differences that cancel: rounding of the like beside them is no difference
+        allowed = ROUNDING * sample.size + CANCELLED * _largest_alike(prepared, oracle, sample)
+        with np.errstate(invalid="ignore"):
+            apart = np.abs(module - sample.value)
+        both = ~np.isfinite(module) & ~np.isfinite(sample.value)  # a point outside the range of a root
+        wrong = ~both & ~(apart <= allowed)
+        if wrong.any():
+            k, row = np.argwhere(wrong)[0]
+            raise ModuleFault(_told(prepared, oracle, block, int(sample.rows[row]), module[k, row], sample.value[k, row]))
+
+
+def _largest_alike(prepared: Prepared, oracle: SampledRows, sample: Sample) -> Array:
+    """The largest finite size of the rows of the same unit [points, rows]."""
+    families = np.searchsorted(oracle.to, sample.rows, side="right") - 1
+    units = np.array([prepared.compiled.form.rows[k].unit for k in families])
+    size = np.where(np.isfinite(sample.size), sample.size, 0.0)
+    found = np.zeros_like(size)
+    for unit in np.unique(units):
+        own = units == unit
+        found[:, own] = size[:, own].max(axis=1, initial=0.0)[:, None]
+    return found
+
+
+def _points(system: System, started: Started, oracle: SampledRows, until: float) -> Points:
+    """The start, and points at which nothing vanishes by chance."""
+    t0 = started.state.t
+    y, yd = started.state.for_form(system)
+    scale, time = magnitudes(system, t0, until, y, yd)
+    random = np.random.default_rng(20260220)
+    order = _order(system, oracle)
+    number = 1 + len(NEARBY)
+    points = Points(np.full(number, t0), np.zeros((number, order.size)), np.zeros((number, order.size)))
+    extended = [np.concatenate([x, np.zeros(order.size - x.size)]) for x in (y, yd)]
+    sizes = [np.concatenate([x, np.ones(order.size - x.size)]) for x in (scale, scale / max(time, 1e-300))]
+    for k, distance in enumerate((0.0, *NEARBY)):
+        points.t[k] += distance * (until - t0) * (0.5 + 0.5 * random.random())
+        for target, x, size in zip((points.y, points.yd), extended, sizes, strict=True):
+            away = random.uniform(0.5, 1.5, x.size) * random.choice((-1.0, 1.0), x.size)
+            target[k] = (x + distance * size * away)[order]
+    return points
+
+
+def _order(system: System, oracle: SampledRows) -> NDArray[np.intp]:
+    """Places in the system's y of the unknowns in the order of the form's families."""
+    families = system.description.families
+    parts = [system.form.at[k] + np.arange(f.size) for k, f in enumerate(families)]
+    return np.concatenate([*parts, np.zeros(0, dtype=np.intp)]).astype(np.intp)
+
+
+def _module_rows(system: System, oracle: SampledRows, block: Block, points: Points) -> Array:
+    """The block's rows [points, rows] by the carrier, in the order of the form's row families."""
+    number = int(oracle.to[-1])
+    return np.stack(
+        [
+            system.rows_at(block.name, oracle.at[:-1], oracle.to[:-1], number, t, y, yd)
+            for t, y, yd in zip(points.t, points.y, points.yd, strict=True)
+        ]
+    )
+
+
+def _told(prepared: Prepared, oracle: SampledRows, block: Block, place: int, module: float, text: float) -> str:
+    family = int(np.searchsorted(oracle.to, place, side="right")) - 1
+    row = prepared.compiled.form.rows[family]
+    where = f", {row.place.file}:{row.place.start[0]}" if row.place else ""
+    return (
+        f"the compiled module ({prepared.backend}) does not say what the text says: {block.name} of {row.label}{where} is "
+        f"{module:.9g}, interpreted {text:.9g}; --backend {'numpy' if prepared.backend == 'c' else 'c'}, and an empty cache"
+    )
