@@ -73,15 +73,14 @@ def classify(error: BaseException) -> tuple[int, str]:
         return SOLVER, "there is no memory left"
     if type(error).__name__ == "TraceError":
         return INPUT_OUTPUT, str(error)
-    where = _where(error)
-    text = f"a fault in sysdyn{where}: {type(error).__name__}: {error}"
-    return FAULT, f"{text} (SYSDYN_DEBUG=1 shows the way there; please report it with the model)"
+    how = f"{_where(error)}SYSDYN_DEBUG=1 shows the way there; please report it with the model"
+    return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} ({how})"
 
 
 def _where(error: BaseException) -> str:
     """The innermost line on the way to an exception."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith("<")]
-    return f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
+    return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}; " if frames else ""
 
 
 def shown(message: str) -> str:

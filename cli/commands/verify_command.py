@@ -119,7 +119,10 @@ def _warnings(found: Verified) -> list[str]:
     """Warnings of the runs, each once with the runs that have it."""
     names: dict[str, list[str]] = {}
     for run in (*found.runs, found.finer):
-        for text in run.outcome.warnings:
+        judgement = run.outcome.judgement
+        unmet = "the accuracy asked for was not reached by its own estimate"
+        inaccurate = [unmet for m in judgement.not_met if m.what == "accuracy"] if judgement else []
+        for text in (*run.outcome.warnings, *inaccurate):
             names.setdefault(text, []).append(run.name)
     return [f"{', '.join(dict.fromkeys(runs))}: {text}" for text, runs in names.items()]
 

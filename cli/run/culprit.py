@@ -41,7 +41,7 @@ def culprit(prepared: Prepared, error: SolverFailure) -> Culprit | None:
     for ahead in (*(s * error.step for s in STEPS), *(a * max(abs(t), error.step) for a in AHEAD)):
         point = t + ahead, y + ahead * rates, yd
         for block in blocks:
-            found = oracle.undefined(block.name, *point)
+            found = oracle.undefined(block.name, *point, infinite=error.cause == "nonfinite")
             if found is not None:
                 return _told(prepared, *found)
     return None

@@ -46,7 +46,8 @@ def check_module(prepared: Prepared, started: Started, until: float) -> None:
         wrong = ~both & ~(apart <= allowed)
         if wrong.any():
             k, row = np.argwhere(wrong)[0]
-            raise ModuleFault(_told(prepared, oracle, block, int(sample.rows[row]), module[k, row], sample.value[k, row]))
+            place, values = int(sample.rows[row]), (float(module[k, row]), float(sample.value[k, row]))
+            raise ModuleFault(_told(prepared, oracle, block, place, values))
 
 
 def _largest_alike(prepared: Prepared, oracle: SampledRows, sample: Sample) -> Array:
@@ -98,11 +99,12 @@ def _module_rows(system: System, oracle: SampledRows, block: Block, points: Poin
     )
 
 
-def _told(prepared: Prepared, oracle: SampledRows, block: Block, place: int, module: float, text: float) -> str:
+def _told(prepared: Prepared, oracle: SampledRows, block: Block, place: int, values: tuple[float, float]) -> str:
     family = int(np.searchsorted(oracle.to, place, side="right")) - 1
     row = prepared.compiled.form.rows[family]
     where = f", {row.place.file}:{row.place.start[0]}" if row.place else ""
+    other = "numpy" if prepared.backend == "c" else "c"
     return (
-        f"the compiled module ({prepared.backend}) does not say what the text says: {block.name} of {row.label}{where} is "
-        f"{module:.9g}, interpreted {text:.9g}; --backend {'numpy' if prepared.backend == 'c' else 'c'}, and an empty cache"
+        f"the compiled module ({prepared.backend}) does not say what the text says: {block.name} of {row.label}{where} "
+        f"is {values[0]:.9g}, interpreted {values[1]:.9g}; --backend {other}, and an empty cache"
     )

@@ -58,9 +58,11 @@ class Oracle:
                     np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), np.abs(c * values))
         return r
 
-    def undefined(self, block: str, t: float, y: Array, yd: Array) -> tuple[int, Node, list[float]] | None:
+    def undefined(
+        self, block: str, t: float, y: Array, yd: Array, *, infinite: bool = True
+    ) -> tuple[int, Node, list[float]] | None:
         """(row family, node, its arguments) of the first operation that makes of numbers what is none; None: there is
-        none in the block.
+        none in the block.  infinite: what overflows counts too.
         """
         point = (t, y, yd)
         for kernel in self._kernels(block):
@@ -74,7 +76,8 @@ class Oracle:
                 rest = iter(values[len(nodes) :])
                 for node, value in zip(nodes, values[: len(nodes)], strict=True):
                     arguments = [next(rest) for _ in node.args]
-                    bad = np.flatnonzero(~np.isfinite(value) & np.all([np.isfinite(a) for a in arguments], axis=0))
+                    wrong = ~np.isfinite(value) if infinite else np.isnan(value)
+                    bad = np.flatnonzero(wrong & np.all([np.isfinite(a) for a in arguments], axis=0))
                     if bad.size:
                         return summand.row, node, [float(a[bad[0]]) for a in arguments]
         return None

@@ -27,6 +27,7 @@ from sysdyn.dsl.model.expression import (
     const,
     derivative,
     differential,
+    is_const,
     mul,
     neg,
     rate,
@@ -92,8 +93,11 @@ def _add_ledger(
 
 
 def _of_one_rate(element: Element, model: EnergyModel) -> bool:
-    """Whether it is the kinetic energy of one rate: its sign is that of an inertia."""
-    return element.account == "kinetic" and len(local_variables(element.expression, model.mirror.rate)) == 1
+    """Whether it is the kinetic energy of one rate, and of nothing else that moves: its sign is that of an inertia."""
+    rates = local_variables(element.expression, model.mirror.rate)
+    if element.account != "kinetic" or len(rates) != 1:
+        return False
+    return is_const(substitute(element.expression, {rates[0]: const(0.0)}), 0.0)
 
 
 def _entries(model: EnergyModel) -> Iterator[Entry]:
