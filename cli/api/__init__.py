@@ -76,7 +76,9 @@ def compile_model(
     report.raise_if_failed()
     assert target is not None
     with ex.fresh():
-        network = load.network(target.document, target.model, target.scene, report, required=target.scene is not None)
+        inner = Report()
+        network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
+        report.extend(inner if network else targets.unsupported(inner))
         wanted = None if formulation == "auto" else formulation
         prepared = None if network is None else prepare(network, report, formulation=wanted, backend=backend)
         if prepared is None:

@@ -1,6 +1,8 @@
 """A run judges itself: what it could not keep is exit 3, and the trace says so (CONTRACT, Met)."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -205,3 +207,66 @@ def test_strict_refuses_what_cannot_be_run_yet(tmp_path, capsys):
     assert run(["check", str(path), "--strict"]) == 1
     assert "E608" in capsys.readouterr().err
     assert run(["check", str(path), "--strict", "--allow-unsupported"]) == 0
+
+
+def test_a_value_error_inside_is_a_fault_and_no_wrong_usage(duffing, tmp_path, capsys, monkeypatch):
+    def broken(*_, **__):
+        raise ValueError("operands could not be broadcast together")
+
+    monkeypatch.setattr("sysdyn.runtime.integrate.runs.Runs.run", broken)
+    assert run(["simulate", str(duffing), "-o", str(tmp_path / "out.h5"), "--quiet"]) == 4
+    said = capsys.readouterr().err
+    assert "a fault in sysdyn: ValueError: operands" in said
+    assert "test_met.py:" in said
+
+
+def test_a_module_that_is_not_the_text_is_exit_4_though_it_conserves_energy(duffing, tmp_path, capsys, monkeypatch):
+    from sysdyn.compiler import pipeline
+
+    plain = pipeline.emit_c
+
+    def wrong(program, form):
+        # another spring, in the rows and in the audit alike: its energy is conserved
+        return plain(program, form).replace("40.0", "44.0").replace("160.0", "176.0")
+
+    monkeypatch.setattr(pipeline, "emit_c", wrong)
+    assert run(["simulate", str(duffing), "-o", str(tmp_path / "out.h5")]) == 4
+    assert "does not say what the text says: dynamics of x" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("redirection", "arguments"), [(">/dev/full", "--json"), (">&-", "--json"), ("2>&-", "")])
+def test_a_stream_that_takes_nothing_is_exit_5(duffing, tmp_path, redirection, arguments):
+    out = tmp_path / "out.h5"
+    command = f"{sys.executable} -m sysdyn.cli simulate {duffing} -o {out} {arguments} {redirection}"
+    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert ran.returncode == 5
+    assert "Traceback" not in ran.stderr + ran.stdout
+
+
+def test_independent_parts_have_ledgers_of_their_own(tmp_path, capsys):
+    """What is lost in a small part is not hidden by a large one."""
+    path = tmp_path / "two.sd"
+    path.write_text(
+        """
+model two {
+  coord x: translation = 1 m
+  coord y: translation = 1 mm
+  energy T* = 1/2*(1e6 kg)*x'^2
+  energy V = 1/2*(1e6 N/m)*x^2
+  energy T* = 1/2*(1e-6 kg)*y'^2
+  energy V = 1/2*(1e-6*400 N/m)*y^2
+  init x' = 0 m/s
+  init y' = 0 m/s
+}
+scene s of two {
+  time 0 s to 30 s
+  trace x
+}
+"""
+    )
+    code, found, _ = simulated(path, tmp_path, capsys, "--method", "bdf", "--rtol", "1e-5", "--atol", "1e-3")
+    with h5py.File(tmp_path / "out.h5") as trace:
+        # in all, nothing is amiss
+        assert np.abs(trace["audit/energy"][:]).max() < 0.1 * 5e5
+    assert code == 3
+    assert [m["element"] for m in found["result"]["not_met"]] == ["y"]
