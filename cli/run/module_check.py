@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Difference allowed, of the terms of a row: sums are ordered apart, and functions differ in their last digits."""
-CANCELLED = 1e-12
-"""Difference allowed, of the largest terms among rows of the block that have the same unit."""
 NEARBY = (1e-2, 0.3)
 """Distances of the points from the start, of the unknowns' magnitudes."""
 
@@ -37,29 +35,25 @@ def check_module(prepared: Prepared, started: Started, until: float) -> None:
     points = _points(system, started, oracle, until)
     for block in prepared.compiled.form.blocks:
         sample = oracle.sample(block, points)
-        module = _module_rows(system, oracle, block, points)[:, sample.rows]
-        # terms may themselves be differences that cancel: rounding of the like beside them is no difference
-        allowed = ROUNDING * sample.size + CANCELLED * _largest_alike(prepared, oracle, sample)
-        with np.errstate(invalid="ignore"):
-            apart = np.abs(module - sample.value)
-        both = ~np.isfinite(module) & ~np.isfinite(sample.value)  # a point outside the range of a root
-        wrong = ~both & ~(apart <= allowed)
+        module = _module_rows(system, oracle, block, points)
+        wrong = _apart(module, sample)
+        if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
+            sample = oracle.sample(block, points, careful=True)
+            wrong = _apart(module, sample)
         if wrong.any():
             k, row = np.argwhere(wrong)[0]
-            place, values = int(sample.rows[row]), (float(module[k, row]), float(sample.value[k, row]))
+            place = int(sample.rows[row])
+            values = float(module[k, place]), float(sample.value[k, row])
             raise ModuleFault(_told(prepared, oracle, block, place, values))
 
 
-def _largest_alike(prepared: Prepared, oracle: SampledRows, sample: Sample) -> Array:
-    """The largest finite size of the rows of the same unit [points, rows]."""
-    families = np.searchsorted(oracle.to, sample.rows, side="right") - 1
-    units = np.array([prepared.compiled.form.rows[k].unit for k in families])
-    size = np.where(np.isfinite(sample.size), sample.size, 0.0)
-    found = np.zeros_like(size)
-    for unit in np.unique(units):
-        own = units == unit
-        found[:, own] = size[:, own].max(axis=1, initial=0.0)[:, None]
-    return found
+def _apart(module: Array, sample: Sample) -> NDArray[np.bool_]:
+    """Where both differ by more than rounding [points, rows of the sample]."""
+    found = module[:, sample.rows]
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(found - sample.value)
+    both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
+    return ~both & ~(apart <= ROUNDING * sample.size)
 
 
 def _points(system: System, started: Started, oracle: SampledRows, until: float) -> Points:

@@ -16,6 +16,7 @@ from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.places import starts
 from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel
 from sysdyn.compiler.model.interpret import Value, evaluate, grid
+from sysdyn.compiler.model.magnitudes import magnitudes
 from sysdyn.compiler.model.parameters import Extents, positions
 from sysdyn.compiler.model.terms import has_reduction
 from sysdyn.dsl.model.expression import Node, const, topological
@@ -62,14 +63,14 @@ class SampledRows:
             for (_, first, count), offset in zip(binding.offsets, form.offsets, strict=True)
         }
 
-    def sample(self, block: Block, points: Points) -> Sample:
-        """The rows of a block at the points."""
+    def sample(self, block: Block, points: Points, *, careful: bool = False) -> Sample:
+        """The rows of a block at the points; careful: sizes count the terms of what cancels inside of terms, too."""
         places = [self._places(kernel) for kernel in block.kernels]
         kept = self._chosen(block, places)
         number = int(self.to[-1])
         value, size = np.zeros((points.t.size, number)), np.zeros((points.t.size, number))
         for kernel, (columns, rows) in zip(block.kernels, places, strict=True):
-            self._add(kernel, columns, rows, kept, points, value, size)
+            self._add(kernel, columns, rows, kept, points, value, size, careful)
         found = np.flatnonzero(kept)
         return Sample(found, value[:, found], size[:, found])
 
@@ -116,6 +117,7 @@ class SampledRows:
         points: Points,
         value: Array,
         size: Array,
+        careful: bool,
     ) -> None:
         """What a kernel adds to the rows kept, at all points: iterations times points in one array."""
         wanted = np.zeros(rows[0].size, dtype=bool) if rows else np.zeros(0, dtype=bool)
@@ -128,13 +130,19 @@ class SampledRows:
         inside = {name: np.tile(values[some], number) for name, values in columns.items()}
         which = np.repeat(np.arange(number), count)
         scaled = [(k, c, term) for k, s in enumerate(kernel.rows) for c, term in _terms(s.expression)]
-        found = evaluate([term for _, _, term in scaled], lambda n, a: self._leaf(n, a, inside, which, points))
-        for (k, c, _), result in zip(scaled, found, strict=True):
-            array = c * np.broadcast_to(np.asarray(result, dtype=float), number * count).reshape(number, count)
+        roots = [term for _, _, term in scaled]
+
+        def lookup(node: Node, args: list[Value]) -> Value:
+            return self._leaf(node, args, inside, which, points)
+
+        found = evaluate(roots, lookup)
+        sizes = magnitudes(roots, lookup) if careful else found
+        for (k, c, _), result, large in zip(scaled, found, sizes, strict=True):
             where = rows[k][some]
-            for p in range(number):
-                np.add.at(value[p], where, array[p])
-                np.add.at(size[p], where, np.abs(array[p]))
+            for target, array in ((value, c * np.asarray(result, dtype=float)), (size, np.abs(c * np.asarray(large)))):
+                spread = np.broadcast_to(array, number * count).reshape(number, count)
+                for p in range(number):
+                    np.add.at(target[p], where, spread[p])
 
     def _index(self, node: Node, args: list[Value], columns: dict[str, Array]) -> Value:
         if node.op == "index":
