@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
@@ -18,13 +20,28 @@ class UsageError(click.UsageError):
 
 
 def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
-    """Print what went wrong (as JSON where asked for) and return the exit code."""
+    """Print what went wrong (as JSON where asked for) and return the exit code; where that cannot be printed either,
+    the code of input and output.
+    """
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 1
     code, message = classify(error)
+    try:
+        _say(error, code, message, arguments)
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+    except OSError as other:
+        _silence()
+        with contextlib.suppress(OSError):
+            print(f"sysdyn: {classify(other)[1]}", file=sys.stderr, flush=True)
+        return code if code in (INTERRUPTED, FAULT) else INPUT_OUTPUT
+    return code
+
+
+def _say(error: BaseException, code: int, message: str, arguments: Sequence[str]) -> None:
     if type(error).__name__ == "NoArgsIsHelpError":  # `sysdyn` alone: the message is the help
         print(message, file=sys.stderr)
-        return code
+        return
     if "--json" in arguments:
         command = next((a for a in arguments if not a.startswith("-")), None)
         print(json.dumps(envelope(command, code, [plain(message, code)], {})))
@@ -36,7 +53,6 @@ def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
             print(f"try '{error.ctx.command_path} --help'", file=sys.stderr)
     if code == FAULT and os.environ.get("SYSDYN_DEBUG"):
         traceback.print_exception(error)
-    return code
 
 
 def classify(error: BaseException) -> tuple[int, str]:
@@ -57,7 +73,14 @@ def classify(error: BaseException) -> tuple[int, str]:
         return SOLVER, "there is no memory left"
     if type(error).__name__ == "TraceError":
         return INPUT_OUTPUT, str(error)
-    return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} (SYSDYN_DEBUG=1 shows where; please report it)"
+    how = f"{_where(error)}SYSDYN_DEBUG=1 shows the way there; please report it with the model"
+    return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} ({how})"
+
+
+def _where(error: BaseException) -> str:
+    """The innermost line on the way to an exception."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith("<")]
+    return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}; " if frames else ""
 
 
 def shown(message: str) -> str:

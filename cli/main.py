@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterator, Sequence
 
 import click
+from sysdyn.cli.streams import standing_streams
 
 COMMANDS = {
     "check": "Check models: everything that needs no time integration.",
@@ -77,9 +78,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    with _ended_like_an_interruption():
+    with _ended_like_an_interruption(), standing_streams():
         try:
             code = group.main(given, prog_name="sysdyn", standalone_mode=False)
+            for stream in (sys.stdout, sys.stderr):
+                stream.flush()  # what a full disk refuses is found here, not at exit
             return code if isinstance(code, int) else 0
         except BaseException as error:
             from sysdyn.cli.failures import report_failure

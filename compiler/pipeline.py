@@ -24,6 +24,7 @@ from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
+from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.network.primal import Step, primal
@@ -93,9 +94,17 @@ class CompiledModel:
 
 
 def compile_network(
-    network: Network, formulation: str = "lagrangian", backend: str = "c", *, integrating: bool = True
+    network: Network,
+    formulation: str = "lagrangian",
+    backend: str = "c",
+    *,
+    integrating: bool = True,
+    traced: bool = False,
 ) -> CompiledModel:
-    """Lower a checked network; ModelError with everything the energies' rules found."""
+    """Lower a checked network; ModelError with everything the energies' rules found.
+
+    traced: where the text traces nothing, every coordinate and every dynamic variable is.
+    """
     timings: list[Timing] = []
     reflected = formulation.startswith("co_")
     with _timed("primal", timings):
@@ -104,6 +113,9 @@ def compile_network(
         model = anchored(energies.energies(network))
         energies.verify_energies(model)
         model, notes = integrate(model) if integrating else (model, ())
+        if traced and not network.observations:
+            model, cut = with_coordinates_observed(model, network)
+            notes = (*notes, *cut)
         found = check_energies(model, network)
         if any(d.severity == "error" for d in found):
             raise ModelError(found)

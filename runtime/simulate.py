@@ -15,9 +15,10 @@ from sysdyn.runtime.integrate.accuracy import FINEST, Achieved, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
 from sysdyn.runtime.integrate.runs import LONG, Runs, Samples
 from sysdyn.runtime.integrate.underlying import obstacle
+from sysdyn.runtime.judgement import UNJUDGED, Estimate, Judgement, judge, own_tolerances
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
-from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
@@ -31,7 +32,8 @@ FINEST_RADAU = 1e-17
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What a simulation did.  statistics and timings as the trace holds them; reached [s]; error_estimate relative
-    (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0).
+    (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0);
+    judgement: of a run that ended; below_round_off: the estimate is less than double precision resolves.
     """
 
     trace: Path
@@ -47,6 +49,13 @@ class Outcome:
     samples: Samples
     warnings: tuple[str, ...]
     failure: SolverFailure | None = None
+    judgement: Judgement | None = None
+    below_round_off: bool = False
+
+    @property
+    def met(self) -> bool:
+        """The run ended as asked and met what it judged itself by."""
+        return self.final and self.judgement is not None and self.judgement.met
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -56,33 +65,35 @@ def _listed(names: tuple[str, ...]) -> str:
 
 
 def _targets(runs: Runs, options: Options) -> Floats:
-    """Accuracy wanted of each stored quantity; infinite where none is."""
-    target = np.full(len(runs.columns), np.inf if options.accuracy is None else options.accuracy)
-    names = [column.name for column in runs.columns]
+    """Accuracy wanted of each compared quantity; infinite where none is."""
+    names = list(runs.compared)
+    target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
     for name, wanted in options.accuracy_on:
         if name not in names:
-            raise ValueError(f"accuracy on '{name}': it is not traced")
+            raise WrongOption(f"accuracy on '{name}': it is not traced")
         target[names.index(name)] = wanted
     return target
 
 
-def _controlled(runs: Runs, options: Options) -> tuple[Achieved | None, tuple[str, ...]]:
-    """Runs with accuracy control, or one with the solver's own tolerances."""
+def _controlled(runs: Runs, options: Options) -> Achieved | None:
+    """Runs with accuracy control; None of one run with the solver's own tolerances."""
     if runs.method == "euler":
         if options.euler_step is None:
-            raise ValueError("method euler needs a step")
+            raise WrongOption("method euler needs a step")
         runs.run(options.rtol or 1e-6, options.atol, None)
-        return None, ()
-    if options.rtol is not None or options.atol is not None:
+        return None
+    if own_tolerances(options):
         runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol, None)
-        return None, ()
-    achieved = _chosen(runs, options) if options.method == "auto" else _achieved(runs, options)
-    if achieved.met:
-        return achieved, ()
-    return achieved, (
-        f"the accuracy asked for was not reached: estimated error {achieved.error_estimate:.1e} "
-        f"at the finest tolerance {achieved.tolerance:.0e}",
-    )
+        return None
+    return _chosen(runs, options) if options.method == "auto" else _achieved(runs, options)
+
+
+def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Estimate, ...]:
+    """The quantity that misses most what was asked, where the accuracy was not reached."""
+    if achieved is None or achieved.met:
+        return ()
+    name, asked, time = runs.worst(_targets(runs, options))
+    return (Estimate(name, achieved.error_estimate, asked, time),)
 
 
 def _achieved(runs: Runs, options: Options) -> Achieved:
@@ -121,7 +132,7 @@ def simulate(
 
     start: a consistent state at t_start that is already known, facts: the structure there (else both are found).
 
-    Raises InconsistentStart, TraceError, ValueError (options that make no sense); a SolverFailure is raised with
+    Raises InconsistentStart, TraceError, WrongOption (options that make no sense); a SolverFailure is raised with
     `partial`, the Outcome up to it, after the trace was closed with final = 0.
     """
     description = manifest if isinstance(manifest, Description) else describe(manifest, binding or {})
@@ -130,7 +141,7 @@ def simulate(
     start = start or consistent_start(written, options.t_start)
     facts = facts or structure(written, start)
     if options.redundancy not in ("error", "drop", "minimum_norm"):
-        raise ValueError(f"redundancy {options.redundancy}: error, drop or minimum_norm")
+        raise WrongOption(f"redundancy {options.redundancy}: error, drop or minimum_norm")
     if facts.left_out and options.redundancy != "error":
         written = written.without(facts.left_out)
         start = replace(consistent_start(written, options.t_start, start), moved=start.moved)
@@ -177,24 +188,29 @@ def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tu
 
     achieved: Achieved | None = None
     try:
-        achieved, more = _controlled(runs, options)
+        achieved = _controlled(runs, options)
     except SolverFailure as failure:
-        _close(runs, None, final=False)
+        _close(runs, None, None)
         reached = failure.time if runs.done is None else options.t_end
         failure.partial = outcome(False, reached, None, failure)
         raise
     except BaseException:
-        _close(runs, None, final=False)
+        _close(runs, None, None)
         raise
-    warnings = (*warnings, *more)
-    _close(runs, achieved, final=True)
-    return outcome(True, options.t_end, achieved, None)
+    assert runs.done is not None
+    missed = _missed(runs, options, achieved)
+    judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed)
+    _close(runs, achieved, judgement)
+    below = achieved is not None and achieved.below_round_off
+    return replace(outcome(True, options.t_end, achieved, None), judgement=judgement, below_round_off=below)
 
 
-def _close(runs: Runs, achieved: Achieved | None, final: bool) -> None:
-    """Last attributes of the finished run that stands at the path."""
+def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:
+    """Last attributes of the finished run that stands at the path; judgement None: it did not end as asked."""
     if runs.done is None or runs.done[2].closed:
         return
     finished, _, writer = runs.done
     estimate = achieved.error_estimate if achieved is not None else None
-    writer.finish(runs.nominal(finished.largest, finished.magnitude), runs.last_attributes(estimate), final)
+    verdict = UNJUDGED if judgement is None else judgement.attributes()
+    attributes = {**runs.last_attributes(estimate), **verdict}
+    writer.finish(runs.nominal(finished.largest, finished.magnitude), attributes, judgement is not None)

@@ -1,11 +1,12 @@
 """The Python face of sysdyn for notebooks and scripts: `compile_model`, `simulate`, `Trace`.
 
 They call what the commands call.  Findings of a model that cannot be used are raised as `ModelError`, wrong usage as
-`UsageError`, a solver that stops as `SolverFailure`; notes and warnings stay silent.
+`UsageError`, a solver that stops as `SolverFailure`, a run that is not met as `NotMet`; notes and warnings stay silent.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,13 @@ from sysdyn.cli.run.starting import start
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.runtime.judgement import NotMet as Missed
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.trace.trace import Trace
 
-__all__ = ["ModelError", "Module", "SolverFailure", "Trace", "UsageError", "compile_model", "simulate"]
+__all__ = ["ModelError", "Module", "NotMet", "SolverFailure", "Trace", "UsageError", "compile_model", "simulate"]
 
 
 class Module:
@@ -74,7 +76,9 @@ def compile_model(
     report.raise_if_failed()
     assert target is not None
     with ex.fresh():
-        network = load.network(target.document, target.model, target.scene, report, required=target.scene is not None)
+        inner = Report()
+        network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
+        report.extend(inner if network else targets.unsupported(inner))
         wanted = None if formulation == "auto" else formulation
         prepared = None if network is None else prepare(network, report, formulation=wanted, backend=backend)
         if prepared is None:
@@ -84,19 +88,36 @@ def compile_model(
     return Module(prepared, found, "3" if index == "auto" else index)
 
 
-def simulate(path: str | Path, **options: Any) -> Trace:
+class NotMet(Exception):  # noqa: N818 (a name of the house)
+    """A run that ended, but did not meet what it judges itself by; trace: complete; not_met: what was missed."""
+
+    def __init__(self, trace: Trace, not_met: tuple[Missed, ...], findings: tuple[Diagnostic, ...]) -> None:
+        self.trace, self.not_met = trace, not_met
+        super().__init__("; ".join(d.message for d in findings if d.code in ("E920", "E921")))
+
+
+def simulate(path: str | Path, *, unmet: str = "raise", **options: Any) -> Trace:
     """Simulate a scene of a file; the options are those of the command (`until`, `set`, `accuracy`, `at`, ...).
 
     set: a mapping of names to numbers or texts; level: one of paths to levels; at: instants or one text; output: the
-    trace's file (a default as the command's).  Returns the trace.
+    trace's file (a default as the command's); unmet: "warn" where a run that is not met shall warn instead of raising
+    `NotMet`.  Returns the trace.
     """
+    if unmet not in ("raise", "warn"):
+        raise UsageError(f"unmet {unmet!r}: raise or warn")
     report = Report()
     ran = run(_request(str(path), options), report)
     if ran is None or ran.exit == 1:
         raise ModelError(report.diagnostics)
     if ran.outcome.failure is not None:
         raise ran.outcome.failure
-    return Trace.open(ran.outcome.trace)
+    trace = Trace.open(ran.outcome.trace)
+    if ran.outcome.judgement is not None and not ran.outcome.met:
+        found = NotMet(trace, ran.outcome.judgement.not_met, report.diagnostics)
+        if unmet == "raise":
+            raise found
+        warnings.warn(str(found), stacklevel=2)
+    return trace
 
 
 def _request(path: str, options: dict[str, Any]) -> Request:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import INPUT_OUTPUT, classify
+from sysdyn.cli.failures import INPUT_OUTPUT, UsageError, classify
 from sysdyn.cli.run import targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
@@ -14,13 +14,17 @@ from sysdyn.dsl.text.diagnostics import Report
 
 @with_console("check")
 @click.argument("files", nargs=-1, required=True)
-@click.option("--strict", is_flag=True, help="Warnings count as errors.")
-def command(console: Console, files: tuple[str, ...], strict: bool) -> int:
+@click.option("--strict", is_flag=True, help="Warnings count as errors, and so does what cannot be run yet.")
+@click.option("--allow-unsupported", is_flag=True, help="With --strict: texts may be ahead of the compiler.")
+def command(console: Console, files: tuple[str, ...], strict: bool, allow_unsupported: bool) -> int:
     """Check every model and scene of FILES, the consistent start included; no C compiler is needed."""
+    if allow_unsupported and not strict:
+        raise UsageError("--allow-unsupported says what --strict may pass: give both")
+    refused = strict and not allow_unsupported
     results, unread = [], False
     for path in files:
         try:
-            results.append(_file(console, path))
+            results.append(_file(console, path, refused))
         except OSError as error:
             unread = True
             console.complain(classify(error)[1], INPUT_OUTPUT)
@@ -29,12 +33,12 @@ def command(console: Console, files: tuple[str, ...], strict: bool) -> int:
     return console.finish(INPUT_OUTPUT if unread else 1 if strict and warned else 0)
 
 
-def _file(console: Console, path: str) -> dict[str, object]:
+def _file(console: Console, path: str, refused: bool) -> dict[str, object]:
     document = targets.read(path, console.report)
     found = []
     for target in targets.all_targets(document, console.report):
         with ex.fresh():
-            summary = _target(console, target)
+            summary = _target(console, target, refused)
         found.append(summary)
         if summary["ok"]:
             console.say(f"{path}: {target.name}: {_line(summary)}")
@@ -54,15 +58,16 @@ def _line(summary: dict[str, object]) -> str:
     return "; ".join([f"ok: {counts}", *shortened(moved)])
 
 
-def _target(console: Console, target: targets.Target) -> dict[str, object]:
-    """Findings go to the report of the console; the counts come back."""
+def _target(console: Console, target: targets.Target, refused: bool = False) -> dict[str, object]:
+    """Findings go to the report of the console; the counts come back.  refused: what cannot be run yet is an error."""
     names = {"scene": target.scene.name.name if target.scene else None, "model": target.model.name.name}
     inner = Report()
     network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
     summary: dict[str, object] = {**names, "ok": network is not None}
     if network is not None and all(p.values for p in network.parameters):
         summary |= _started(network, inner)
-    console.report.extend(inner)
+    incomplete = refused and not summary["ok"]
+    console.report.extend(targets.unsupported(inner) if incomplete else inner)
     return summary
 
 

@@ -18,6 +18,7 @@ from sysdyn.compiler.program import program_text
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
+from sysdyn.dsl.text.diagnostics import Report
 
 
 @with_console("compile")
@@ -46,10 +47,11 @@ def command(
     if target is None:
         return console.finish(1)
     with ex.fresh():
-        required = target.scene is not None
+        required, inner = target.scene is not None, Report()
         network = load.network(
-            target.document, target.model, target.scene, console.report, settings, levels=levels, required=required
+            target.document, target.model, target.scene, inner, settings, levels=levels, required=required
         )
+        console.report.extend(inner if network else targets.unsupported(inner))
         if network is None:
             return console.finish(1)
         if dump == "network":

@@ -55,7 +55,8 @@ def command(
                 from sysdyn.cli.compare.comparison_page import page
 
                 write(html_file, page(f"{test} against {ref}", [(one, two, verdict)]))
-            unfinished = [t.path for t in (one, two) if not t.final]
+            unfinished = [(t.path, "did not end as asked") for t in (one, two) if not t.final]
+            unfinished += [(t.path, "is not met") for t in (one, two) if t.final and not t.met]
     except Incomparable as error:
         console.complain(f"the traces cannot be compared: {error}", SOLVER)
         if junit_file:
@@ -64,11 +65,11 @@ def command(
     if junit_file:
         write(junit_file, junit([(f"{test} against {ref}", time.monotonic() - began, cases(verdict))]))
     console.result = as_json(verdict)
-    for path in unfinished:
-        console.say(f"{path} is of a run that did not end as asked")
+    for path, why in unfinished:
+        console.complain(f"{path} is of a run that {why}", 1)
     if not (console.quiet or pages):
         console.data(headline(verdict) + "\n" + table(verdict))
-    return console.finish(0 if verdict.equal else 1)
+    return console.finish(0 if verdict.equal and not unfinished else 1)
 
 
 def write(file: str, text: str) -> None:

@@ -102,8 +102,8 @@ def record(
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")
     request = Request(file, scene=scene_name, model=model_name, until=until, formulation=formulation, settings=settings)
     found = _measured(console, request, rtol, atol)
-    if found is None:
-        return console.finish(1)
+    if isinstance(found, int):
+        return console.finish(found)
     golden = _golden(
         Golden(place, Path(file), label, scene_name or "", rtol, atol, 0, 0, 0, 0, 0, (), settings, until), found
     )
@@ -253,8 +253,8 @@ def accept(
     for golden in book.find(Path(folder), names):
         wanted = golden if rtol is None else replace(golden, rtol=rtol)
         found = _again(console, wanted)
-        if found is None:
-            code = max(code, 1)
+        if isinstance(found, int):
+            code = max(code, found)
             continue
         change, text = what_changed(golden, wanted, found)
         changes.append({"golden": golden.label, "change": change})
@@ -273,7 +273,7 @@ def accept(
     return console.finish(code)
 
 
-def _again(console: Console, golden: Golden) -> Recorded | None:
+def _again(console: Console, golden: Golden) -> Recorded | int:
     from sysdyn.cli.golden.checking import request_of
 
     only = golden.formulations[0] if len(golden.formulations) == 1 else None
@@ -328,16 +328,17 @@ def _target(
     return (target.scene.name.name, target.scene.name.name, None) if target.scene else (model_name, None, model_name)
 
 
-def _measured(console: Console, request: Request, rtol: float, atol: float) -> Recorded | None:
-    """The record; None after saying why there is none."""
+def _measured(console: Console, request: Request, rtol: float, atol: float) -> Recorded | int:
+    """The record; the exit code after saying why there is none."""
     from sysdyn.cli.golden import recording
     from sysdyn.cli.golden.runs import Stopped
 
     try:
         return recording.record(request, rtol, atol, console.say)
     except (recording.Refused, Stopped) as error:
-        console.complain(str(error), getattr(error, "code", 1))
-        return None
+        code = getattr(error, "code", 1)
+        console.complain(str(error), code)
+        return code
 
 
 def _golden(golden: Golden, found: Recorded) -> Golden:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import SOLVER, UsageError
+from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run.running import Request
@@ -53,10 +53,9 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         "dof": study.started.facts.dof,
         "index": study.started.facts.index,
         "final": None if study.ran is None else study.ran.outcome.final,
+        "met": None if study.ran is None else study.ran.outcome.met,
         "failure": None if study.ran is None else study.ran.failure,
     }
-    if study.ran is not None and study.ran.failure:
-        console.complain(study.ran.failure, SOLVER)
     return console.finish(0 if study.ran is None else study.ran.exit)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import click
 import numpy as np
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import SOLVER, UsageError
+from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run.running import Ran, Request, run
@@ -43,8 +43,10 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     console.result = _result(ran)
     for text in (*shortened(described(ran.started.state)), *ran.outcome.warnings):
         console.say(text)
-    if ran.failure:
-        console.complain(ran.failure, SOLVER)
+    if ran.outcome.judgement is not None and not ran.outcome.met:
+        for claim in ran.claims:
+            found = "" if claim.value is None else f": {claim.value:.9g} at {claim.time:.9g} s"
+            console.say(f"expect {claim.text}{found} (of a run that is not met: not judged)")
     console.say(_summary(ran))
     return console.finish(ran.exit)
 
@@ -65,13 +67,14 @@ def _summary(ran: Ran) -> str:
     o = ran.outcome
     s, t = o.statistics, o.timings
     estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
+    estimate = ", estimated error below round-off" if o.below_round_off else estimate
     form = {"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {}
     how = (ran.prepared.formulation, o.method, f"index {form.get(o.index, o.index)}", ran.prepared.backend)
     lines = [
         f"{ran.target.name}: {', '.join(how)}",
         f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
         f"  energy balance {_last(o.samples.energy):.2e} J, constraints {_last(o.samples.constraints):.1e}",
-        f"  {o.trace}{'' if o.final else ' (not final)'}",
+        f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
     ]
     return "\n".join(lines)
 
@@ -92,6 +95,10 @@ def _result(ran: Ran) -> dict[str, Any]:
         "statistics": o.statistics,
         "timings": o.timings,
         "error_estimate": o.error_estimate,
+        "below_round_off": o.below_round_off,
+        "met": o.met,
+        "judged": list(o.judgement.judged) if o.judgement else [],
+        "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
         "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
         "moved": described(ran.started.state),
         "warnings": list(o.warnings),

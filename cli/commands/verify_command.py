@@ -36,7 +36,8 @@ def command(console: Console, progress: str, no_timings: bool, full: bool, outpu
 
     Two runs agree where every traced quantity differs by less than 10 x accuracy x its nominal magnitude, up to the
     horizon: the instant at which the reference differs by that much from its own run at a tenth of the accuracy.
-    --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree.
+    --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree, 3 where a
+    ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.
     """
     line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)
@@ -67,6 +68,9 @@ def _judged(found: Verified, console: Console) -> int:
     for text in _complaints(found):
         console.complain(text, 1)
         code = 1
+    for text in shortened(_unbalanced(found)):
+        console.complain(text, SOLVER)
+        code = SOLVER
     for text in _warnings(found):
         console.say(text)
     for text in found.failures:
@@ -92,13 +96,17 @@ def _complaints(found: Verified) -> list[str]:
         for t in found.twins
         if not t.agree
     ]
-    books = [
-        f"{run.name}: the energy balance is off by {run.energy:.2g} J of {run.turnover:.2g} J, "
-        f"{run.books:.3g} times what is allowed"
+    return [*shortened(pairs), *carriers]
+
+
+def _unbalanced(found: Verified) -> list[str]:
+    """Ledgers that are off, a line each."""
+    return [
+        f"{run.name}: the {m.what} ledger is off by {m.value:.2g} {m.unit}, {m.limit:.2g} {m.unit} is allowed, "
+        f"most at {m.element}"
         for run in found.runs
-        if run.books > 1.0 and not run.failure
+        for m in run.unbalanced
     ]
-    return [*shortened(pairs), *shortened(books), *carriers]
 
 
 def _apart(gap: Gap) -> str:
@@ -111,7 +119,10 @@ def _warnings(found: Verified) -> list[str]:
     """Warnings of the runs, each once with the runs that have it."""
     names: dict[str, list[str]] = {}
     for run in (*found.runs, found.finer):
-        for text in run.outcome.warnings:
+        judgement = run.outcome.judgement
+        unmet = "the accuracy asked for was not reached by its own estimate"
+        inaccurate = [unmet for m in judgement.not_met if m.what == "accuracy"] if judgement else []
+        for text in (*run.outcome.warnings, *inaccurate):
             names.setdefault(text, []).append(run.name)
     return [f"{', '.join(dict.fromkeys(runs))}: {text}" for text, runs in names.items()]
 
@@ -141,7 +152,7 @@ def _refused(found: Verified) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for r in found.refusals:
         reason = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
-        text = "not supported yet" if r.code == "N608" else f"{r.code} {reason}"
+        text = "not supported yet" if r.code == "E608" else f"{r.code} {reason}"
         reasons.setdefault(text, []).append(r.formulation)
     return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]
 
@@ -211,6 +222,8 @@ def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict
         "timings": o.timings if timings else {},
         "error_estimate": o.error_estimate,
         "energy": run.energy,
+        "met": not run.unbalanced and o.final,
+        "not_met": [m.to_json() for m in run.unbalanced],
         "constraints": run.constraints,
         "worst": None if gap is None else _gap_object(gap),
         "expects": [{"text": text, "ok": ok} for text, ok in run.expects],

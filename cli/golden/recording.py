@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.compare.diffing import common, differences, sentence
-from sysdyn.cli.golden.runs import APART, Run, Stopped, between, run
+from sysdyn.cli.golden.runs import APART, RUNS, Run, Stopped, between, run
 from sysdyn.cli.run.running import Request
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Curve, Flags, bernstein, cells_at
@@ -75,7 +75,12 @@ class Recorded:
 def record(request: Request, rtol: float, atol: float, say: Say) -> Recorded:
     """Measure a scene.  request: file, scene, settings.  Raises Refused, Stopped, UsageError."""
     for share in REFERENCE:
-        base, runs, golden = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
+        try:
+            base, runs, golden = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
+        except Stopped as stopped:
+            if share == REFERENCE[0] or stopped.finding not in RUNS:
+                raise
+            break  # finer than can be met: the last reference stands, or falls, by its own error
         first, *wider = _taus(golden, runs)
         try:
             _own_error(golden, runs, Tolerance(rtol, atol, first))

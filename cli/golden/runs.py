@@ -26,6 +26,8 @@ APART = 1e-12
 """Of the span: instants nearer than this are one, computed in two ways."""
 CLAIMS = ("E907", "E909")
 """Expectations are judged by `simulate`, at the scene's own accuracy."""
+RUNS = ("E920", "E921", "E930", "E931", "E932", "E933", "E934")
+"""What a run says of itself: it is no golden trace."""
 
 
 def between(time: Floats) -> Floats:
@@ -65,7 +67,8 @@ def run(request: Request, also: Floats | None = None) -> Run:
     with tempfile.TemporaryDirectory(prefix="sysdyn-golden-") as folder:
         path = Path(folder) / "trace.h5"
         ran = _ran(replace(request, output=str(path)), report, also)
-        errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in CLAIMS)]
+        later = (*CLAIMS, *RUNS)
+        errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in later)]
         if ran is None or errors:
             first = next(iter(errors), None)
             where = f"{first.place.file}:{first.place.start[0]}: " if first and first.place else ""
@@ -75,6 +78,9 @@ def run(request: Request, also: Floats | None = None) -> Run:
             raise Stopped(1, f"{where}{first.code}: {first.message}", first.code)
         if ran.failure:
             raise Stopped(3, ran.failure)
+        if not ran.outcome.met:
+            unmet = next(d for d in report.diagnostics if d.code in RUNS)
+            raise Stopped(3, unmet.message, unmet.code)
         trace = Trace.open(path)
     energy, constraints = (_largest(trace[f"audit.{meter}"].values) for meter in ("energy", "constraints"))
     parameters = {name: value for name, (value, _) in trace.parameters.items()}

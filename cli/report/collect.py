@@ -42,7 +42,9 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
         return None
     with _timed("check", stages):
         settings, levels = request.settings, request.levels
-        network = load.network(target.document, target.model, target.scene, report, settings, levels=levels)
+        inner = Report()
+        network = load.network(target.document, target.model, target.scene, inner, settings, levels=levels)
+        report.extend(inner if network else targets.unsupported(inner))
     if network is None:
         return None
     prepared = _prepared(request, network, report, stages)
@@ -80,7 +82,7 @@ def _study(
         if ran is not None:
             trace = Trace.open(ran.outcome.trace)
             _split(stages, ran)
-            findings += [text for text in (ran.failure, *ran.outcome.warnings) if text]
+            findings += ran.outcome.warnings
             found = _energies(target, prepared, options, ran, folder, stages)
     if started is None:
         return None
@@ -95,7 +97,7 @@ def _prepared(request: Request, network: Network, report: Report, stages: Stages
     """Compiled, with the compiler's own stages."""
     made: Stages = []
     with _timed("formulation, build and load", made):
-        prepared = prepare(network, report, formulation=request.formulation, backend=request.backend)
+        prepared = prepare(network, report, formulation=request.formulation, backend=request.backend, traced=True)
     if prepared is not None:
         own = [(t.stage, t.wall, t.cpu) for t in prepared.compiled.timings]
         stages += own

@@ -40,7 +40,7 @@ def _how(study: Study) -> str:
         o = study.ran.outcome
         how += [o.method, f"index {o.index}", f"{o.reached:g} s in {o.statistics['steps']} steps"]
         if o.error_estimate is not None:
-            how.append(f"estimated error {o.error_estimate:.1e}")
+            how.append("estimated error " + ("below round-off" if o.below_round_off else f"{o.error_estimate:.1e}"))
     return ", ".join([study.sources[0].name, *how])
 
 

@@ -53,9 +53,12 @@ class Prepared:
         }
 
 
-def prepare(network: Network, report: Report, *, formulation: str | None = None, backend: str = "c") -> Prepared | None:
+def prepare(
+    network: Network, report: Report, *, formulation: str | None = None, backend: str = "c", traced: bool = False
+) -> Prepared | None:
     """Compile and bind a network; None where the report says why not.
 
+    traced: a run is asked, which traces every coordinate where the text traces nothing.
     formulation None: the scene's, else auto.  A missing C compiler is reported as a note and NumPy takes over.
     """
     cpu = time.process_time()
@@ -68,7 +71,7 @@ def prepare(network: Network, report: Report, *, formulation: str | None = None,
     if found:
         return None
     try:
-        compiled, made, backend = _compiled(network, chosen, backend, report)
+        compiled, made, backend = _compiled(network, chosen, backend, report, traced)
         binding = compiled.bind()
     except ModelError as error:
         report.extend(error.diagnostics)
@@ -78,16 +81,18 @@ def prepare(network: Network, report: Report, *, formulation: str | None = None,
     return Prepared(network, compiled, binding, manifest, made, chosen, backend, time.process_time() - cpu)
 
 
-def _compiled(network: Network, formulation: str, backend: str, report: Report) -> tuple[CompiledModel, Carrier, str]:
+def _compiled(
+    network: Network, formulation: str, backend: str, report: Report, traced: bool
+) -> tuple[CompiledModel, Carrier, str]:
     if backend == "c":
-        compiled = compile_network(network, formulation, "c")
+        compiled = compile_network(network, formulation, "c", traced=traced)
         try:
             return compiled, carrier.load(compiled.library()), "c"
         except build.BuildError as error:  # none there, or one that cannot build (no headers, no room)
             first = error.output.strip().splitlines()[:1]
             said = ": ".join([str(error), *first])
             report.note("N609", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
-    compiled = compile_network(network, formulation, "numpy")
+    compiled = compile_network(network, formulation, "numpy", traced=traced)
     return compiled, carrier.load(module_of(compiled.text)), "numpy"
 
 

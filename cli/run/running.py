@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import re
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -15,23 +14,27 @@ import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.expectations import Claim, judge
-from sysdyn.cli.run.prepare import Prepared, place_at, prepare
+from sysdyn.cli.run.module_check import check_module
+from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.verdict import stopped, verdict
 from sysdyn.compiler.binding.instants import instants
 from sysdyn.dsl import load
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network, Scene
 from sysdyn.dsl.model.units import si_text
-from sysdyn.dsl.text.diagnostics import Place, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.integrate.options import Options, Progress
-from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.simulate import Outcome, simulate
 from sysdyn.runtime.trace.opening import replaceable
 from sysdyn.runtime.trace.trace import Parameter
 
 ACCURACY = 1e-4
+FINEST_RTOL, FINEST_ACCURACY = 1e-14, 1e-13
+"""What double precision resolves; of an accuracy the estimate must be seen too."""
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
 LISTED = 1000
@@ -65,7 +68,10 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Ran:
-    """What came of it.  exit: 0, 1 (an expectation failed), 3 (the solver stopped, `failure` says where)."""
+    """What came of it.
+
+    exit: 0, 1 (an expectation failed), 3 (the solver stopped, `failure` says where, or the run is not met).
+    """
 
     target: Target
     prepared: Prepared
@@ -99,25 +105,31 @@ def check_tolerances(request: Request) -> None:
     """UsageError where --accuracy, --rtol, --atol make no sense."""
     if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
         raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
-    if request.rtol is not None and not 0.0 < request.rtol < 1.0:
-        raise UsageError(f"--rtol {request.rtol:g}: it must be positive and less than 1")
+    if request.rtol is not None and not FINEST_RTOL <= request.rtol < 1.0:
+        raise UsageError(f"--rtol {request.rtol:g}: from {FINEST_RTOL:g} to less than 1, what double precision allows")
+    if request.accuracy is not None and not FINEST_ACCURACY <= request.accuracy < 1.0:
+        raise UsageError(f"--accuracy {request.accuracy:g}: from {FINEST_ACCURACY:g} to less than 1, what can be told")
     if request.atol is not None and not 0.0 <= request.atol < math.inf:
         raise UsageError(f"--atol {request.atol:g}: it must not be negative")
 
 
 def ready(request: Request, target: Target, report: Report) -> Prepared | None:
     """The target under the request's settings, compiled and bound; None where the report says why not."""
-    network = load.network(target.document, target.model, target.scene, report, request.settings, levels=request.levels)
-    if network is None:
-        return None
-    return prepare(network, report, formulation=request.formulation, backend=request.backend)
+    inner = Report()
+    network = load.network(target.document, target.model, target.scene, inner, request.settings, levels=request.levels)
+    prepared = None
+    if network is not None:
+        prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend, traced=True)
+    report.extend(inner if prepared else targets.unsupported(inner))
+    return prepared
 
 
 def integrate(target: Target, prepared: Prepared, options: Options, report: Report) -> Ran | None:
     """From the consistent start to the trace; None where the report says why not."""
     started = start(prepared, options.t_start, report, options.redundancy)
-    if started is None or report.failed:
+    if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
         return None
+    check_module(prepared, started, options.t_end)
     options = replace(options, stops=_stops(prepared, options, report))
     return _ran(target, prepared, started, options, report)
 
@@ -209,12 +221,13 @@ def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
 def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:
     """Accuracy of all traced quantities, or of those that the scene names."""
     if request.accuracy is not None:
-        if not 0.0 < request.accuracy < 1.0:
-            raise UsageError(f"--accuracy {request.accuracy:g}: it must be positive and less than 1")
         return request.accuracy, ()
     if scene.accuracy is None:
         return ACCURACY, ()
     wanted = prepared.binding.evaluate(scene.accuracy)
+    if not FINEST_ACCURACY <= wanted < 1.0:
+        text = f"accuracy {wanted:g}: from {FINEST_ACCURACY:g} to less than 1, what double precision can tell"
+        raise ModelError([Diagnostic("E906", text, scene.place)])
     return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
 
 
@@ -281,52 +294,20 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
     except NoSuchForm as error:
         report.error("E607", str(error), prepared.network.place)
         return None
-    except ValueError as error:
+    except WrongOption as error:
         raise UsageError(str(error)) from error
     except SolverFailure as error:
-        failure = _failure(prepared, error)
         if not isinstance(error.partial, Outcome):
-            raise UsageError(failure) from error
+            raise
         outcome = error.partial
-        if outcome.reached > error.time:
-            failure += "; the trace is that of a coarser run to the end, its error is not known"
-    claims = judge(prepared, outcome, report, finished=outcome.reached >= options.t_end)
-    code = 3 if failure else 1 if report.failed else 0
+        failure = stopped(target, prepared, started, error, report)
+    found = Report()
+    claims = judge(prepared, outcome, found, finished=outcome.reached >= options.t_end)
+    if outcome.judgement is None or outcome.met:
+        report.extend(found)
+        code = 3 if failure else 1 if report.failed else 0
+    else:  # what such a run says of the author's claims is not believed
+        claims, code = tuple(replace(claim, ok=None) for claim in claims), 3
+    if outcome.judgement is not None:
+        verdict(target, prepared, outcome.judgement, report)
     return Ran(target, prepared, started, outcome, claims, code, failure)
-
-
-_CAUSES = {
-    "newton": "Newton's iteration does not converge",
-    "error_test": "the local error cannot be brought below the tolerance",
-    "singular": "the iteration matrix is singular",
-    "nonfinite": "an equation is not a number",
-    "stiff": "the equations are stiff, an explicit method is held to tiny steps: take radau or bdf",
-    "step_too_small": "the step size fell below the resolution of time",
-    "max_steps": "the limit of steps is reached",
-    "max_wall": "the limit of wall time is reached",
-    "memory": "there is no memory left",
-}
-
-
-def _failure(prepared: Prepared, error: SolverFailure) -> str:
-    """The sentence of exit code 3: time, element, source line."""
-    cause = _CAUSES.get(error.cause, error.cause)
-    text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {cause}"
-    if error.row is not None:
-        place = place_at(prepared.network, error.row.file, error.row.line)
-        text += f", in {error.row.kind} {error.row.label}, {place.file}:{place.start[0]}"
-    if error.unknown is not None:
-        text += f", unknown {error.unknown}"
-        if error.row is None:
-            place = _declared(prepared.network, error.unknown)
-            text += f", {place.file}:{place.start[0]}"
-    return text
-
-
-def _declared(network: Network, unknown: str) -> Place:
-    """Where the family of an unknown is declared: `x[3]'`, `x.p` and `rod.multiplier` are of x and rod."""
-    name = re.split(r"[^\w]", unknown, maxsplit=1)[0]
-    families = (network.coordinates, network.states, network.unknowns)
-    places = {item.name: item.place for group in families for item in group}
-    places |= {item.name: item.place for item in network.constraints if item.name}
-    return places.get(name, network.place)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.dsl import load
 from sysdyn.dsl.load import Document
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.text.decoding import decode
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.dsl.tree import syntax
 
 
@@ -77,6 +78,12 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
     if report.failed:
         return None
     raise UsageError(f"{path} has no model")
+
+
+def unsupported(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    """The findings where a run is asked of a text that cannot be run yet: what N608 notes is then the error E608."""
+    help_ = "leave it out of what is run; 'check' passes texts that are ahead of the compiler"
+    return (replace(d, code="E608", help=d.help or help_) if d.code == "N608" else d for d in found)
 
 
 def _nothing(document: Document, path: str, what: str, name: str, names: list[str], report: Report) -> Exception:

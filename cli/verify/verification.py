@@ -37,8 +37,10 @@ FINER = 0.1
 """Of the accuracy asked: that of the run which gives the horizon (CONTRACT)."""
 GRID = 200
 """Intervals of the common instants where the scene leaves them to the solver."""
-REFUSALS = ("E601", "E602", "E603", "E604", "E605", "E606", "E607", "N608")
+REFUSALS = ("E601", "E602", "E603", "E604", "E605", "E606", "E607", "E608")
 """Codes by which a formulation says that it cannot express a model."""
+JUDGED = ("E907", "E909", "E920", "E921", "E930", "E931", "E932", "E933", "E934")
+"""What runs say of themselves: it is in their part of the table."""
 
 
 def verify(
@@ -173,7 +175,7 @@ class _Verification:
     def _collect(self, report: Report, name: str) -> None:
         """Errors by code and place, with the runs that have them."""
         for item in report:
-            if item.severity == "error":
+            if item.severity == "error" and item.code not in JUDGED:
                 self.found.setdefault((item.code, item.place), (item, []))[1].append(name)
 
     def _tell(self) -> None:
@@ -273,5 +275,4 @@ def _read(ran: Ran, options: Options) -> Run:
     accuracy = min([options.accuracy or ACCURACY, *(wanted for _, wanted in options.accuracy_on)])
     claims = tuple((claim.text, claim.ok) for claim in ran.claims)
     trace = Trace.open(ran.outcome.trace)
-    stores = any(ran.prepared.compiled.energies.functions.values())
-    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure, stores)
+    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure)

@@ -11,20 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from sysdyn.cli.verify.agreement import Bounds, Gap, gaps
 from sysdyn.cli.verify.twins import Twins
-from sysdyn.runtime.model.scales import ROUND_OFF
+from sysdyn.runtime.judgement import NotMet
 from sysdyn.runtime.simulate import Outcome
 from sysdyn.runtime.trace.trace import Trace
-
-BOOKS = 10.0
-"""Energy balance allowed: times the accuracy asked, of the largest energy stored, dissipated or supplied."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
     """One run of the scene.
 
-    accuracy: as asked; expects: text, and whether it held; failure: where it stopped; stores: the model has an energy
-    or a content, so that its balance is more than works that cancel.
+    accuracy: as asked; expects: text, and whether it held; failure: where it stopped.
     """
 
     formulation: str
@@ -34,7 +30,6 @@ class Run:
     expects: tuple[tuple[str, bool | None], ...]
     trace: Trace
     failure: str | None
-    stores: bool
 
     @property
     def name(self) -> str:
@@ -47,17 +42,10 @@ class Run:
         return float(np.max(np.abs(self.trace["audit.energy"].values), initial=0.0))
 
     @property
-    def turnover(self) -> float:
-        """Largest energy that was stored, dissipated or supplied (J)."""
-        return self.trace["audit.energy"].nominal or 0.0
-
-    @property
-    def books(self) -> float:
-        """Energy balance in units of what is allowed: BOOKS x accuracy of the turnover."""
-        allowed = max(BOOKS * self.accuracy, ROUND_OFF) * self.turnover
-        if not self.stores:
-            return 0.0
-        return self.energy / allowed if allowed > 0.0 else (np.inf if self.energy > 0.0 else 0.0)
+    def unbalanced(self) -> tuple[NotMet, ...]:
+        """Ledgers of energy and invariants that are off."""
+        judgement = self.outcome.judgement
+        return () if judgement is None else tuple(m for m in judgement.not_met if m.what != "accuracy")
 
     @property
     def constraints(self) -> float:

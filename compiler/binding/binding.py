@@ -31,6 +31,8 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 Overrides = Mapping[Override, Any]
 
+OUTSIDE = {"extend": 0, "clamp": 1, "stop": 2}
+"""What a table of two arguments does outside its data, as the text's helper reads it."""
 SCALAR = ("observe", "audit")  # blocks whose row families are scalars, whatever else has their names
 
 
@@ -227,7 +229,7 @@ def _integer(
     table = next(t for t in network.tables if t.name == name)
     if kind == "table":
         return where[f"table {name}"]
-    return len(table.points[slot[2]]) if kind == "points" else int(table.outside != "extend")
+    return len(table.points[slot[2]]) if kind == "points" else OUTSIDE[table.outside]
 
 
 def _label(offset: str) -> str:

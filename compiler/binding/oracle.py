@@ -13,7 +13,8 @@ from sysdyn.compiler.binding.places import starts
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
 from sysdyn.compiler.model.interpret import Value, over
 from sysdyn.compiler.model.parameters import Extents, positions
-from sysdyn.dsl.model.expression import Node, derivative, is_const, variables
+from sysdyn.compiler.model.terms import has_reduction
+from sysdyn.dsl.model.expression import Node, derivative, is_const, topological, variables
 
 Array = NDArray[np.float64]
 Point = tuple[float, Array, Array]  # t, y, yd
@@ -56,6 +57,30 @@ class Oracle:
                 for c, values in zip(scales, at[len(summand.at) :], strict=True):
                     np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), np.abs(c * values))
         return r
+
+    def undefined(
+        self, block: str, t: float, y: Array, yd: Array, *, infinite: bool = True
+    ) -> tuple[int, Node, list[float]] | None:
+        """(row family, node, its arguments) of the first operation that makes of numbers what is none; None: there is
+        none in the block.  infinite: what overflows counts too.
+        """
+        point = (t, y, yd)
+        for kernel in self._kernels(block):
+            for summand in kernel.rows:
+                nodes = [n for n in topological([summand.expression]) if n.op in ("table", "call", "pow", "mul", "sum")]
+                nodes = [n for n in nodes if not has_reduction(n)]
+                roots = (*nodes, *(a for n in nodes for a in n.args))
+                if not nodes:
+                    continue
+                values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, point))
+                rest = iter(values[len(nodes) :])
+                for node, value in zip(nodes, values[: len(nodes)], strict=True):
+                    arguments = [next(rest) for _ in node.args]
+                    wrong = ~np.isfinite(value) if infinite else np.isnan(value)
+                    bad = np.flatnonzero(wrong & np.all([np.isfinite(a) for a in arguments], axis=0))
+                    if bad.size:
+                        return summand.row, node, [float(a[bad[0]]) for a in arguments]
+        return None
 
     def entries(self, block: str, order: int, t: float, y: Array, yd: Array) -> tuple[Array, Array, Array]:
         """(v, rows, columns) of dy (order 0) or dyd (order 1) in the order of the contract."""

@@ -1,64 +1,145 @@
-"""The energy audit of a form: its four rows.
+"""The energy audit of a form: what is stored, dissipated and supplied, in all and ledger by ledger.
 
     T = f.dT*/df - T* (or T where given)       V       dissipated = f.dD/df
     supplied = sum E du/dq f + kappa.Phi_t + mu.b + V_t - T*_t + T_t        (b = Psi at f = 0; _t at fixed q, f)
 
 so that d(T + V)/dt + dissipated - supplied = 0 on every solution: from (3.34), multiplied by f.  A store whose law
 stands beside the state functions adds its energy; its work is no supply.
+
+A ledger is kept for each connected part of the model (ledgers.py): its own sums, additive constants left out, and the
+sums of the magnitudes of what single elements dissipate and are supplied with, against which its balance is judged.
+Block `ledger` holds what each element stores.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations
-from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.compiler.model.terms import Nest, local_variables
+from sysdyn.compiler.forms.ledgers import POWERS, STORED, Element, Entry, Ledger, elements, ledgers
+from sysdyn.compiler.model.energies import EnergyModel, Virtual
+from sysdyn.compiler.model.terms import Term, counter, local_variables
 from sysdyn.dsl.model.expression import (
     Node,
     add,
+    call,
     const,
     derivative,
     differential,
+    is_const,
     mul,
     neg,
     rate,
     signals_held,
     sub,
     substitute,
+    topological,
     var,
     variables,
 )
+from sysdyn.dsl.model.network import Shape
+
+GLOBAL = (("kinetic", "J"), ("potential", "J"), ("dissipated", "W"), ("supplied", "W"))
+LEDGER = ("stored", "dissipated", "supplied", "gross")
+"""Rows of block audit that each ledger has behind the global ones; gross: the sum over elements of the magnitudes of
+power dissipated and supplied."""
 
 
-def add_audit(assembly: Assembly, model: EnergyModel) -> None:
-    """Rows kinetic, potential (J), dissipated, supplied (W)."""
-    for name, unit in (("kinetic", "J"), ("potential", "J"), ("dissipated", "W"), ("supplied", "W")):
+def add_audit(assembly: Assembly, model: EnergyModel) -> tuple[tuple[str, Shape], ...]:
+    """Rows kinetic, potential (J), dissipated, supplied (W), those of the ledgers, and what elements store.
+
+    Returns the shapes of the row families of block ledger, by owner.
+    """
+    for name, unit in GLOBAL:
         assembly.family(Equations("audit", name, name, "audit", unit, None))
+    entries = tuple(_entries(model))
+    units = {c.name: c.units.get("balance", "J") for c in model.coordinates}
+    for entry in entries:
+        if units[entry.owners[0]] == "J" if entry.owners else True:
+            assembly.add("audit", entry.account, (), entry.nest, entry.expression)
+    shapes: list[tuple[str, Shape]] = []
+    for number, ledger in enumerate(ledgers(model, entries)):
+        _add_ledger(assembly, number, ledger, model, shapes)
+    return tuple(shapes)
 
-    def into(row: str, nest: Nest, expression: Node) -> None:
-        assembly.add("audit", row, (), nest, expression)
 
+def _add_ledger(
+    assembly: Assembly, number: int, ledger: Ledger, model: EnergyModel, shapes: list[tuple[str, Shape]]
+) -> None:
+    """The sums of a ledger, and what its elements store."""
+    place = ledger.entries[0].place
+    for name in LEDGER:
+        power = "W" if ledger.unit == "J" else f"({ledger.unit})/s"
+        unit = ledger.unit if name == "stored" else power
+        assembly.family(Equations("audit", ledger.kind, f"#ledger {number} {name}", "ledger", unit, place))
+    for entry in ledger.entries:
+        account = "stored" if entry.account in STORED else entry.account
+        assembly.add("audit", f"#ledger {number} {account}", (), entry.nest, entry.expression)
+    for found in elements(ledger.entries):
+        magnitude = call("abs", found.expression)
+        if found.account in POWERS:
+            assembly.add("audit", f"#ledger {number} gross", (), found.nest, magnitude)
+            continue
+        owner = f"#ledger {number} element {len(shapes)}"
+        apart = not any(n.op == "index" for loop in found.nest for n in topological([loop.first, loop.last]))
+        shape = tuple((loop.first, loop.last) for loop in found.nest) if apart else ()
+        shapes.append((owner, shape))
+        label = found.place.element or ledger.label(found)
+        kind = f"{number} inertia" if _of_one_rate(found, model) else str(number)
+        assembly.family(Equations("ledger", label, owner, kind, ledger.unit, found.place))
+        at = tuple(counter(k) for k in range(len(shape)))
+        assembly.add("ledger", owner, at, found.nest, found.expression if len(shape) == len(found.nest) else magnitude)
+
+
+def _of_one_rate(element: Element, model: EnergyModel) -> bool:
+    """Whether it is the kinetic energy of one rate, and of nothing else that moves: its sign is that of an inertia."""
+    rates = local_variables(element.expression, model.mirror.rate)
+    if element.account != "kinetic" or len(rates) != 1:
+        return False
+    return is_const(substitute(element.expression, {rates[0]: const(0.0)}), 0.0)
+
+
+def _entries(model: EnergyModel) -> Iterator[Entry]:
+    """Everything that the audit sums up."""
     m = model.mirror
+    moving = (m.coordinate, m.rate, m.conjugate)
     for term in model.function(m.coenergy):
-        into("kinetic", term.loops, sub(_along(term.expression, m.rate), term.expression))
-        into("supplied", term.loops, neg(explicit(term.expression)))
+        yield _entry("kinetic", term, sub(_along(term.expression, m.rate), term.expression), moving)
+        yield _entry("supplied", term, neg(explicit(term.expression)), moving)
     for name, stored in ((m.energy, "kinetic"), (m.potential, "potential")):
         for term in model.function(name):
-            into(stored, term.loops, term.expression)
-            into("supplied", term.loops, explicit(term.expression))
-    for stored in ("kinetic", "potential"):
+            yield _entry(stored, term, term.expression, moving)
+            yield _entry("supplied", term, explicit(term.expression), moving)
+    for stored in STORED:
         for term in model.function(f"kept {stored}"):
-            into(stored, term.loops, term.expression)
+            works = [w for w in model.works if w.kept and w.place == term.place]
+            owners = tuple(n.data[0] for w in works for n in _driven(w, m.coordinate))
+            yield Entry(stored, owners, term.loops, term.expression, term.place)
     for term in model.function(m.content):
-        into("dissipated", term.loops, _along(term.expression, m.rate))
+        yield _entry("dissipated", term, _along(term.expression, m.rate), (m.rate,))
     for work in (w for w in model.works if not w.kept):
-        power = [mul(derivative(work.on, q), _rate(q)) for q in local_variables(work.on, m.coordinate)]
-        into("supplied", work.loops, mul(work.effort, add(*power)))
+        driven = _driven(work, m.coordinate)
+        power = [mul(derivative(work.on, q), _rate(q)) for q in driven]
+        owners = tuple(n.data[0] for n in driven)
+        yield Entry("supplied", owners, work.loops, mul(work.effort, add(*power)), work.place)
     for row in model.rows:
         for term in row.terms if row.kind in ("phi", "psi") else ():
             still = explicit(term.expression) if row.kind == "phi" else _at_rest(term.expression, m.rate)
             multiplier = var(row.name, "kappa" if row.kind == "phi" else "mu", *row.at)
-            into("supplied", term.loops, mul(multiplier, still))
+            kind = m.coordinate if row.kind == "phi" else m.rate
+            owners = tuple(n.data[0] for t in row.terms for n in local_variables(t.expression, kind))
+            yield Entry("supplied", owners, term.loops, mul(multiplier, still), row.place)
+
+
+def _driven(work: Virtual, kind: str) -> list[Node]:
+    """The displacements that a work is done on."""
+    return local_variables(work.on, kind)
+
+
+def _entry(account: str, term: Term, expression: Node, kinds: tuple[str, ...]) -> Entry:
+    owners = tuple(n.data[0] for n in local_variables(term.expression, kinds))
+    return Entry(account, owners, term.loops, expression, term.place)
 
 
 def explicit(expression: Node) -> Node:

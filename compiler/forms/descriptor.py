@@ -23,7 +23,7 @@ AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraint
 BLOCKS = (
     "dynamics", "dynamics_rate", "phi_reaction", "phi_normal", "psi_reaction", "momentum", "momentum_rate", "phi",
     "phi_rate", "phi_acceleration", "psi", "psi_rate", "gamma", "gamma_rate", "lambda", "observe", "observe_rate",
-    "observe_scale", "audit", "initial",
+    "observe_scale", "audit", "ledger", "initial",
 )  # fmt: skip
 # the block whose row families a block shares
 HOME = {
@@ -33,7 +33,7 @@ HOME = {
     "observe_scale": "observe",
 }  # fmt: skip
 # blocks that Newton never sees: rows without Jacobian entries
-WITHOUT_ENTRIES = frozenset(("observe", "observe_rate", "observe_scale", "audit"))
+WITHOUT_ENTRIES = frozenset(("observe", "observe_rate", "observe_scale", "audit", "ledger"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class DescriptorForm:
     blocks: tuple[Block, ...]
     pins: tuple[Pin, ...]
     offsets: tuple[Offset, ...]
-    shapes: tuple[tuple[str, Shape], ...]  # of coordinates, unknowns, states and `initial` rows, by owner
+    shapes: tuple[tuple[str, Shape], ...]  # of coordinates, unknowns, states, rows `initial` and `ledger`, by owner
     hulls: tuple[tuple[str, tuple[tuple[tuple[Node, ...], Nest, Place], ...]], ...]  # where each label is declared
     covers: tuple[tuple[str, tuple[tuple[Nest, Node], ...]], ...] = ()  # families that momenta cover in part
 

@@ -50,12 +50,13 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     form.works()
     form.constraints()
     add_observations(form.assembly, model, form.carriers)
-    add_audit(form.assembly, model)
+    stored = add_audit(form.assembly, model)
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
     owners = (*model.coordinates, *model.unknowns, *model.states)
     shapes = [(f.name, f.shape) for f in owners]
     shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
+    shapes += stored
     hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
     for row in model.rows:
         if row.kind != "lambda":

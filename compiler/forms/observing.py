@@ -14,7 +14,10 @@ from sysdyn.compiler.forms.descriptor import Equations, Pin, Unknowns
 from sysdyn.compiler.forms.momenta import resolve
 from sysdyn.compiler.model.energies import EnergyModel, Target
 from sysdyn.compiler.model.terms import counter, local_variables, split, without_nested
-from sysdyn.dsl.model.expression import Node, call, sub, time_derivative, variables
+from sysdyn.dsl.model.expression import Node, add, call, sub, substitute, time_derivative, var, variables
+
+TURNED = ("kinetic", "potential", "dissipated", "supplied")
+"""Members of the audit whose magnitudes make up what went round."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +50,19 @@ def add_observations(assembly: Assembly, model: EnergyModel, carriers: frozenset
         assembly.family(Equations("observe", name, name, "observe", unit, place, known, quantity.stored))
         for term in split(expression, (), place, read=True):
             assembly.add("observe", name, (), term.loops, term.expression)
-            assembly.add("observe_scale", name, (), term.loops, call("abs", term.expression))
+            assembly.add("observe_scale", name, (), term.loops, _scale(term.expression))
         for term in split(slope, (), place, read=True) if slope is not None else ():
             assembly.add("observe_rate", name, (), term.loops, term.expression)
+
+
+def _scale(expression: Node) -> Node:
+    """The magnitude of a term; that of the audit's balance is what went round."""
+    read = {n: add(*(call("abs", var(k, "audit")) for k in TURNED)) for n in _balances(expression)}
+    return call("abs", substitute(expression, read) if read else expression)
+
+
+def _balances(expression: Node) -> list[Node]:
+    return [n for n in variables(expression) if n.op == "var" and n.data[:2] == ("energy", "audit")]
 
 
 def pins_and_equations(

@@ -16,8 +16,10 @@ from dataclasses import dataclass, field, replace
 
 from sysdyn.compiler.model.mirror import PRIMAL, Mirror
 from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
+from sysdyn.dsl.model.dimensions import TIME
 from sysdyn.dsl.model.expression import Node, derivative, substitute, topological, var
 from sysdyn.dsl.model.network import Loop, Network, Shape
+from sysdyn.dsl.model.units import multiply, si_text
 from sysdyn.dsl.text.diagnostics import Place
 
 
@@ -46,7 +48,10 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """A coordinate, an implicit unknown or a state with its shape and units by kind of unknown."""
+    """A coordinate, an implicit unknown or a state with its shape and units by kind of unknown.
+
+    balance: of a coordinate, the unit of effort times displacement (J but in pseudo domains).
+    """
 
     name: str
     shape: Shape
@@ -123,7 +128,13 @@ def energies(network: Network) -> EnergyModel:
             Family(
                 c.name,
                 c.shape,
-                {"q": c.displacement.text, "f": c.flow.text, "p": c.momentum.text, "e": c.effort.text},
+                {
+                    "q": c.displacement.text,
+                    "f": c.flow.text,
+                    "p": c.momentum.text,
+                    "e": c.effort.text,
+                    "balance": si_text(multiply(c.effort.dimension, multiply(c.flow.dimension, TIME))),
+                },
                 c.place,
             )
             for c in network.coordinates

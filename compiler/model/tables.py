@@ -16,6 +16,8 @@ from sysdyn.dsl.model.network import Table
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
 Array = NDArray[np.float64]
+ROUND_OFF = 1e-12
+"""Of a table's range: what its argument may pass the end by."""
 
 
 def numbers(table: Table) -> Array:
@@ -23,15 +25,23 @@ def numbers(table: Table) -> Array:
     axes = [np.asarray(points, dtype=float) for points in table.points]
     values = np.asarray(table.values, dtype=float)
     if len(axes) == 1:
-        return np.concatenate((axes[0], coefficients(axes[0], values, table.method, table.outside).ravel()))
+        rows = coefficients(axes[0], values, table.method, table.outside)
+        return np.concatenate((_closed(axes[0], table.outside), rows.ravel()))
     if len(axes) == 2 and table.method == "linear":
         return np.concatenate((axes[0], axes[1], values))
     text = f"table '{table.name}': {len(axes)} arguments with {table.method} are not supported yet"
     raise ModelError([Diagnostic("N608", text, table.place)])
 
 
+def _closed(x: Array, outside: str) -> Array:
+    """The breakpoints that pieces are looked up by: of a table that stops, the last one still belongs to its piece."""
+    if outside != "stop":
+        return x
+    return np.append(x[:-1], x[-1] + ROUND_OFF * (x[-1] - x[0]))
+
+
 def coefficients(x: Array, z: Array, method: str, outside: str) -> Array:
-    """(n + 1, 4) coefficients of the pieces, those before and after the data included."""
+    """(n + 1, 4) coefficients of the pieces, those before and after the data included (no numbers: it stops)."""
     h = np.diff(x)
     if method == "hold":
         inner = np.zeros((len(h), 4))
@@ -45,6 +55,8 @@ def coefficients(x: Array, z: Array, method: str, outside: str) -> Array:
     ends[:, 0] = z[0], z[-1]
     if outside == "extend":
         ends[:, 1] = slopes[0], slopes[-1]
+    if outside == "stop":
+        ends[:] = np.nan
     return np.concatenate((ends[:1], inner, ends[1:]))
 
 
@@ -128,7 +140,7 @@ def evaluate(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any
     u, order = np.asarray(arguments[0], dtype=float), orders[0]
     x = np.asarray(table.points[0], dtype=float)
     rows = coefficients(x, np.asarray(table.values, dtype=float), table.method, table.outside)
-    piece = np.sum(u[..., None] >= x, axis=-1)
+    piece = np.sum(u[..., None] >= _closed(x, table.outside), axis=-1)
     distance = u - x[np.maximum(piece - 1, 0)]
     value = np.zeros_like(u)
     for power in range(order, 4):
@@ -150,6 +162,8 @@ def _bilinear(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> An
         h = axis[i + 1] - axis[i]
         pair = (1 - (held - axis[i]) / h, (held - axis[i]) / h) if order == 0 else (-1 / h, 1 / h)
         live = np.where((held != u) & (order > 0), 0.0, 1.0)
+        if table.outside == "stop":
+            live = np.where(held != u, np.nan, live)
         parts.append((i, live * pair[0], live * pair[1]))
     (i, a0, a1), (j, b0, b1) = parts
     return a0 * (b0 * g[i, j] + b1 * g[i, j + 1]) + a1 * (b0 * g[i + 1, j] + b1 * g[i + 1, j + 1])

@@ -68,6 +68,7 @@ static int32_t sd_cell(const double *x, int32_t n, double u)
 static double sd_weight(const double *x, int32_t n, int32_t clamped, double *u, int order)
 {
     const int outside = *u < x[0] || *u > x[n - 1];
+    if (clamped > 1 && outside) return NAN;
     if (clamped && outside) *u = *u < x[0] ? x[0] : x[n - 1];
     return clamped && outside && order ? 0.0 : 1.0;
 }

@@ -73,6 +73,8 @@ def _table(x, n, u, order):
 def _axis(x, n, clamped, u, order):
     held = np.clip(u, x[0], x[n - 1]) if clamped else u
     scale = np.where((held != u) & (order > 0), 0.0, 1.0)
+    if clamped > 1:
+        scale = np.where(held != u, np.nan, scale)
     i = np.clip(np.searchsorted(x[:n], held, side="right") - 1, 0, n - 2)
     h = x[i + 1] - x[i]
     weight = (held - x[i])/h if order == 0 else 1.0/h

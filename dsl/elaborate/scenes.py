@@ -276,6 +276,9 @@ class SceneReader:
                     node = self.resolver.scalar(target).node
             except Failed:
                 continue  # it has been said
+            if node not in self._raw and node.op == "var" and node.data[1] == "audit":
+                names.append(f"audit.{node.data[0]}")  # in every trace
+                continue
             if node not in self._raw:
                 text = format_expression(target)
                 raise self.resolver.fail(

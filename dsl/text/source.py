@@ -64,10 +64,13 @@ class SourceText:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A span together with the text that it is a span of."""
+    """A span together with the text that it is a span of; element: of which element of the model it speaks, by its
+    path, where a component's text stands for many.
+    """
 
     source: SourceText
     span: Span
+    element: str = ""
 
     @property
     def file(self) -> str:

@@ -79,6 +79,7 @@ class Recorded:
         self.quantities = {name: self._about(name, item) for name, item in sets.items()}
         self.events = self._events(data.get("events"))
         self.final = bool(np.all(self._file.attrs.get("final", 1)))
+        self.met = bool(np.all(self._file.attrs.get("met", 1)))
         tau = np.asarray(self._file.attrs.get("tau", math.nan))
         self.tau = float(tau) if tau.ndim == 0 and tau.dtype.kind in "fiu" and tau >= 0.0 else None
 

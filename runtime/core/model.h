@@ -27,7 +27,9 @@
  *   observe           one row family a traced quantity (and each side of an expect); reads y, yd and the audit
  *   observe_rate      their time derivatives, where known
  *   observe_scale     sum of the magnitudes of the terms of each
- *   audit             four rows: kinetic energy T, potential energy V, power dissipated, power supplied
+ *   audit             kinetic energy T, potential energy V, power dissipated, power supplied; four rows a ledger (ledgers.h)
+ *   ledger            what each element stores; the kind of a row: the number of its ledger, then `inertia` where the sign
+ *                     of that is the sign of an inertia
  *   initial           one row family an `init` that is no unknown of this formulation: expression - value
  * Rates read f as yd of q, f' as yd of f: they never read yd of q.
  * q' = f has no block: the runtime writes those rows itself.

@@ -9,13 +9,15 @@
 
 #define POLL 4 /* steps between two looks at the clock */
 
-sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed)
+sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
+                   int32_t audited)
 {
     sd_run *run = calloc(1, sizeof *run);
     if (!run)
         return NULL;
     size_t n = (size_t)(extended > stepper->n ? extended : stepper->n) + 8, m = (size_t)observed + 8;
-    run->memory = calloc(4 * n + 2 * m, sizeof(double));
+    size_t a = (size_t)audited + 8;
+    run->memory = calloc(4 * n + 2 * m + 5 * a, sizeof(double));
     if (!run->memory) {
         free(run);
         return NULL;
@@ -30,6 +32,12 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
     run->aux_d = run->aux + n;
     run->values = run->aux_d + n;
     run->largest = run->values + m;
+    run->audited = audited;
+    run->power = run->largest + m;
+    run->after = run->power + a;
+    run->sample = run->after + a;
+    run->integral = run->sample + a;
+    run->end = run->integral + a;
     return run;
 }
 
@@ -41,58 +49,69 @@ void sd_run_free(sd_run *run)
     free(run);
 }
 
-/* out [4]: kinetic and potential energy, powers dissipated and supplied */
+/* out [audited]: kinetic and potential energy, powers dissipated and supplied, the rows of the ledgers */
 static void audit(const sd_run *run, double t, const double *y, const double *yd, double *out)
 {
-    memset(out, 0, 4 * sizeof *out);
+    memset(out, 0, (size_t)run->audited * sizeof *out);
     if (run->audit)
         run->audit->rows(&run->audit->frame, t, y, yd, out);
 }
 
-/* integrals of the two powers from the start of the last step to `to`, within that step */
-static void integrate(sd_run *run, double to, double *dissipated, double *supplied, double *end)
+/* run->integral += weight * run->sample */
+static void weigh(sd_run *run, double weight)
+{
+    for (int32_t k = 2; k < run->audited; k++)
+        run->integral[k] += weight * run->sample[k];
+}
+
+static void sample(sd_run *run, double t)
+{
+    run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+    audit(run, t, run->aux, run->aux_d, run->sample);
+}
+
+/* run->integral [audited]: of the powers from the start of the last step to `to`, within that step */
+static void integrate(sd_run *run, double to)
 {
     static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
     const sd_stepper *stepper = run->stepper;
-    double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from), out[4], sum[2] = {0.0, 0.0};
-    if (!run->audit || half == 0.0) {
-        *dissipated = *supplied = 0.0;
+    double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from);
+    memset(run->integral, 0, (size_t)run->audited * sizeof(double));
+    if (!run->audit || half == 0.0)
         return;
-    }
     if (stepper->nodes && to == *stepper->t) {
-        *dissipated = *supplied = 0.0;
         for (int32_t k = 0; k < stepper->nodes; k++) {
             if (stepper->node_weight[k] == 0.0)
                 continue;
-            audit(run, from + stepper->node[k] * (to - from), stepper->node_y[k], stepper->node_yd[k], out);
-            *dissipated += (to - from) * stepper->node_weight[k] * out[2];
-            *supplied += (to - from) * stepper->node_weight[k] * out[3];
+            audit(run, from + stepper->node[k] * (to - from), stepper->node_y[k], stepper->node_yd[k], run->sample);
+            weigh(run, (to - from) * stepper->node_weight[k]);
         }
         return;
     }
+    memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
+    weigh(run, half / 6.0);
     for (int k = -1; k <= 1; k += 2) {
-        run->stepper->dense(run->stepper->self, middle + k * inner * half, run->aux, run->aux_d);
-        audit(run, middle + k * inner * half, run->aux, run->aux_d, out);
-        sum[0] += out[2];
-        sum[1] += out[3];
+        sample(run, middle + k * inner * half);
+        weigh(run, 5.0 * half / 6.0);
     }
-    run->stepper->dense(run->stepper->self, to, run->aux, run->aux_d);
-    audit(run, to, run->aux, run->aux_d, end);
-    *dissipated = half / 6.0 * (run->power_dissipated + 5.0 * sum[0] + end[2]);
-    *supplied = half / 6.0 * (run->power_supplied + 5.0 * sum[1] + end[3]);
+    sample(run, to);
+    weigh(run, half / 6.0);
 }
 
 /* one output row at an instant of the last step, written as of `label` */
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
     double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
-    double out[4], end[4] = {0.0, 0.0, 0.0, 0.0}, dissipated = 0.0, supplied = 0.0;
+    double *out = run->end, dissipated = 0.0, supplied = 0.0;
     if (run->fresh) {
         memcpy(run->point, run->stepper->y, (size_t)run->stepper->n * sizeof(double));
         memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
     } else {
-        if (!at_step)
-            integrate(run, t, &dissipated, &supplied, end);
+        if (!at_step) {
+            integrate(run, t);
+            dissipated = run->integral[2];
+            supplied = run->integral[3];
+        }
         run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
     }
     if (run->settle)
@@ -170,7 +189,7 @@ static int drain(sd_run *run)
  * instant is not earlier. */
 static void rows_of_start(sd_run *run, double label)
 {
-    double out[4], t = *run->stepper->t;
+    double t = *run->stepper->t;
     int32_t before = run->rows;
     while (run->next < run->instants && run->instant[run->next] < label) {
         double kind = (double)run->instant_kind[run->next];
@@ -186,9 +205,9 @@ static void rows_of_start(sd_run *run, double label)
         run->rows--; /* nobody asked for it */
         run->rows_written--;
     }
-    audit(run, t, run->point, run->point_d, out);
-    run->power_dissipated = out[2];
-    run->power_supplied = out[3];
+    audit(run, t, run->point, run->point_d, run->after);
+    if (run->ledgers)
+        sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after);
     run->t_from = t;
     run->fresh = 0;
 }
@@ -207,7 +226,7 @@ static int begin(sd_run *run)
 void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
                     const double *before_d)
 {
-    double old[4], new[4];
+    double *old = run->sample, *new = run->end;
     size_t written = (size_t)run->written * sizeof(double);
     memcpy(run->aux, before, written);
     memcpy(run->aux_d, before_d, written);
@@ -216,21 +235,31 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
     memcpy(run->aux_d, yd, written);
     audit(run, t, run->aux, run->aux_d, new);
     run->supplied += (new[0] + new[1]) - (old[0] + old[1]);
+    if (run->ledgers)
+        sd_ledgers_jump(run->ledgers, old, new);
     run->stepper->start(run->stepper->self, t, y, yd, 0.0);
     run->fresh = 1;
     rows_of_start(run, label);
 }
 
-/* quadratures over the step just accepted */
+/* quadratures over the step just accepted, powers and balances at its end */
 static void measure(sd_run *run, double from)
 {
-    double dissipated, supplied, end[4] = {0.0, 0.0, 0.0, 0.0};
+    double t = *run->stepper->t;
     run->t_from = from;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
-    integrate(run, *run->stepper->t, &dissipated, &supplied, end);
-    run->dissipated += dissipated;
-    run->supplied += supplied;
+    integrate(run, t);
+    run->dissipated += run->integral[2];
+    run->supplied += run->integral[3];
+    if (run->audit) {
+        run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+        audit(run, t, run->aux, run->aux_d, run->after);
+    }
+    if (run->ledgers) {
+        sd_ledgers_add(run->ledgers, run->integral);
+        sd_ledgers_note(run->ledgers, t, run->aux, run->aux_d, run->after);
+    }
     /* powers at the start of the next step are kept apart until the rows of this one are written */
     run->pending = 1;
 }
@@ -244,7 +273,7 @@ static double now(void)
 
 int sd_run_advance(sd_run *run, int64_t steps, double seconds)
 {
-    double until = now() + seconds, out[4];
+    double until = now() + seconds;
     if (!run->started && begin(run))
         return SD_FULL;
     for (int64_t k = 0; k < steps; k++) {
@@ -252,18 +281,15 @@ int sd_run_advance(sd_run *run, int64_t steps, double seconds)
             return SD_FULL;
         if (*run->stepper->system->stop)
             return SD_FAILED;
-        if (*run->stepper->t >= *run->stepper->t_end)
-            return SD_FINISHED;
         double from = *run->stepper->t;
-        if (run->audit && *run->stepper->taken > 0) { /* else they are those of the start */
-            run->stepper->dense(run->stepper->self, from, run->aux, run->aux_d);
-            audit(run, from, run->aux, run->aux_d, out);
-            run->power_dissipated = out[2];
-            run->power_supplied = out[3];
-        }
+        if (from >= *run->stepper->t_end)
+            return SD_FINISHED;
+        memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
         if (run->stepper->step(run->stepper->self))
             return SD_FAILED;
         measure(run, from);
+        if (run->ledgers && run->ledgers->lost >= 0)
+            return SD_FAILED;
         if (drain(run))
             return SD_FULL;
         if (k % POLL == POLL - 1 && now() > until)

@@ -12,6 +12,7 @@
 #define SYSDYN_RUN_H
 
 #include "least_norm.h"
+#include "ledgers.h"
 #include "settle.h"
 #include "stepper.h"
 
@@ -23,8 +24,10 @@ typedef struct sd_run {
     sd_stepper *stepper;
     sd_settle *settle;
     sd_least_norm *least_norm;        /* NULL: multipliers are as they come */
+    sd_ledgers *ledgers;              /* NULL: none is kept */
     int32_t written;                  /* unknowns as written: y of blocks observe, audit */
     int32_t observed;
+    int32_t audited;                  /* rows of block audit */
     const sd_call *audit;             /* NULL: no audit block */
     const sd_call *observe, *observe_rate, *observe_scale;   /* NULL where missing */
     const int32_t *audit_at;          /* [6] places of energy, kinetic, potential, dissipated, supplied, constraints */
@@ -38,13 +41,16 @@ typedef struct sd_run {
     int32_t rows, next, pending, started, fresh;   /* fresh: at a point started from, no step yet */
     double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
     double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
-    double t_from, power_dissipated, power_supplied;
+    double t_from;
+    double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
+                                                        * sample; integrals over the step; of a row */
     double *point, *point_d, *aux, *aux_d, *values, *largest, *memory;   /* largest [observed]: of observe_scale */
     int64_t rows_written;
     double first_energy;
 } sd_run;
 
-sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed);
+sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
+                   int32_t audited);
 void sd_run_free(sd_run *run);
 /* goes on from y, yd [n] at t with the row of the instant `label`; before [written], before_d: the point at the end of the
  * last step */

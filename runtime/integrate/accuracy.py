@@ -27,6 +27,8 @@ SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
 RATIO = 0.1
 """Of the tolerances of the first two runs."""
+ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
+"""Relative errors below this are those of the numbers themselves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +45,12 @@ class Sampled:
 
 @dataclass(frozen=True, slots=True)
 class Achieved:
-    """error_estimate: largest relative error estimated of the last run; met: it is within what was asked."""
+    """error_estimate: largest relative error estimated of the last run (None: nothing estimates it, and it is not
+    met); below_round_off: the estimate is less than double precision resolves; met: it is within what was asked.
+    """
 
-    error_estimate: float
+    error_estimate: float | None
+    below_round_off: bool
     met: bool
     runs: int
     tolerance: float
@@ -58,7 +63,7 @@ Run = Callable[[float, Floats | None], Sampled]
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
     """(largest relative difference, the same over the accuracy wanted) of two runs."""
     size = np.maximum(coarse.largest, fine.largest)
-    use = (size > 0.0) & np.isfinite(target)
+    use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
     if not use.any() or not fine.values.size:
         return 0.0, 0.0
     if coarse.values.shape != fine.values.shape:
@@ -72,6 +77,13 @@ def _shrink(power: float, step: float) -> float:
     """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger."""
     ratio = 10.0 ** (-power * step)
     return float(SAFETY * ratio / (1.0 - ratio))
+
+
+def _achieved(estimate: float, met: bool, runs: int, tolerance: float) -> Achieved:
+    """A finite estimate, or none at all."""
+    if not np.isfinite(estimate):
+        return Achieved(None, False, False, runs, tolerance)
+    return Achieved(estimate, estimate < ROUND_OFF, met, runs, tolerance)
 
 
 def control(run: Run, target: Floats, finest: float = FINEST) -> Achieved:
@@ -100,7 +112,7 @@ def control(run: Run, target: Floats, finest: float = FINEST) -> Achieved:
         except SolverFailure as failure:
             if failure.cause in ("max_steps", "max_wall") or number == 2:
                 raise
-            return Achieved(relative, False, number, last.tolerance)
+            return _achieved(relative, False, number, last.tolerance)
         step = float(np.log10(last.tolerance / now.tolerance))
         apart, over = difference(last, now, target)
         if before is not None and before > 0.0 and 0.0 < over < before and last_step > 0.0:
@@ -110,11 +122,11 @@ def control(run: Run, target: Floats, finest: float = FINEST) -> Achieved:
             shrink = 1.0  # no convergence seen: no credit for the smaller tolerance
         estimate, relative = over * shrink, apart * shrink
         if estimate <= 1.0:
-            return Achieved(relative, True, number, now.tolerance)
+            return _achieved(relative, True, number, now.tolerance)
         if now.tolerance <= 1.01 * finest:
-            return Achieved(relative, False, number, now.tolerance)
+            return _achieved(relative, False, number, now.tolerance)
         before, last, last_step = over, now, step
         # the tolerance at which the next run should do, with the estimate's own safety
         drop = np.clip((1.0 / (1.5 * estimate)) ** (1.0 / max(power, CREDIT)), 1e-3, 0.2)
         tolerance = max(float(drop) * now.tolerance, finest)
-    return Achieved(relative, False, RUNS, last.tolerance)
+    return _achieved(relative, False, RUNS, last.tolerance)

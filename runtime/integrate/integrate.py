@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.least_norm import LeastNorm
+from sysdyn.runtime.integrate.ledgers import Ledgers
 from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.metric import kinematic_scale, light
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
@@ -138,9 +139,12 @@ class Integration:
             system.form.written,
             system.form.extended,
             self.observed,
+            system.observed_rows("audit")[1],
         )
         if not self.run_:
             raise MemoryError
+        self.ledgers = Ledgers(system)
+        self.run_.contents.ledgers = self.ledgers.address
         self._calls = {
             name: system.observer(name) for name in ("audit", "observe", "observe_rate", "observe_scale")
         }
@@ -175,8 +179,16 @@ class Integration:
             sink(self._rows[: run.rows].copy())
             run.rows = 0
 
+    def _placed(self, failure: SolverFailure) -> SolverFailure:
+        """The failure with the last good point."""
+        n, (y, yd) = self.system.form.written, self.method.point()
+        failure.state = (self.method.contents.t, y[:n].copy(), yd[:n].copy())
+        return failure
+
     def _failure(self, cause: str) -> SolverFailure:
         method = self.method.contents
+        if self.ledgers.lost is not None:
+            return SolverFailure("inertia", method.t, method.h, None, self.ledgers.lost)
         unknown: str | None = None
         row: RowLabel | None = None
         if cause in ("singular", "nonfinite") and 0 <= method.bad_row < self.system.rows:
@@ -261,7 +273,7 @@ class Integration:
             if progress is not None:
                 progress(method.t)
             if state == 3:
-                raise self._failure(lib.CAUSES[method.cause])
+                raise self._placed(self._failure(lib.CAUSES[method.cause]))
             if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
                 raise self._failure("max_steps")
             late = request.max_wall is not None and time.monotonic() - began > request.max_wall
@@ -289,6 +301,7 @@ class Integration:
             self.largest(),
             self.cpu,
             self.settler.core.contents.failures,
+            self.ledgers.balances(),
         )
 
     def __del__(self) -> None:

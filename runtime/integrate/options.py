@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.runtime.integrate.request import COMPARED, STEP, TRACE
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.failures import NoSuchForm
+from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
 from sysdyn.runtime.structure.structure import Structure
 from sysdyn.runtime.trace.trace import Parameter
 
@@ -86,11 +86,11 @@ def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[s
         return "2v", min(written, 2), ()
     if wanted == "1":
         return "1", min(written, 1), ()
-    raise ValueError(f"index {wanted}: auto, 3, 2, 2v, 1 or 0")
+    raise WrongOption(f"index {wanted}: auto, 3, 2, 2v, 1 or 0")
 
 
 def choose_method(options: Options) -> str:
-    """The method of the core, or euler, with which a simulation begins; ValueError for what does not exist.
+    """The method of the core, or euler, with which a simulation begins; WrongOption for what does not exist.
 
     auto: radau from an accuracy of FINE on, else bdf.  Measured over the seed's models (CPU of radau over that of bdf,
     geometric mean): 1.08 at 1e-2, 0.78 at 1e-4 and 1e-6, about 0.5 at 1e-9.  The underlying equation (index 0) is
@@ -104,15 +104,15 @@ def choose_method(options: Options) -> str:
         return "radau" if min(wanted) <= FINE and not own else "bdf"
     if options.method in ("bdf", "radau", "dopri", "euler"):
         return options.method
-    raise ValueError(f"method {options.method}: auto, bdf, radau, dopri or euler")
+    raise WrongOption(f"method {options.method}: auto, bdf, radau, dopri or euler")
 
 
 def instants(options: Options) -> tuple[Floats, Ints]:
-    """Instants and kinds of rows: grid, --at, comparison.  Raises ValueError for instants outside the span."""
+    """Instants and kinds of rows: grid, --at, comparison.  Raises WrongOption for instants outside the span."""
     t0, t1 = options.t_start, options.t_end
     outside = [t for t in options.at if not t0 <= t <= t1]
     if outside:
-        raise ValueError(f"instant {outside[0]:g} s lies outside {t0:g} .. {t1:g} s")
+        raise WrongOption(f"instant {outside[0]:g} s lies outside {t0:g} .. {t1:g} s")
     wanted = np.asarray(options.at, dtype=np.float64)
     if options.every is not None:
         number = int(np.floor((t1 - t0) / options.every * (1.0 + 1e-12)))

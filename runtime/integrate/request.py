@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 
@@ -68,7 +69,7 @@ class Finished:
     """An integration that reached its end.
 
     magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
-    their expressions; cpu [s].
+    their expressions; cpu [s]; balances: of the ledgers.
     """
 
     reached: float
@@ -77,3 +78,4 @@ class Finished:
     largest: Floats
     cpu: float
     unsettled: int
+    balances: tuple[Balance, ...] = ()

@@ -31,6 +31,12 @@ LONG = 1000
 STIFF = 1e5
 """Steps that a stiff dopri which was asked for still takes."""
 
+METERS = {
+    "audit.kinetic": 2, "audit.potential": 3, "audit.dissipated": 4, "audit.supplied": 5, "audit.energy": 6,
+    "audit.constraints": 7,
+}  # fmt: skip
+"""Places of the audit's members in a row."""
+
 
 @dataclass(frozen=True, slots=True)
 class Samples:
@@ -70,6 +76,7 @@ class Runs:
         self.rows: list[Floats] = []
         self.samples: list[Floats] = []
         self.done: tuple[Finished, list[Floats], TraceWriter] | None = None
+        self.samplings: tuple[tuple[Floats, Sampled], ...] = ()
 
     def request(self, rtol: float, atol: float | None, magnitude: Floats | None) -> Request:
         """One integration's request."""
@@ -170,7 +177,8 @@ class Runs:
         assert self.writer is not None
         if first:
             nominal = self.nominal(integration.largest(), integration.magnitude)
-            self.writer.finish(nominal, self.last_attributes(None), final=False)
+            attributes: dict[str, str | float | int] = {**self.last_attributes(None), "met": 0, "judged": ""}
+            self.writer.finish(nominal, attributes, final=False)
             return
         self.writer.discard()
         with contextlib.suppress(OSError):
@@ -229,10 +237,48 @@ class Runs:
     def sampled(self, tolerance: float, magnitude: Floats | None) -> Sampled:
         """One run of the accuracy control."""
         finished = self.run(tolerance, None, magnitude)
-        places = [column.place for column in self.columns]
+        places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
         rows = np.concatenate(self.rows) if self.rows else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
-        values = rows[:, lib.ROW_HEAD :][:, places]
-        return Sampled(tolerance, values, self.sizes(finished.largest, finished.magnitude), finished.magnitude)
+        sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
+        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.magnitude)
+        self.samplings = (*self.samplings[-1:], (rows[:, 0], found))
+        return found
+
+    @property
+    def meters(self) -> tuple[str, ...]:
+        """Members of the audit of which accuracy is asked, though they are not traced."""
+        names = {column.name for column in self.columns}
+        return tuple(name for name, _ in self.options.accuracy_on if name in METERS and name not in names)
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """Names of the quantities of `sampled`."""
+        return (*(column.name for column in self.columns), *self.meters)
+
+    def _turned_over(self, meter: str) -> float:
+        """What an error of a meter is relative to: the norm of constraints is scaled, energies are what went round."""
+        assert self.finished is not None
+        turnover = sum(b.turnover for b in self.finished.balances if b.kind == "energy" and b.unit == "J")
+        return 1.0 if meter == "audit.constraints" else turnover
+
+    def worst(self, target: Floats) -> tuple[str, float, float | None]:
+        """Of the last two runs: the quantity whose difference is largest beside what is asked of it (target
+        [compared]), that, and the first instant [s] at which it differs by more.
+        """
+        asked = {name: float(wanted) for name, wanted in zip(self.compared, target, strict=True)}
+        name = min(asked, key=lambda n: asked[n], default="")
+        if len(self.samplings) < 2 or self.samplings[0][1].values.shape != self.samplings[1][1].values.shape:
+            return name, asked.get(name, 0.0), None
+        (time, one), (_, two) = self.samplings
+        size = np.maximum(one.largest, two.largest)
+        with np.errstate(all="ignore"):
+            ratio = np.abs(two.values - one.values) / (size * target)
+        ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
+        ratio = np.where(one.values == two.values, 0.0, ratio)
+        k = int(np.argmax(ratio.max(axis=0)))
+        beyond = np.flatnonzero(ratio[:, k] > 1.0)
+        name = self.compared[k]
+        return name, asked[name], float(time[beyond[0]]) if beyond.size else None
 
     def collected(self) -> Samples:
         """Samples of the run that stands in the trace."""

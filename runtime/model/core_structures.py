@@ -292,6 +292,27 @@ class LeastNorm(c.Structure):
     ]
 
 
+class Record(c.Structure):
+    """sd_record."""
+
+    _fields_ = [("t", _D), ("value", _D), ("ledger", _I)]
+
+
+class Ledgers(c.Structure):
+    """sd_ledgers."""
+
+    _fields_ = [
+        ("count", _I),
+        ("elements", _I),
+        *[(name, _P) for name in ["contents", "of", "inertia", "gross", "most", "largest", "element", "record"]],
+        ("records", _I),
+        ("room", _I),
+        *[(name, _P) for name in ["stored", "balance", "highest", "dissipated", "supplied", "value", "before"]],
+        ("begun", _I),
+        ("lost", _I),
+    ]
+
+
 class Run(c.Structure):
     """sd_run."""
 
@@ -299,8 +320,10 @@ class Run(c.Structure):
         ("stepper", _P),
         ("settle", _P),
         ("least_norm", _P),
+        ("ledgers", _P),
         ("written", _I),
         ("observed", _I),
+        ("audited", _I),
         *[
             (name, _P)
             for name in [
@@ -325,7 +348,8 @@ class Run(c.Structure):
         ("started", _I),
         ("fresh", _I),
         *[(name, _D) for name in ["stored", "dissipated", "supplied", "step_dissipated", "step_supplied"]],
-        *[(name, _D) for name in ["t_from", "power_dissipated", "power_supplied"]],
+        ("t_from", _D),
+        *[(name, _P) for name in ["power", "after", "sample", "integral", "end"]],
         *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "memory"]],
         ("rows_written", _L),
         ("first_energy", _D),

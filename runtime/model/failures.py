@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 @dataclass(frozen=True, slots=True)
 class RowLabel:
@@ -31,14 +34,18 @@ class TraceError(Exception):
     """The trace cannot be written or read."""
 
 
-class NoSuchForm(ValueError):  # noqa: N818
+class WrongOption(Exception):  # noqa: N818
+    """An option of a simulation that makes no sense; the message says what would."""
+
+
+class NoSuchForm(Exception):  # noqa: N818
     """The asked index form or method is impossible for the model (E607); the message says what is possible."""
 
 
 class SolverFailure(Exception):  # noqa: N818 (a name of the house)
     """The integration stopped at `time` [s] with step `step` [s].
 
-    cause: newton, error_test, singular, nonfinite, step_too_small, stiff, max_steps, max_wall, memory.
+    cause: newton, error_test, singular, inertia, nonfinite, step_too_small, stiff, max_steps, max_wall, memory.
     unknown: name of the unknown in the way, row: its row; None where the cause has no place.
     """
 
@@ -47,6 +54,8 @@ class SolverFailure(Exception):  # noqa: N818 (a name of the house)
     ) -> None:
         self.cause, self.time, self.step, self.unknown, self.row = cause, time, step, unknown, row
         self.partial: object = None
+        self.state: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
+        """t [s], y, yd [unknowns as written] at the last good point."""
         place = "".join(
             [f", row {row}" if row else "", f", unknown {unknown}" if unknown else ""],
         )

@@ -222,6 +222,16 @@ class System:
         self.failure.check()
         return out[:number]
 
+    def rows_at(self, block: str, at: Ints, to: Ints, rows: int, t: float, y: Floats, yd: Floats) -> Floats:
+        """R [rows] of one block alone, for places of families (at) and of rows (to) of the caller's choice."""
+        call = self.call(block, np.ascontiguousarray(at), np.ascontiguousarray(to), max(rows, 1))
+        out = np.zeros(max(rows, 1))
+        a, b = self._buffer(y), self._buffer(yd)
+        lib.ROWS(call.rows)(c.addressof(call.frame), t, lib.pointer(a), lib.pointer(b), lib.pointer(out))
+        del self._keep[-1]
+        self.failure.check()
+        return out[:rows]
+
     def observe(self, t: float, y: Floats, yd: Floats, audit: Mapping[str, float] | None = None) -> Floats:
         """Traced quantities (and sides of expects) at a point, in the order of their rows."""
         a, b = self._buffer(y[: self.form.written]), self._buffer(yd[: self.form.written])

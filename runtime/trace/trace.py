@@ -288,6 +288,16 @@ class Trace:
         return bool(self.attributes.get("final", 1))
 
     @property
+    def met(self) -> bool:
+        """The run met what it judged itself by; a trace that does not say counts as met."""
+        return bool(self.attributes.get("met", 1))
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """What the run judged itself by: accuracy, energy, invariants."""
+        return tuple(str(self.attributes.get("judged", "")).split())
+
+    @property
     def statistics(self) -> dict[str, Any]:
         """Counters of the run."""
         return dict(json.loads(self.attributes.get("statistics", "{}")))

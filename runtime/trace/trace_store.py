@@ -128,7 +128,7 @@ class Store:
             fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_UN)
         try:
             if like is None:
-                _set(self._file.attrs, {**layout.attributes, "final": np.int64(0)})
+                _set(self._file.attrs, {**layout.attributes, "final": np.int64(0), "met": np.int64(0), "judged": ""})
                 self._create(layout)
                 self._file.flush()
             else:

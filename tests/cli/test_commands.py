@@ -68,7 +68,7 @@ def test_without_arguments_the_help_is_shown(capsys):
             ["simulate", "two.sd", "--scene", "swing", "--accuracy", "1e-3", "--atol", "1e-3"],
             "--accuracy together with",
         ),
-        (["simulate", "two.sd", "--scene", "swing", "--accuracy", "0"], "must be positive"),
+        (["simulate", "two.sd", "--scene", "swing", "--accuracy", "0"], "from 1e-13"),
         (["simulate", "two.sd", "--scene", "swing", "--accuracy", "2"], "less than 1"),
         (["simulate", "two.sd", "--scene", "swing", "--rtol", "-1"], "--rtol -1"),
         (["simulate", "two.sd", "--scene", "swing", "--atol", "-1"], "--atol -1"),

@@ -230,8 +230,8 @@ scene long of chaos {
 }
 """
     )
-    assert run(["golden", "record", "chaos.sd"]) == 1
-    assert "below ten times that" in capsys.readouterr().err
+    assert run(["golden", "record", "chaos.sd"]) == 3
+    assert "the accuracy asked was not reached: x" in capsys.readouterr().err
     assert not (project / "golden/chaos").exists()
 
 

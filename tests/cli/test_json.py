@@ -103,7 +103,7 @@ def test_simulate_that_the_solver_cannot_finish(tmp_path, capsys):
     assert found["result"]["final"] is False
     assert found["result"]["reached"] == pytest.approx(1.0, abs=1e-3)
     (failure,) = (d for d in found["diagnostics"] if d["severity"] == "error")
-    assert failure["code"] == "solver"
+    assert failure["code"] == "E930"
     assert "t = " in failure["message"]
 
 

@@ -58,6 +58,8 @@ def test_the_trace_is_as_the_contract_says(tmp_path):
             "statistics",
             "timings",
             "final",
+            "met",
+            "judged",
         }
         assert set(file.attrs) == wanted
         assert file.attrs["final"] == 1

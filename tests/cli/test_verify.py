@@ -209,12 +209,10 @@ def test_carriers_that_differ_are_found(tmp_path, capsys, monkeypatch):
     assert "c and numpy disagree in hamiltonian: row" in found["diagnostics"][-1]["message"]
 
 
-def test_an_expectation_that_fails_is_said_once_with_exit_1(tmp_path, capsys):
+def test_an_expectation_that_fails_is_listed_and_never_decides(tmp_path, capsys):
     code, found = run_json(capsys, "verify", write(tmp_path, FAILING))
-    assert code == 1
-    (error,) = (d for d in found["diagnostics"] if d["severity"] == "error")
-    assert error["code"] == "E909"
-    assert "(in " not in error["message"]
+    assert code == 0
+    assert not [d for d in found["diagnostics"] if d["severity"] == "error"]
     assert [e["ok"] for r in found["result"]["runs"] for e in r["expects"]] == [False] * 5
     assert found["result"]["disagreements"] == []
 
@@ -262,11 +260,11 @@ def test_quantities_without_an_accuracy_are_left_out(tmp_path, capsys):
     assert {item["reason"] for item in found["result"]["not_compared"]} == {"no accuracy is asked of it"}
 
 
-def test_a_scene_that_traces_nothing_cannot_be_compared(tmp_path, capsys):
+def test_a_scene_that_traces_nothing_is_compared_on_its_coordinates(tmp_path, capsys):
     text = re.sub(r"  trace .*\n", "", PENDULUM)
     code, found = run_json(capsys, "verify", write(tmp_path, text))
-    assert code == 3
-    assert "nothing to compare (the scene traces nothing)" in found["diagnostics"][-1]["message"]
+    assert code == 0
+    assert found["result"]["compared"] == ["x", "y"]
 
 
 def test_without_an_interval_the_runs_share_instants(tmp_path, capsys):

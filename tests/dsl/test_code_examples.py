@@ -13,6 +13,7 @@ ELSEWHERE = {
     "E901": "a scene that is not there is named on the command line",
     "E907": "found when simulating",
     "E909": "found when simulating, but for static claims",
+    **dict.fromkeys(("E608", "W920", "E931", "E932", "E933", "E934"), "found when simulating"),
 }
 EXAMPLES = {code: page for code, page in codes.codes().items() if page.bad}
 

@@ -5,6 +5,7 @@ import pytest
 import small_models as models
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.failures import WrongOption
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.start.start import consistent_start
@@ -107,5 +108,5 @@ def test_a_singular_configuration_is_not_redundant():
 
 
 def test_what_is_no_policy(tmp_path):
-    with pytest.raises(ValueError, match="redundancy"):
+    with pytest.raises(WrongOption, match="redundancy"):
         run(pendulum(), tmp_path / "t.h5", "maybe")

@@ -5,7 +5,7 @@ import pytest
 import small_models as models
 from sysdyn.runtime.integrate.options import Options, choose_index
 from sysdyn.runtime.model.carrier import load
-from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.failures import SolverFailure, WrongOption
 from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.trace.trace import Parameter, Trace
 
@@ -59,7 +59,7 @@ def test_trace_of_accepted_steps_holds_the_instants_asked_for(tmp_path):
     assert trace.time.size > 40
     # derivatives are those of the quantity
     assert np.allclose(trace["q1"].derivative, trace["f1"].values, atol=1e-14)
-    with pytest.raises(ValueError, match="outside"):
+    with pytest.raises(WrongOption, match="outside"):
         outcome(models.pendulum(), tmp_path / "p.h5", 4.0, at=(5.0,))
 
 
@@ -72,11 +72,13 @@ def test_expert_mode_is_one_run(tmp_path):
     assert trace.attributes["atol"] == 1e-9
 
 
-def test_accuracy_that_cannot_be_reached_is_a_warning(tmp_path):
+def test_an_accuracy_that_cannot_be_reached_is_not_met(tmp_path):
     result = outcome(models.slider_crank(), tmp_path / "o.h5", 1.0, accuracy=1e-15, every=0.1)
     assert result.final
-    assert "not reached" in result.warnings[0]
-    assert result.error_estimate < 1e-9
+    assert not result.met
+    (missed,) = result.judgement.not_met
+    assert (missed.what, missed.limit) == ("accuracy", 1e-15)
+    assert missed.value == result.error_estimate < 1e-9
 
 
 def test_accuracy_on_one_quantity(tmp_path):
@@ -148,8 +150,8 @@ def test_index_option(wanted, form, tmp_path):
 
 
 def test_options_that_do_not_exist(tmp_path):
-    with pytest.raises(ValueError, match="index 7"):
+    with pytest.raises(WrongOption, match="index 7"):
         outcome(models.pendulum(), tmp_path / "o.h5", 1.0, index="7")
-    with pytest.raises(ValueError, match="method rk4"):
+    with pytest.raises(WrongOption, match="method rk4"):
         outcome(models.pendulum(), tmp_path / "o.h5", 1.0, method="rk4")
     assert choose_index is not None

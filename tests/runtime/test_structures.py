@@ -13,7 +13,7 @@ CORE = Path(__file__).parents[2] / "runtime" / "core"
 def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs = [("Frame", "sd_frame"), ("Call", "sd_call"), ("System", "sd_system"), ("Linear", "sd_linear")]
     pairs += [("Bdf", "sd_bdf"), ("Settle", "sd_settle"), ("Stepper", "sd_stepper"), ("Radau", "sd_radau")]
-    pairs += [("LeastNorm", "sd_least_norm"), ("Run", "sd_run")]
+    pairs += [("LeastNorm", "sd_least_norm"), ("Run", "sd_run"), ("Ledgers", "sd_ledgers"), ("Record", "sd_record")]
     headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau")]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:

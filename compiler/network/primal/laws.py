@@ -14,7 +14,7 @@ Everything is still said in the branches' own variables; `reading` replaces thes
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
 from sysdyn.compiler.network.primal.choices import OWN, Choice, Law, own
@@ -102,6 +102,7 @@ class _Statement:
 
     def __init__(self, element: Element, law: Law, names: dict[tuple[int, str], Part], found: Laws) -> None:
         self.element, self.branch, self.law, self.names, self.found = element, element.branch, law, names, found
+        self.place = replace(self.branch.place, element=self.branch.name)
 
     def say(self) -> None:
         """Add everything to the laws found."""
@@ -110,7 +111,7 @@ class _Statement:
         found.tables.update((t.name, t) for t in law.tables)
         if law.how == "energy":
             assert law.stated is not None
-            found.energies.append(Energy(ENERGY[b.kind], law.stated, b.loops, b.place))
+            found.energies.append(Energy(ENERGY[b.kind], law.stated, b.loops, self.place))
             self._explicit()
         elif law.how == "work":
             assert law.stated is not None
@@ -137,7 +138,7 @@ class _Statement:
 
     def _work(self, effort: Node) -> None:
         b = self.branch
-        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, b.place, self.law.kept is not None))
+        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, self.place, self.law.kept is not None))
 
     def _row(self, kind: str, equation: Node | None, unit: Unit) -> None:
         b = self.branch
@@ -148,7 +149,7 @@ class _Statement:
         """An implicit effort closed by a gamma; with a momentum as state, p' = e."""
         b, number, found = self.branch, self.element.number, self.found
         if self.law.kept is not None:
-            found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, b.place))
+            found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, self.place))
         part = self.names[number, "e"]
         found.unknowns.setdefault(part.name, Unknown(part.name, shape_of(part.box), b.domain.effort, b.place))
         effort = var(part.name, "e", *b.at)
@@ -193,7 +194,8 @@ def _couple(coupling: Coupling, label: str, elements: Sequence[Element], sizes: 
     if c.kind == "gyrator":
         efforts = mul(c.ratio, second), neg(mul(c.ratio, first))
         for effort, name in zip(efforts, (c.first, c.second), strict=True):
-            found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, c.place))
+            place = replace(c.place, element=_stem(c.first))
+            found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, place))
     else:
         multiplier = var(label, "mu", *c.at)
         if c.side == "f":

@@ -1,0 +1,77 @@
+"""Which function of which row is no number, where a run cannot go on: the rows evaluated node by node.
+
+The rows of the form are evaluated by the interpreter at the last good point and at points ahead along its rates; the
+first operation whose arguments are numbers and whose value is none is named with its argument.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES
+from sysdyn.dsl.model.expression import Node, to_text, topological
+from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+
+AHEAD = (0.0, 1e-9, 1e-6, 1e-3, 1e-2, 1e-1)
+"""Times ahead at which rows are evaluated, of the time passed so far (and multiples of the step)."""
+STEPS = (1.0, 10.0, 100.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Culprit:
+    """code: E932 (a table) or E933; text: the sentence; row: that holds the function."""
+
+    code: str
+    text: str
+    row: RowLabel
+
+
+def culprit(prepared: Prepared, error: SolverFailure) -> Culprit | None:
+    """The operation that is no number at the failure, or just ahead of the last good point; None where all are."""
+    if error.state is None:
+        return None
+    t, y, yd = error.state
+    oracle = Oracle(prepared.compiled.form, prepared.binding)
+    blocks = [b for b in prepared.compiled.form.blocks if b.name not in (*WITHOUT_ENTRIES, "initial")]
+    rates = np.where(np.isfinite(yd), yd, 0.0)
+    for ahead in (*(s * error.step for s in STEPS), *(a * max(abs(t), error.step) for a in AHEAD)):
+        point = t + ahead, y + ahead * rates, yd
+        for block in blocks:
+            found = oracle.undefined(block.name, *point, infinite=error.cause == "nonfinite")
+            if found is not None:
+                return _told(prepared, *found)
+    return None
+
+
+def _told(prepared: Prepared, row: int, node: Node, arguments: list[float]) -> Culprit:
+    place = _statement(prepared, node) or prepared.compiled.form.rows[row].place
+    label = RowLabel(
+        place.element if place else "", "law", place.file if place else "", place.start[0] if place else 0
+    )
+    listed = ", ".join(f"{a:.9g}" for a in arguments)
+    if node.op == "table":
+        return Culprit("E932", f"the argument of table {node.data[0]} left its range: it is {listed}", label)
+    text = to_text(node)
+    shown = text if len(text) <= 60 else text[:57] + "..."
+    name = {"call": str(node.data), "pow": "a power", "mul": "a quotient or power", "sum": "a sum"}[node.op]
+    return Culprit("E933", f"{name} is outside its domain: {shown} with {listed}", label)
+
+
+def _statement(prepared: Prepared, node: Node) -> Place | None:
+    """The statement that holds a node, or one of its function (a derivative's own node stands in no text)."""
+    network = prepared.compiled.network
+    said = [(e.expression, e.place) for e in network.energies]
+    said += [(w.effort, w.place) for w in network.works]
+    said += [(c.expression, c.place) for c in network.constraints]
+    said += [(d.expression, d.place) for d in network.dynamics]
+    names = {"table": lambda n: n.op == "table" and n.data[0] == node.data[0]}
+    alike = names.get(node.op, lambda n: n.op == node.op and n.data == node.data)
+    for matches in (lambda n: n is node, alike):
+        for expression, place in said:
+            if any(matches(n) for n in topological([expression])):
+                return place
+    return None

@@ -1,0 +1,104 @@
+"""Before the first step: do the rows of the compiled module say what the text says?
+
+The module's blocks are compared with the interpreted nodes at the start and at points nearby (families by sample).  It
+is there for faults of the generation, of the C compiler and of a damaged cache: those that conserve energy too.
+Received: a prepared model and its start; raises ModuleFault.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.starting import Started
+from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
+from sysdyn.compiler.forms.descriptor import Block
+from sysdyn.runtime.model.scales import magnitudes
+from sysdyn.runtime.model.system import System
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""Difference allowed, of the terms of a row: sums are ordered apart, and functions differ in their last digits."""
+NEARBY = (1e-2, 0.3)
+"""Distances of the points from the start, of the unknowns' magnitudes."""
+
+
+class ModuleFault(Exception):  # noqa: N818 (a fault in sysdyn, exit 4)
+    """The compiled module does not say what the text says; the message names the row."""
+
+
+def check_module(prepared: Prepared, started: Started, until: float) -> None:
+    """Compare every block at the start and nearby, up to `until` [s].  Raises ModuleFault."""
+    system = started.system
+    oracle = SampledRows(prepared.compiled.form, prepared.binding)
+    points = _points(system, started, oracle, until)
+    for block in prepared.compiled.form.blocks:
+        sample = oracle.sample(block, points)
+        module = _module_rows(system, oracle, block, points)
+        wrong = _apart(module, sample)
+        if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
+            sample = oracle.sample(block, points, careful=True)
+            wrong = _apart(module, sample)
+        if wrong.any():
+            k, row = np.argwhere(wrong)[0]
+            place = int(sample.rows[row])
+            values = float(module[k, place]), float(sample.value[k, row])
+            raise ModuleFault(_told(prepared, oracle, block, place, values))
+
+
+def _apart(module: Array, sample: Sample) -> NDArray[np.bool_]:
+    """Where both differ by more than rounding [points, rows of the sample]."""
+    found = module[:, sample.rows]
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(found - sample.value)
+    both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
+    return ~both & ~(apart <= ROUNDING * sample.size)
+
+
+def _points(system: System, started: Started, oracle: SampledRows, until: float) -> Points:
+    """The start, and points at which nothing vanishes by chance."""
+    t0 = started.state.t
+    y, yd = started.state.for_form(system)
+    scale, time = magnitudes(system, t0, until, y, yd)
+    random = np.random.default_rng(20260220)
+    order = _order(system, oracle)
+    number = 1 + len(NEARBY)
+    points = Points(np.full(number, t0), np.zeros((number, order.size)), np.zeros((number, order.size)))
+    extended = [np.concatenate([x, np.zeros(order.size - x.size)]) for x in (y, yd)]
+    sizes = [np.concatenate([x, np.ones(order.size - x.size)]) for x in (scale, scale / max(time, 1e-300))]
+    for k, distance in enumerate((0.0, *NEARBY)):
+        points.t[k] += distance * (until - t0) * (0.5 + 0.5 * random.random())
+        for target, x, size in zip((points.y, points.yd), extended, sizes, strict=True):
+            away = random.uniform(0.5, 1.5, x.size) * random.choice((-1.0, 1.0), x.size)
+            target[k] = (x + distance * size * away)[order]
+    return points
+
+
+def _order(system: System, oracle: SampledRows) -> NDArray[np.intp]:
+    """Places in the system's y of the unknowns in the order of the form's families."""
+    families = system.description.families
+    parts = [system.form.at[k] + np.arange(f.size) for k, f in enumerate(families)]
+    return np.concatenate([*parts, np.zeros(0, dtype=np.intp)]).astype(np.intp)
+
+
+def _module_rows(system: System, oracle: SampledRows, block: Block, points: Points) -> Array:
+    """The block's rows [points, rows] by the carrier, in the order of the form's row families."""
+    number = int(oracle.to[-1])
+    return np.stack(
+        [
+            system.rows_at(block.name, oracle.at[:-1], oracle.to[:-1], number, t, y, yd)
+            for t, y, yd in zip(points.t, points.y, points.yd, strict=True)
+        ]
+    )
+
+
+def _told(prepared: Prepared, oracle: SampledRows, block: Block, place: int, values: tuple[float, float]) -> str:
+    family = int(np.searchsorted(oracle.to, place, side="right")) - 1
+    row = prepared.compiled.form.rows[family]
+    where = f", {row.place.file}:{row.place.start[0]}" if row.place else ""
+    other = "numpy" if prepared.backend == "c" else "c"
+    return (
+        f"the compiled module ({prepared.backend}) does not say what the text says: {block.name} of {row.label}{where} "
+        f"is {values[0]:.9g}, interpreted {values[1]:.9g}; --backend {other}, and an empty cache"
+    )

@@ -1,0 +1,144 @@
+"""What a run says of itself, as findings: where it stopped (E930 to E934), what it did not meet (E920, E921, W920)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from sysdyn.cli.run.culprit import Culprit, culprit
+from sysdyn.cli.run.prepare import Prepared, place_at
+from sysdyn.cli.run.starting import Started
+from sysdyn.cli.run.targets import Target
+from sysdyn.dsl.text.diagnostics import Place, Report
+from sysdyn.dsl.tree import syntax
+from sysdyn.runtime.judgement import Judgement, NotMet
+from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+from sysdyn.runtime.simulate import Outcome
+
+SHOWN = 4
+"""Unknowns of the last good state that a finding lists."""
+
+_CAUSES = {
+    "newton": ("E930", "Newton's iteration does not converge"),
+    "error_test": ("E930", "the local error cannot be brought below the tolerance"),
+    "singular": ("E931", "the iteration matrix is singular"),
+    "inertia": ("E931", "an inertia became negative: a law was carried past its pole"),
+    "nonfinite": ("E933", "an equation is not a number"),
+    "stiff": ("E930", "the equations are stiff, an explicit method is held to tiny steps: take radau or bdf"),
+    "step_too_small": ("E930", "the step size fell below the resolution of time"),
+    "max_steps": ("E934", "the limit of steps is reached"),
+    "max_wall": ("E934", "the limit of wall time is reached"),
+    "memory": ("E934", "there is no memory left"),
+}
+_REMEDIES = {
+    "E930": "another --method or --index, a looser --accuracy, or a smoother law there",
+    "E931": "a range of the law that keeps it positive, or an earlier end: --until",
+    "E932": "data that reach further, or 'clamp' or 'extend' in the table",
+    "E933": "a law that is defined there, or an earlier end: --until",
+    "E934": "a higher limit, or a looser --accuracy",
+}
+
+
+def stopped(target: Target, prepared: Prepared, started: Started, error: SolverFailure, report: Report) -> str:
+    """Reports where the solver stopped; the sentence of it."""
+    code, cause = _CAUSES.get(error.cause, ("E930", error.cause))
+    found = culprit(prepared, error) if error.cause in ("nonfinite", "newton", "step_too_small") else None
+    if found is not None:
+        code, cause = found.code, found.text
+    where = _place(target, prepared, error, found)
+    text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {cause}"
+    if error.row is not None and found is None:
+        text += f", in {_named(error.row)}, {where.file}:{where.start[0]}"
+    if error.unknown is not None:
+        text += f", unknown {error.unknown}"
+        if error.row is None:
+            text += f", {where.file}:{where.start[0]}"
+    partial = error.partial
+    if isinstance(partial, Outcome) and partial.reached > error.time:
+        text += "; the trace is that of a coarser run to the end, its error is not known"
+    help_ = "; ".join(filter(None, (_REMEDIES[code], _last_good(started, error))))
+    report.error(code, text, where, help=help_)
+    return text
+
+
+def verdict(target: Target, prepared: Prepared, judgement: Judgement, report: Report) -> None:
+    """Reports what a run that ended did not meet; W920 where nothing judges it."""
+    scene = prepared.network.scene
+    place = scene.place if scene else prepared.network.place
+    if not judgement.judged:
+        help_ = "without --rtol and --atol, and by another method than euler, the run estimates its own error"
+        report.warning("W920", "nothing judges this run", place, help=help_)
+    for missed in judgement.not_met:
+        if missed.what == "accuracy":
+            _inaccurate(prepared, missed, place, report)
+        else:
+            _unbalanced(target, prepared, missed, report)
+
+
+def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, report: Report) -> None:
+    estimate = "nothing estimates its error" if missed.value is None else f"estimated error {missed.value:.1e}"
+    since = "" if missed.time is None else f", beyond it from t = {missed.time:.9g} s on"
+    text = f"the accuracy asked was not reached: {missed.element}, {estimate}, asked {missed.limit:.1e}{since}"
+    where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
+    report.error("E920", text, where, help="a looser accuracy, a shorter span, or what stands at the place")
+
+
+def _unbalanced(target: Target, prepared: Prepared, missed: NotMet, report: Report) -> None:
+    assert missed.row is not None
+    what = "the energy ledger" if missed.what == "energy" else "an invariant of dynamic variables"
+    time = "" if missed.time is None else f" at t = {missed.time:.9g} s"
+    beyond = f"its balance passes {missed.limit:.3g} {missed.unit}{time} and reaches {missed.value:.3g} {missed.unit}"
+    text = f"{what} is off: {beyond}, most at {missed.element}"
+    where = author_place(target, prepared, missed.row)
+    report.error("E921", text, where, help="a smaller accuracy, another --method, or what stands at the place")
+
+
+def author_place(target: Target, prepared: Prepared, row: RowLabel) -> Place:
+    """The author's own statement for a row: where that is a component's, the line that places the component."""
+    own = target.document.file.source
+    if row.file == own.name:
+        return place_at(prepared.network, row.file, row.line)
+    return _declared(target, prepared, re.split(r"[^\w]", row.label, maxsplit=1)[0])
+
+
+def _declared(target: Target, prepared: Prepared, name: str) -> Place:
+    """Where the model declares a name; the model's own place where it does not."""
+    for statement in _statements(target.model.body):
+        decls = (*getattr(statement, "decls", ()), getattr(statement, "decl", None))
+        if any(d is not None and d.name == name for d in decls):
+            return Place(target.document.file.source, statement.span)
+    return prepared.network.place
+
+
+def _statements(body: Iterable[syntax.Statement]) -> Iterable[syntax.Statement]:
+    """Statements, those under loops included."""
+    for statement in body:
+        yield statement
+        yield from _statements(getattr(statement, "body", ()))
+
+
+def _place(target: Target, prepared: Prepared, error: SolverFailure, found: Culprit | None) -> Place:
+    if found is not None:
+        return author_place(target, prepared, found.row)
+    if error.row is not None:
+        return author_place(target, prepared, error.row)
+    if error.unknown is not None:
+        return _declared(target, prepared, re.split(r"[^\w]", error.unknown, maxsplit=1)[0])
+    return prepared.network.place
+
+
+def _named(row: RowLabel) -> str:
+    """The row, or the element, by its name."""
+    kind = "" if row.kind[:1].isdigit() else f"{row.kind} "
+    return f"{kind}{row.label}"
+
+
+def _last_good(started: Started, error: SolverFailure) -> str:
+    """A few unknowns at the last good point."""
+    if error.state is None:
+        return ""
+    time, y, _ = error.state
+    names = started.system.unknown_names
+    kept = [k for k in range(min(len(names), y.size)) if started.system.kinds[k] in ("q", "f", "p", "s")][:SHOWN]
+    listed = ", ".join(f"{names[k]} = {y[k]:.6g}" for k in kept)
+    return f"last good state at {time:.9g} s: {listed}" if listed else ""

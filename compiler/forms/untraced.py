@@ -1,0 +1,43 @@
+"""What a scene without `trace` traces: every coordinate and every dynamic variable, arrays element by element.
+
+Received: an EnergyModel and its network (whose parameters give the sizes of arrays).  Returned: the model with these
+quantities, and a note where an array is too large to be listed whole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice, product
+
+from sysdyn.compiler.model.energies import EnergyModel, Family, Quantity
+from sysdyn.compiler.model.parameters import Parameters
+from sysdyn.dsl.model.expression import const, var
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Diagnostic
+
+MOST = 1000
+"""Elements of one array: each is a row of text in the compiled model and a data set in the trace."""
+
+
+def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
+    """The model with a stored quantity for each coordinate and each dynamic variable."""
+    parameters = Parameters(network, {})
+    found: list[Quantity] = []
+    notes: list[Diagnostic] = []
+    kinds = [(c, model.mirror.coordinate, "q") for c in model.coordinates] + [(s, "s", "s") for s in model.states]
+    for family, kind, unit in kinds:
+        box = parameters.extents(family.shape)
+        number = math.prod(last - first + 1 for first, last in box)
+        if number > MOST:
+            text = f"nothing is traced: of the {number} elements of {family.name} the first {MOST} are"
+            notes.append(Diagnostic("N608", text, family.place, f"trace {family.name}[...] in the scene"))
+        found += islice(_elements(family, kind, family.units[unit], box), MOST)
+    return replace(model, quantities=(*found, *model.quantities)), tuple(notes)
+
+
+def _elements(family: Family, kind: str, unit: str, box: tuple[tuple[int, int], ...]) -> Iterator[Quantity]:
+    for at in product(*(range(first, last + 1) for first, last in box)):
+        name = f"{family.name}[{', '.join(map(str, at))}]" if at else family.name
+        yield Quantity(name, var(family.name, kind, *(const(k) for k in at)), True, unit, family.place)

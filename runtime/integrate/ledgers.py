@@ -1,0 +1,99 @@
+"""The ledgers of one integration (core/ledgers.h), and what came of each."""
+
+from __future__ import annotations
+
+import ctypes as c
+from dataclasses import dataclass
+
+import numpy as np
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.system import System
+
+HEAD, ROWS = 4, 4
+"""Rows of block audit before the ledgers', and of each ledger."""
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """A ledger over a run.
+
+    kind: energy or invariant; unit: of value and turnover; turnover: the sum over elements of what each stored at most
+    and of what went through it; value: largest magnitude of the balance (infinite where it is no number); element:
+    whose content changed most in the step that spoiled the balance most (else the first of the ledger); risen: (instant
+    [s], magnitude) whenever it became larger than before.
+    """
+
+    kind: str
+    unit: str
+    turnover: float
+    value: float
+    element: RowLabel
+    risen: tuple[tuple[float, float], ...]
+
+    def first_beyond(self, limit: float) -> float | None:
+        """The instant [s] from which the balance was beyond a limit; None where it never was."""
+        return next((t for t, value in self.risen if not value <= limit), None)
+
+
+class Ledgers:
+    """The core's structure for the ledgers of a system."""
+
+    def __init__(self, system: System) -> None:
+        description = system.description
+        heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
+        families = [description.rows[k] for k in description.rows_of("ledger")]
+        self._heads = [(row.label, row.unit, row.at(0)) for row in heads]
+        self._labels = [(row, k) for row in families for k in range(row.size)]
+        of = np.array([int(row.kind.split()[0]) for row, _ in self._labels] + [0], dtype=np.int32)
+        count, elements = len(heads), len(self._labels)
+        names = ("gross", "largest", "stored", "balance", "highest", "dissipated", "supplied")
+        self._arrays = {name: np.zeros(count + 1) for name in names}
+        self._arrays |= {name: np.zeros(elements + 1) for name in ("most", "value", "before")}
+        self._element = np.full(count + 1, -1, dtype=np.int32)
+        self._of = of
+        self._inertia = np.array(["inertia" in row.kind for row, _ in self._labels] + [False], dtype=np.int32)
+        self._contents = system.observer("ledger") if elements else None
+        self.core = lib.Ledgers(
+            count=count,
+            elements=elements,
+            contents=None if self._contents is None else c.addressof(self._contents),
+            of=lib.pointer(of),
+            inertia=lib.pointer(self._inertia),
+            lost=-1,
+            element=lib.pointer(self._element),
+            **{name: lib.pointer(array) for name, array in self._arrays.items()},
+        )
+        self.address = c.addressof(self.core) if count else None
+
+    @property
+    def lost(self) -> RowLabel | None:
+        """The element whose inertia became negative."""
+        found = int(self.core.lost)
+        if found < 0:
+            return None
+        row, position = self._labels[found]
+        return row.at(position)
+
+    def balances(self) -> tuple[Balance, ...]:
+        """What came of each ledger."""
+        records = c.cast(self.core.record, c.POINTER(lib.Record))
+        found = [records[k] for k in range(self.core.records)]
+        return tuple(self._balance(k, [r for r in found if r.ledger == k]) for k in range(len(self._heads)))
+
+    def _balance(self, k: int, records: list[lib.Record]) -> Balance:
+        kind, unit, first = self._heads[k]
+        own = self._of[:-1] == k
+        turnover = float(self._arrays["gross"][k] + self._arrays["most"][:-1][own].sum())
+        value = float(self._arrays["highest"][k])
+        highest = max((r.value for r in records), default=0.0) if np.isfinite(value) else np.inf
+        element = first
+        if self._element[k] >= 0:
+            row, position = self._labels[self._element[k]]
+            element = row.at(position)
+        risen = tuple((float(r.t), float(r.value) if np.isfinite(r.value) else np.inf) for r in records)
+        return Balance(kind, unit, turnover, highest, element, risen)
+
+    def __del__(self) -> None:
+        if getattr(self, "core", None) is not None:
+            lib.core.sd_ledgers_clear(c.byref(self.core))

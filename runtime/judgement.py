@@ -1,0 +1,114 @@
+"""A run judged by itself: is the accuracy that was asked for reached, and does every ledger balance?
+
+    accuracy    the estimate of each quantity is within the accuracy asked of it
+    energy      max |balance| <= max(k, 1e-12) G for each part's ledger, G what its elements stored and passed on
+    invariants  likewise, for combinations of dynamic variables that keep their value
+
+k: ten times the loosest accuracy asked; min(0.1, 10 sqrt(rtol)) where the solver's own tolerances are given.  Implicit
+Euler's method is not judged.  Received: options, the accuracy control's result, balances.  Returned: a Judgement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from sysdyn.runtime.integrate.ledgers import Balance
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.model.failures import RowLabel
+
+LEAST = 1e-12
+"""Smallest part of what went through a ledger that its balance may be."""
+TIMES = 10.0
+"""Of the loosest accuracy asked: what the balance may be."""
+MOST = 0.1
+"""Largest part of it that is allowed where the solver's own tolerances are given."""
+
+
+@dataclass(frozen=True, slots=True)
+class NotMet:
+    """What a run missed.
+
+    what: accuracy, energy or invariants; value beyond limit: relative for accuracy (value None: no estimate), in `unit`
+    for a ledger; element: the quantity, or whose content changed most in the step that spoiled the balance most; time
+    [s]: of the first instant beyond the limit; row: where the element stands in the text.
+    """
+
+    what: str
+    value: float | None
+    limit: float
+    element: str
+    time: float | None
+    unit: str = "1"
+    row: RowLabel | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of CONTRACT's `not_met` list."""
+        return {name: getattr(self, name) for name in ("what", "value", "limit", "element", "time", "unit")}
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """judged: what could be judged, in the order accuracy, energy, invariants; not_met: what was missed."""
+
+    judged: tuple[str, ...]
+    not_met: tuple[NotMet, ...]
+
+    @property
+    def met(self) -> bool:
+        """Nothing was missed."""
+        return not self.not_met
+
+    def attributes(self) -> dict[str, str | int]:
+        """Root attributes of the trace."""
+        return {"met": int(self.met), "judged": " ".join(self.judged)}
+
+
+UNJUDGED: dict[str, str | int] = {"met": 0, "judged": ""}
+"""Root attributes of a run that did not end as asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """The accuracy control's verdict on one quantity.  error: relative (None: there is none); time [s] of the first
+    instant at which two runs differ by more than asked.
+    """
+
+    quantity: str
+    error: float | None
+    asked: float
+    time: float | None
+
+
+def own_tolerances(options: Options) -> bool:
+    """Whether the solver's own tolerances are given: nothing estimates the error."""
+    return options.rtol is not None or options.atol is not None
+
+
+def allowed(options: Options) -> float:
+    """The part of what went through a ledger that its balance may be."""
+    if own_tolerances(options):
+        return max(min(MOST, TIMES * float(np.sqrt(options.rtol if options.rtol is not None else 1e-6))), LEAST)
+    asked = [a for a in (options.accuracy, *(wanted for _, wanted in options.accuracy_on)) if a is not None]
+    return max(TIMES * max(asked, default=0.0), LEAST)
+
+
+def judge(
+    options: Options, method: str, balances: Iterable[Balance], accurate: bool, missed: Iterable[Estimate]
+) -> Judgement:
+    """The verdict; accurate: an accuracy was asked for; missed: quantities that did not reach it."""
+    if method == "euler":
+        return Judgement((), ())
+    judged = ["accuracy"] if accurate else []
+    found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time) for e in missed] if accurate else []
+    part = allowed(options)
+    for kind, what in (("energy", "energy"), ("invariant", "invariants")):
+        own = [b for b in balances if b.kind == kind]
+        judged += [what] if own else []
+        for b in own:
+            limit = part * b.turnover
+            if not b.value <= limit:
+                found.append(NotMet(what, b.value, limit, b.element.label, b.first_beyond(limit), b.unit, b.element))
+    return Judgement(tuple(judged), tuple(found))
