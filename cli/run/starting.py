@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 from sysdyn.cli.run.prepare import Prepared, place_at, prepare
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Expectation
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.implicit import undetermined
 from sysdyn.runtime.structure.inertia import negative_inertia
@@ -35,12 +37,16 @@ def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None 
     policy = redundancy or (scene.redundancy if scene else None) or "error"
     system = System(prepared.manifest, prepared.arrays, prepared.carrier)
     try:
-        state = consistent_start(system, t0)
+        with np.errstate(all="ignore"):  # what overflows is seen as no number
+            state = consistent_start(system, t0)
+            facts = structure(system, state)
+            implicit = undetermined(system, state)
     except InconsistentStart as error:
         _inconsistent(prepared, error, report)
         return None
-    facts = structure(system, state)
-    implicit = undetermined(system, state)
+    except NotFiniteError:
+        _steep(prepared, report)
+        return None
     _structural(prepared, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
     for name in implicit:
@@ -92,6 +98,12 @@ def _inconsistent(prepared: Prepared, error: InconsistentStart, report: Report) 
         case _:
             message = f"no consistent start was found: {unit} in {names}"
             report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
+
+
+def _steep(prepared: Prepared, report: Report) -> None:
+    """E519: the slopes of the rows at the start are no numbers."""
+    message = "the slopes of the equations are no numbers at the start: values beyond 1e308, or a root at zero?"
+    report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")
 
 
 def _structural(prepared: Prepared, facts: Structure, policy: str, report: Report) -> None:
