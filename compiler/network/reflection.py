@@ -17,7 +17,7 @@ from dataclasses import replace
 from sysdyn.compiler.model.terms import summands, vanishes
 from sysdyn.compiler.network.islands import grounded
 from sysdyn.compiler.network.linkages import with_linkages
-from sysdyn.compiler.network.positions import from_stores, massive, with_contents, with_quadratures
+from sysdyn.compiler.network.positions import from_masses, from_stores, massive, with_contents, with_quadratures
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -31,12 +31,13 @@ from sysdyn.dsl.model.network import (
     Slope,
     Terminal,
 )
+from sysdyn.dsl.model.paynter import REFLECTED, REFLECTED_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place
 
 _KINDS = {"be": "bf", "bf": "be", "bq": "bp", "bp": "bq", "ne": "nf", "nf": "ne"}
-_FUNCTIONS = {"T*": "V*", "V*": "T*", "T": "V", "V": "T", "D": "G", "G": "D"}
+_KINDS |= {f"b{name}": f"b{image}" for name, image in REFLECTED_FUNCTIONS.items()}
+_FUNCTIONS = REFLECTED_FUNCTIONS | {"kept kinetic": "kept potential", "kept potential": "kept kinetic"}
 _ELEMENTS = {"kinetic": "potential", "potential": "kinetic", "effort": "flow", "flow": "effort"}
-_SIDES = {"e": "f", "f": "e", "p": "q", "q": "p"}
 
 
 def reflect(network: Network) -> Network:
@@ -45,7 +46,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = with_linkages(from_stores(grounded(as_elements(network))))
+    bare = with_linkages(from_masses(from_stores(grounded(as_elements(network)))))
     network = with_contents(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
@@ -106,14 +107,15 @@ def _energy(e: Energy) -> Energy:
 
 def _branch(b: Branch) -> Branch:
     law = None if b.law is None else _node(b.law)
-    side = None if b.side is None else _SIDES[b.side]
-    return replace(b, domain=_domain(b.domain), kind=_ELEMENTS.get(b.kind, b.kind), side=side, law=law)
+    shift = None if b.shift is None else _node(b.shift)
+    side = None if b.side is None else REFLECTED[b.side]
+    return replace(b, domain=_domain(b.domain), kind=_ELEMENTS.get(b.kind, b.kind), side=side, law=law, shift=shift)
 
 
 def _coupling(c: Coupling) -> Coupling:
     ratio = _node(c.ratio)
     if c.kind == "transformer":
-        return replace(c, side=_SIDES[c.side], ratio=ratio)
+        return replace(c, side=REFLECTED[c.side], ratio=ratio)
     # e1 = r f2 reads f1 = r e2 in the reflection: e2 = f1/r and with e1 f1 + e2 f2 = 0 e1 = -f2/r
     return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), ratio)))
 

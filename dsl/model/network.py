@@ -38,6 +38,7 @@ class Domain:
     common: str
     pseudo: bool
     place: Place
+    kinetic: bool = True  # whether kinetic stores exist: the domain has a momentum
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ class Branch:
     Its effort, flow, displacement, momentum are var kinds be bf bq bp of its name at `at` (loop variables of `loops`,
     or constants).  kind: kinetic, potential, dissipator, effort, flow (sources), field (no law: it stands in energies
     and constraints), port (one side of a coupling).  law: side = law, side one of e f q p; law holds the branch's own
-    conjugate variable, and others where it is modulated.
+    conjugate variable, and others where it is modulated.  Its state functions are var kinds bT bT* bV bV* bD bG.
     """
 
     name: str
@@ -79,6 +80,8 @@ class Branch:
     minus: Terminal | None
     on: Node | None
     place: Place
+    shift: Node | None = None  # the law is over the own variable plus this constant
+    stated: bool = False  # its energy stands among the state functions, kept for the audit
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +166,7 @@ class Coordinate:
     effort: Unit
     asserted: bool | None  # tangible, intangible, or not said
     place: Place
+    domain: Domain | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,13 +13,29 @@ import numpy as np
 from sysdyn.compiler.network.primal.integrals import Rests, antiderivative, line, polynomial
 from sysdyn.compiler.network.primal.inverses import Inverse, inverse
 from sysdyn.compiler.network.primal.slopes import Slopes
-from sysdyn.dsl.model.expression import Node, const, mul, param, sub, substitute, to_text, topological, var, variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    const,
+    mul,
+    neg,
+    param,
+    sub,
+    substitute,
+    to_text,
+    topological,
+    var,
+    variables,
+)
 from sysdyn.dsl.model.network import Branch, Table
+from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
 Notes = tuple[tuple[str, str], ...]
 OWN = {"kinetic": ("bf", "p"), "potential": ("bq", "e"), "dissipator": ("bf", "e")}
 """The variable of a law that is explicit, and the side that it gives."""
+ENERGY = {"kinetic": "T*", "potential": "V", "dissipator": "D"}
+"""The state function of that variable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +122,35 @@ class Choice:
             return None
         rests: Rests = []
         energy = antiderivative(law, v, rests)
-        return energy if energy is not None and self._rest_on(rests) else None
+        return self._from_rest(energy, v) if energy is not None and self._rest_on(rests) else None
+
+    def functions(self, law: Law) -> dict[str, Node]:
+        """State functions of a store or dissipator, of both variables of its edge, as far as they are closed; each
+        adds up to the product of the two with its Legendre transform.
+        """
+        branch = self.branch
+        if branch.kind not in OWN or branch.law is None:
+            return {}
+        v, w = own(branch, OWN[branch.kind][0]), conjugate(branch)
+        name = ENERGY[branch.kind]
+        transform = STATE_FUNCTIONS[name].transform
+        whole = v if branch.shift is None else add(v, branch.shift)
+        if law.how == "energy" and law.stated is not None:
+            return {name: law.stated, transform: sub(mul(whole, w), law.stated)}
+        if law.kept is not None:
+            kept = {"kinetic": transform, "potential": name}[branch.kind]
+            return {kept: law.kept, STATE_FUNCTIONS[kept].transform: sub(mul(whole, w), law.kept)}
+        given, rests = (v if branch.side == OWN[branch.kind][1] else w), Rests()
+        area = antiderivative(branch.law, given, rests)
+        if area is None or not self._rest_on(rests):
+            return {}
+        area = self._from_rest(area, v) if given is v else sub(mul(v, w), area)
+        return {name: area, transform: sub(mul(whole, w), area)}
+
+    def _from_rest(self, area: Node, v: Node) -> Node:
+        """An integral over the own variable from where that and its shift cancel."""
+        shift = self.branch.shift
+        return area if shift is None else sub(area, substitute(area, {v: neg(shift)}))
 
     def _rest_on(self, rests: Sequence[tuple[Node, int]]) -> bool:
         """Keep what a result rests on; False where that is not so."""
