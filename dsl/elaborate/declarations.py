@@ -120,7 +120,9 @@ class Declarations(Parameters):
             self._unknown(decl, "q", family, own.dimension, domain, co)
             place = self.place(decl.span)
             self.parts.coordinates.append(
-                Coordinate(family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place)
+                Coordinate(
+                    family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place, domain
+                )
             )
             if statement.init is not None:
                 self._own_initial(decl, "q", family, own.dimension, statement.init)

@@ -69,7 +69,6 @@ def law_of(
     if wanted is not None and kind != wanted:
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
-    _alone(context, branch, kind, node, span)
     return LawOf(kind, side, node)
 
 
@@ -98,19 +97,6 @@ def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> 
         f"a law must relate p-f, q-e or e-f; this one relates {side} and {other}, which {requirement} already fixes"
     )
     return context.fail("E301", message, span)
-
-
-def _alone(context: Context, branch: BranchSymbol, kind: str, node: Node, span: syntax.Span) -> None:
-    """E304: the law of a store may not depend on another displacement or momentum."""
-    if kind == "dissipator":
-        return
-    for other in sorted((n for n in ex.variables(node) if n.op == "var"), key=lambda n: n.number):
-        name, var_kind, _ = other.data
-        if name != branch.family.name and var_kind in ("q", "nq", "bq", "p", "np", "bp"):
-            what = "displacement" if var_kind.endswith("q") else "momentum"
-            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store works there too"
-            function = "T*" if kind == "kinetic" else "V"
-            raise context.fail("E304", message, span, help=f"energy {function} = ... with ports for both")
 
 
 @dataclass(frozen=True, slots=True)
