@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sysdyn.dsl.elaborate.level_ports import level_ports
 from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.symbols import ComponentSymbol
-from sysdyn.dsl.rules.level_ports import level_ports
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 

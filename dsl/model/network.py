@@ -242,6 +242,7 @@ class Initial:
 
     Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
     store: whose content that is, where no text says it; unit: of a displacement, of the rate of a momentum.
+    depth: 0 of a scene, 1 of the model, 2 of its components, ...: what has less goes before what has more.
     """
 
     target: Node
@@ -251,6 +252,7 @@ class Initial:
     place: Place
     store: str = ""
     unit: str = "1"
+    depth: int = 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.context import Context, Failed
 from sysdyn.dsl.names.members import branch_dimension
-from sysdyn.dsl.names.symbols import BranchSymbol, Typed
+from sysdyn.dsl.names.symbols import BranchSymbol, Definition, Typed
 from sysdyn.dsl.tree import syntax
 
 ONE_PORTS = ("kinetic", "potential", "dissipator", "effort", "flow")
@@ -61,6 +62,10 @@ def law_of(
     kind = _EDGES.get(frozenset((side, others[0])))
     if kind is None:
         raise _off_diagram(context, side, others[0], span)
+    if wanted in ("effort", "flow") and _controlled(context, branch, value, node):
+        if side != wanted[0]:
+            raise context.fail("E303", f"'{branch.name}' is a {wanted} source, but its law gives {side}", span)
+        return LawOf(wanted, side, node)
     if wanted in ("effort", "flow"):
         help_ = f"that is a {kind}: '{kind}({side} = ...)'"
         raise context.fail(
@@ -70,6 +75,20 @@ def law_of(
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
     return LawOf(kind, side, node)
+
+
+def _controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:
+    """Whether a law reads an input, time or another element: that of a controlled source, whatever else it reads."""
+    for name in walk(value):
+        symbol = context.scope.find(name.name) if isinstance(name, syntax.Name) else None
+        if isinstance(symbol, Definition) and symbol.kind == "input":
+            return True
+    for node in ex.topological([law]):
+        if node.op == "time" or (node.op == "param" and node.data in context.inputs):
+            return True
+        if node.op == "var" and node.data[0] != branch.family.name:
+            return True
+    return False
 
 
 def _source(

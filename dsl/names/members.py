@@ -16,7 +16,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Domain
 from sysdyn.dsl.model.paynter import MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
-from sysdyn.dsl.names.context import Failed, Quadrature, Use, Value
+from sysdyn.dsl.names.context import Failed, Part, Quadrature, SeveralError, Use, Value
 from sysdyn.dsl.names.names import Names
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
@@ -99,14 +99,30 @@ class Members(Names):
         if len(base.indices) != count:
             raise self.index_count(symbol.name, count, len(base.indices), span)
         at = tuple(self.index(i) for i in base.indices)
-        for space in symbol.spaces:
-            own = space.prefix[len(space.prefix) - count :]
-            if all(o.op == "index" or o is a for o, a in zip(own, at, strict=True)):
-                self._remember(symbol, space, base, at, count)
-                change = dict(base.change)
-                change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
-                return space, change
-        raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
+        fitting = [s for s in symbol.spaces if _may_hold(s, at)]
+        if not fitting:
+            raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
+        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at)
+        self._remember(symbol, space, base, at, count)
+        own = space.prefix[len(space.prefix) - count :]
+        change = dict(base.change)
+        change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
+        return space, change
+
+    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...]) -> Space:
+        """The statement of a label that an element comes from; SeveralError where a loop runs over several."""
+        chosen = self.chosen.get((id(symbol), at))
+        if chosen is not None:
+            return chosen
+        for k, a in enumerate(at):
+            loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
+            ranges = [s.around[len(s.around) - len(at) + k] for s in spaces]
+            if loop is not None and len(set(ranges)) > 1:
+                offset = ex.sub(a, loop)
+                parts = (Part(s, *(ex.sub(b, offset) for b in r)) for s, r in zip(spaces, ranges, strict=True))
+                raise SeveralError(symbol.name, (id(symbol), at), loop.data, tuple(parts))
+        inside = [s for s in spaces if _holds(s, at)]
+        return (inside or spaces)[0]
 
     def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
         shape = space.around[len(space.around) - count :]
@@ -436,6 +452,28 @@ class Members(Names):
             raise self.fail("E203", "a constant has no displacement", e.args[0].span)
         node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
         return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
+
+
+def _gaps(space: Space, at: tuple[Node, ...]) -> list[Node]:
+    """How far fixed indices lie behind the first and before the last element of a statement."""
+    ranges = space.around[len(space.around) - len(at) :]
+    found = []
+    for a, (first, last) in zip(at, ranges, strict=True):
+        if all(n.op != "index" for n in ex.topological([a])):
+            found += [ex.sub(a, first), ex.sub(last, a)]
+    return found
+
+
+def _may_hold(space: Space, at: tuple[Node, ...]) -> bool:
+    """Whether no index lies outside a statement's range for certain."""
+    own = space.prefix[len(space.prefix) - len(at) :]
+    fits = all(o.op == "index" or o is a or a.op != "const" for o, a in zip(own, at, strict=True))
+    return fits and not any(ex.is_const(gap) and gap.data < 0 for gap in _gaps(space, at))
+
+
+def _holds(space: Space, at: tuple[Node, ...]) -> bool:
+    """Whether every index lies inside a statement's range for certain."""
+    return all(ex.is_const(gap) and gap.data >= 0 for gap in _gaps(space, at))
 
 
 def branch_dimension(domain: DomainSymbol, letter: str) -> Dimension:

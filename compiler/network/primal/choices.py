@@ -112,7 +112,7 @@ class Choice:
         if kinetic:
             text = f"the {self._kept} of {branch.name} is kept as a state: its law has no closed integral"
             return Law("state", stated, (*notes, ("N604", text)), tables)
-        if branch.kind == "potential" and not pseudo:
+        if branch.kind == "potential" and not pseudo and not branch.stated:
             notes = (*notes, ("N604", f"the energy of {branch.name} is counted as the integral of its power"))
         return Law("work", law, notes, tables)
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
 from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Choice, Law, conjugate, own
+from sysdyn.compiler.network.primal.fields import field_quantities
 from sysdyn.compiler.network.primal.incidence import Element
 from sysdyn.compiler.network.primal.reading import FUNCTIONS
 from sysdyn.compiler.network.primal.slopes import Slopes
@@ -98,6 +99,9 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     for element, law in chosen:
         _Statement(element, law, names, found).say()
     integrate_powers([e for e, _ in chosen if e.name in asked], found, reflected=reflected)
+    efforts, momenta = field_quantities(network, elements)
+    found.efforts.update(efforts)
+    found.momenta.update(momenta)
     for coupling, label in _ratios(network, elements, sizes):
         _couple(coupling, label, elements, sizes, found)
     return found
@@ -183,7 +187,8 @@ class _Statement:
 
     def _work(self, effort: Node) -> None:
         b = self.branch
-        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, b.place, self.law.kept is not None))
+        kept = self.law.kept is not None or b.stated
+        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, b.place, kept))
 
     def _row(self, kind: str, equation: Node | None, unit: Unit) -> None:
         b = self.branch
