@@ -108,8 +108,10 @@ def _energy(e: Energy) -> Energy:
 def _branch(b: Branch) -> Branch:
     law = None if b.law is None else _node(b.law)
     shift = None if b.shift is None else _node(b.shift)
+    energy = None if b.energy is None else _node(b.energy)
     side = None if b.side is None else REFLECTED[b.side]
-    return replace(b, domain=_domain(b.domain), kind=_ELEMENTS.get(b.kind, b.kind), side=side, law=law, shift=shift)
+    kind = _ELEMENTS.get(b.kind, b.kind)
+    return replace(b, domain=_domain(b.domain), kind=kind, side=side, law=law, shift=shift, energy=energy)
 
 
 def _coupling(c: Coupling) -> Coupling:

@@ -5,9 +5,10 @@ An energy over one node, over the difference of two, or over branches without a 
     V(q) e = dV/dq      T*(f) p = dT*/df      D(f) e = dD/df
     T(p) f = dT/dp      V*(e) q = dV*/de      G(e) f = dG/de
 
-The primal family lowers V, T* and D as they stand, so there only functions of the other three become elements; the
-reflection needs all of them.  An energy over several branches gives each of them a law that reads the others, and is
-kept for the audit: each port keeps its own q or p (language, section 11, 16).
+The primal family lowers V, T* and D over nodes and over several branches as they stand, so there only functions of the
+other three become elements, and those of one branch; the reflection needs all of them.  An energy over several branches
+gives each of them a law that reads the others, and is kept for the audit: each port keeps its own q or p (language,
+section 11, 16).
 """
 
 from __future__ import annotations
@@ -77,7 +78,11 @@ def _on_branches(network: Network, functions: frozenset[str]) -> Network:
     """Branches without a law whose only statements are state functions of one name, with the laws that these give."""
     fields = {b.name: b for b in network.branches if b.kind == "field"}
     said = _statements(network, fields)
-    chosen = [e for e in network.energies if e.function in functions and _over_fields(e, fields, said)]
+    chosen = [
+        e
+        for e in network.energies
+        if _over_fields(e, fields, said) and (e.function in functions or len(ex.variables(e.expression)) == 1)
+    ]
     chosen = _closed(chosen, fields, said)
     if not chosen:
         return network
@@ -151,7 +156,8 @@ def _with_law(branch: Branch, energies: list[Energy]) -> Branch:
     own = ex.var(branch.name, f"b{function.own}", *branch.at)
     law = ex.add(*(ex.derivative(e.expression, own) for e in energies))
     stated = any(len(_owners(e)) > 1 for e in energies)
-    return replace(branch, kind=function.edge, side=function.conjugate, law=law, stated=stated)
+    energy = None if stated else ex.add(*(e.expression for e in energies))
+    return replace(branch, kind=function.edge, side=function.conjugate, law=law, stated=stated, energy=energy)
 
 
 def _kept(energy: Energy) -> Energy:

@@ -82,6 +82,7 @@ class Branch:
     place: Place
     shift: Node | None = None  # the law is over the own variable plus this constant
     stated: bool = False  # its energy stands among the state functions, kept for the audit
+    energy: Node | None = None  # the state function of its own variable, where the author wrote that instead of the law
 
 
 @dataclass(frozen=True, slots=True)

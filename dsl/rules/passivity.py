@@ -22,9 +22,9 @@ ROUND_OFF = 1e-9
 
 
 def passivity(network: Network, known: Values, report: Report) -> None:
-    """Dissipators whose law is a function of their own variable alone."""
+    """Dissipators whose law is a function of their own variable alone; e f of a pseudo domain is no power."""
     for branch in network.branches:
-        if branch.kind == "dissipator" and branch.law is not None and branch.side is not None:
+        if branch.kind == "dissipator" and branch.law is not None and not branch.domain.pseudo:
             _judge(branch, branch.law, known, report)
 
 

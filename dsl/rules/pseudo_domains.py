@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from sysdyn.dsl.model.dimensions import POWER
 from sysdyn.dsl.model.network import Domain, Network
-from sysdyn.dsl.model.units import multiply
+from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
+from sysdyn.dsl.model.units import Dimension, multiply
 from sysdyn.dsl.rules.letters import Diagram
 from sysdyn.dsl.text.diagnostics import Place, Report
 
@@ -19,11 +21,20 @@ def pseudo_domains(network: Network, report: Report) -> None:
     diagram = Diagram(network)
     for energy in network.energies:
         domains = [domain for _, domain in diagram.domains(energy.expression)]
-        _meet(domains, energy.function, energy.place, report)
+        if domains and all(d.pseudo and _product(d) != POWER for d in domains):
+            unit = "power" if STATE_FUNCTIONS[energy.function].edge == "dissipator" else "energy"
+            message = f"{energy.function} is {unit}, but e*f of the pseudo domain '{domains[0].name}' is not"
+            report.error("E213", message, energy.place, help="elements with laws: they keep a ledger of their own")
+        else:
+            _meet(domains, energy.function, energy.place, report)
+
+
+def _product(domain: Domain) -> Dimension:
+    return multiply(domain.effort.dimension, domain.flow.dimension)
 
 
 def _meet(domains: list[Domain], where: str, place: Place, report: Report) -> None:
-    products = {multiply(d.effort.dimension, d.flow.dimension): d for d in domains}
+    products = {_product(d): d for d in domains}
     if len(products) > 1:
         one, other = sorted(products.values(), key=lambda d: not d.pseudo)[:2]
         word = "pseudo domain" if one.pseudo else "domain"

@@ -118,6 +118,8 @@ class Choice:
 
     def _energy(self, law: Node, v: Node) -> Node | None:
         """The integral of a law; of dissipators that of polynomials only: works say theirs as well."""
+        if self.branch.energy is not None and law is self.branch.law:
+            return self.branch.energy
         if self.branch.kind == "dissipator" and polynomial(law, v) is None:
             return None
         rests: Rests = []
@@ -141,7 +143,7 @@ class Choice:
             kept = {"kinetic": transform, "potential": name}[branch.kind]
             return {kept: law.kept, STATE_FUNCTIONS[kept].transform: sub(mul(whole, w), law.kept)}
         given, rests = (v if branch.side == OWN[branch.kind][1] else w), Rests()
-        area = antiderivative(branch.law, given, rests)
+        area = branch.energy or antiderivative(branch.law, given, rests)
         if area is None or not self._rest_on(rests):
             return {}
         area = self._from_rest(area, v) if given is v else sub(mul(v, w), area)
@@ -186,7 +188,8 @@ class Choice:
         branch, rests = self.branch, Rests()
         if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
             return None
-        area = antiderivative(law, given, rests)
+        written = branch.energy if law is branch.law else None
+        area = written or antiderivative(law, given, rests)
         if area is None or not self._rest_on(rests):
             return None
         return area if given is own(branch, "bp") else sub(mul(given, law), area)
