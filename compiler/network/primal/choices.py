@@ -17,6 +17,7 @@ from sysdyn.dsl.model.expression import (
     Node,
     add,
     const,
+    is_const,
     mul,
     neg,
     param,
@@ -111,7 +112,8 @@ class Choice:
             return Law("energy", energy, notes, tables)
         if kinetic:
             text = f"the {self._kept} of {branch.name} is kept as a state: its law has no closed integral"
-            return Law("state", stated, (*notes, ("N604", text)), tables)
+            kept = self._stored(law, v) if law is branch.law else None
+            return Law("state", stated, (*notes, ("N604", text)), tables, kept)
         if branch.kind == "potential" and not pseudo and not branch.stated:
             notes = (*notes, ("N604", f"the energy of {branch.name} is counted as the integral of its power"))
         return Law("work", law, notes, tables)
@@ -124,7 +126,18 @@ class Choice:
             return None
         rests: Rests = []
         energy = antiderivative(law, v, rests)
-        return self._from_rest(energy, v) if energy is not None and self._rest_on(rests) else None
+        if energy is None or not self._rest_on(rests):
+            return None
+        return self._from_rest(energy, v) if law is self.branch.law else self._from_origin(energy, v)
+
+    def _from_origin(self, energy: Node, v: Node) -> Node:
+        """The integral of an inverted law from where that of the law as written begins: its own variable is zero."""
+        assert self.branch.law is not None
+        origin = substitute(self.branch.law, {conjugate(self.branch): const(0.0)})
+        values = self.slopes.values(self.branch, origin)
+        if is_const(origin, 0.0) or values is None or not np.isfinite(values).all():
+            return energy
+        return sub(energy, substitute(energy, {v: origin}))
 
     def functions(self, law: Law) -> dict[str, Node]:
         """State functions of a store or dissipator, of both variables of its edge, as far as they are closed; each
@@ -143,7 +156,7 @@ class Choice:
             kept = {"kinetic": transform, "potential": name}[branch.kind]
             return {kept: law.kept, STATE_FUNCTIONS[kept].transform: sub(mul(whole, w), law.kept)}
         given, rests = (v if branch.side == OWN[branch.kind][1] else w), Rests()
-        area = branch.energy or antiderivative(branch.law, given, rests)
+        area = branch.energy or antiderivative(branch.law, given, rests, valued=True)
         if area is None or not self._rest_on(rests):
             return {}
         area = self._from_rest(area, v) if given is v else sub(mul(v, w), area)
@@ -189,7 +202,7 @@ class Choice:
         if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
             return None
         written = branch.energy if law is branch.law else None
-        area = written or antiderivative(law, given, rests)
+        area = written or antiderivative(law, given, rests, valued=True)
         if area is None or not self._rest_on(rests):
             return None
         return area if given is own(branch, "bp") else sub(mul(given, law), area)
