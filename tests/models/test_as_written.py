@@ -12,7 +12,7 @@ def run(tmp_path, text, traced, formulation, **options):
 
 
 def codes_of(tmp_path, text):
-    ran, report = attempt(tmp_path, text + END.format("t"), backend="numpy")
+    _, report = attempt(tmp_path, text + END.format("t"), backend="numpy")
     return {d.code for d in report if d.severity == "error"}
 
 
