@@ -16,7 +16,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions
+from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
 
 DENSE = 300
 MAX_INDEX = 6
@@ -175,6 +175,9 @@ def structure(system: System, state: ConsistentState) -> Structure:
             if fewer.size < left.size:
                 lost += int(left.size - fewer.size)
                 found, left = there, fewer
+    zero = vanished(system, state)
+    lost = max(lost, int(zero.size))
+    left = np.setdiff1d(left, zero).astype(np.int32)
     n = int((system.kinds == "f").sum())
     m1, m2 = (int((system.kinds == kind).sum()) for kind in ("kappa", "mu"))
     rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())

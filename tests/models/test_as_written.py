@@ -372,3 +372,72 @@ def test_the_manifest_s_values_are_in_its_units(tmp_path):
     with pytest.raises(SystemExit) as ended:
         main(["compile", str(tmp_path / "m.sd"), "--scene", "s", "-o", str(tmp_path), "--index", "3", "--quiet"])
     assert ended.value.code == 1
+
+
+# -- singular starts ---------------------------------------------------------------------------------------
+
+SINGULAR = {
+    "folded parallelogram": (
+        """
+model m {
+  param l = 0.6 m
+  param d = 1.1 m
+  coord x1: translation ~ 0.6 m
+  coord y1: translation ~ 0 m
+  coord x2: translation ~ 1.7 m
+  coord y2: translation ~ 0 m
+  energy T* = 1/2*(2 kg)*(x1'^2 + y1'^2 + x2'^2 + y2'^2)
+  work -9 N on y1
+  work -9 N on y2
+  phi a: x1^2 + y1^2 = l^2
+  phi b: (x2 - d)^2 + y2^2 = l^2
+  phi c: (x2 - x1)^2 + (y2 - y1)^2 = d^2
+}
+""",
+        "rank 2, 3 nearby",
+        ("y1: translation ~ 0 m", "y1: translation ~ 0.2 m"),
+    ),
+    "two equal links": (
+        """
+model m {
+  param l = 0.45 m
+  coord th: rotation = ANGLE
+  coord ph: rotation ~ ANGLE
+  coord s: translation ~ 0 m
+  energy T* = 1/2*(0.3 kg.m^2)*(th'^2 + ph'^2) + 1/2*(2 kg)*s'^2
+  phi along: l*cos(th) + l*cos(ph) = s
+  phi across: l*sin(th) - l*sin(ph) = 0 m
+  init th' = 0 rad/s
+}
+""".replace("ANGLE", "90 deg"),
+        "rank 1, 2 nearby",
+        ("90 deg", "70 deg"),
+    ),
+    "a circle of radius 0": (
+        """
+model m {
+  param r = 0 m
+  coord x: translation ~ 0 m
+  coord y: translation ~ 0 m
+  energy T* = 1/2*(3 kg)*(x'^2 + y'^2)
+  phi ring: x^2 + y^2 = r^2
+}
+""",
+        "rank 0, 1 nearby",
+        ("r = 0 m", "r = 0.4 m"),
+    ),
+}
+
+
+@pytest.mark.parametrize("formulation", FOUR[:2])
+@pytest.mark.parametrize("name", SINGULAR)
+def test_a_singular_start_is_found_and_a_regular_one_is_none(tmp_path, name, formulation):
+    text, says, (here, moved) = SINGULAR[name]
+    ran, report = attempt(tmp_path, text + END.format("t"), formulation=formulation, backend="numpy")
+    assert ran is None
+    found = [d for d in report if d.severity == "error"]
+    assert [d.code for d in found] == ["E512"]
+    assert says in found[0].message
+    text = text.replace(here, moved).replace("coord x: translation ~ 0 m", "coord x: translation ~ 0.1 m")
+    _, report = attempt(tmp_path, text + END.format("t"), formulation=formulation, backend="numpy")
+    assert "E512" not in [d.code for d in report]
