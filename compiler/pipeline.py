@@ -27,8 +27,11 @@ from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
+from sysdyn.compiler.network.along import along
+from sysdyn.compiler.network.precedence import outermost
 from sysdyn.compiler.network.primal import Step, primal
 from sysdyn.compiler.network.reflection import reflect
+from sysdyn.compiler.network.stated import FOREIGN, as_elements
 from sysdyn.compiler.program import build
 from sysdyn.compiler.program import program as program_
 from sysdyn.compiler.program.emit_c import emit_c
@@ -108,7 +111,9 @@ def compile_network(
     timings: list[Timing] = []
     reflected = formulation.startswith("co_")
     with _timed("primal", timings):
-        network, inverted, steps = primal(reflect(network) if reflected else network, reflected=reflected)
+        network = along(outermost(network), complementary=reflected)
+        network = reflect(network) if reflected else as_elements(network, FOREIGN)
+        network, inverted, steps = primal(network, reflected=reflected)
     with _timed("energies", timings):
         model = anchored(energies.energies(network))
         energies.verify_energies(model)

@@ -22,7 +22,7 @@ from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
-from sysdyn.dsl.rules import checks, graph_checks
+from sysdyn.dsl.rules import checks, graph_checks, laws
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
@@ -132,9 +132,9 @@ def _network(
     checks.values(elaborator, known, report)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, _read(elaborator.parts), report)
-    if report.failed or _incomplete(report):
-        return None
-    return _result(elaborator, reader, read_scene)
+    found = _result(elaborator, reader, read_scene)
+    laws.run(found, known, report)
+    return None if report.failed or _incomplete(report) else found
 
 
 def _unused_levels(elaborator: Elaborator, report: Report) -> None:

@@ -67,8 +67,8 @@ def command(
                 "program": lambda: program_text.show(prepared.compiled.program),
             }
             console.data(stages[dump]())
-        if dump is None or folder is not None:
-            _write(console, prepared, Path(folder or "."))
+        if (dump is None or folder is not None) and not _write(console, prepared, Path(folder or "."), index):
+            return console.finish(1)
     if explain:
         console.say(_account(prepared))
     console.explain = explain
@@ -85,11 +85,19 @@ def _account(prepared: Prepared) -> str:
     return aligned(rows) if rows else "coordinate style: nothing was merged or pruned"
 
 
-def _write(console: Console, prepared: Prepared, folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
+def _write(console: Console, prepared: Prepared, folder: Path, index: str | None) -> bool:
+    """Write module and manifest; False after E607 where another index form than the text's own is asked for."""
     scene = prepared.network.scene
     t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
     started = start(prepared, t0, console.report)
+    own = None if started is None else started.facts.index
+    if index not in (None, "auto") and own is not None and index != str(own):
+        place = prepared.network.place
+        message = f"compile --index {index}: the module holds the form as written, whose index is {own}"
+        help_ = f"--index {own}; simulate --index {index} assembles that form"
+        console.report.error("E607", message, place, help=help_)
+        return False
+    folder.mkdir(parents=True, exist_ok=True)
     manifest = {**prepared.manifest, "index": started.facts.index if started else None}
     text = folder / ("residual.c" if prepared.backend == "c" else "residual.py")
     text.write_text(prepared.compiled.text, encoding="utf-8")
@@ -97,3 +105,4 @@ def _write(console: Console, prepared: Prepared, folder: Path) -> None:
     console.result = manifest
     lines = prepared.compiled.text.count("\n")
     console.say(f"{text}: {lines} lines; {folder / 'manifest.json'}")
+    return True

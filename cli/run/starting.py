@@ -120,7 +120,7 @@ def _structural(prepared: Prepared, facts: Structure, policy: str, report: Repor
         plural = "s" if facts.redundant > 1 else ""
         message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
         report.error("E509", message, where, help="delete one of them, or redundancy minimum_norm in the scene")
-    elif facts.undetermined:
+    elif facts.undetermined and not facts.singular:  # multipliers of a singular configuration are not determined
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
         message = f"the equations do not determine {names}"
         report.error(

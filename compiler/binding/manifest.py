@@ -14,6 +14,7 @@ from sysdyn.compiler.model.integers import Index, Reference
 from sysdyn.compiler.model.parameters import Extents
 from sysdyn.compiler.program.program import Pattern, Program
 from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
 
 
@@ -77,10 +78,16 @@ def manifest(
         "unknowns": _unknowns(form, program, binding),
         "rows": _rows(form, binding),
         "parameters": [
-            {"name": p.name, "unit": p.unit.text, "value": _plain(binding.values[p.name])} for p in network.parameters
+            {"name": p.name, "unit": p.unit.text, "value": _plain(_in_unit(binding.values[p.name], p.unit))}
+            for p in network.parameters
         ],
         "structure": structure(form, program),
     }
+
+
+def _in_unit(value: Any, unit: Unit) -> Any:
+    """A value in SI as one in a unit: (value - offset)/scale."""
+    return value if unit.scale == 1 and not unit.offset else (value - float(unit.offset)) * float(1 / unit.scale)
 
 
 def _plain(value: Any) -> Any:
@@ -104,6 +111,19 @@ def _head(name: str) -> tuple[str, str, str]:
     return head, ".", tail
 
 
+_REFLECTED = {"q": "p", "f": "e", "p": "q", "e": "f"}
+"""Letters of the complementary family for those of the reflection that it is lowered from."""
+
+
+def _letter(kind: str, form: DescriptorForm) -> str:
+    return _REFLECTED.get(kind, kind) if form.formulation.startswith("co_") else kind
+
+
+def _word(name: str, kind: str, form: DescriptorForm) -> str:
+    """A name with its family's letter: x.p of the reflection is x.q."""
+    return f"{name[:-2]}.q" if kind == "p" and form.formulation.startswith("co_") and name.endswith(".p") else name
+
+
 def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[dict[str, Any]]:
     moving = {
         column.family
@@ -114,8 +134,9 @@ def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[
     found = []
     for k, family in enumerate(form.families):
         if family.kind != "audit":
-            plain = {"kind": family.kind, "unit": family.unit, "differential": family.kind == "q" or k in moving}
-            found.append({**_named(family.name, binding.shapes[k]), **plain})
+            moves = family.kind == "q" or k in moving
+            plain = {"kind": _letter(family.kind, form), "unit": family.unit, "differential": moves}
+            found.append({**_named(_word(family.name, family.kind, form), binding.shapes[k]), **plain})
     return found
 
 

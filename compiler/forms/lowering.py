@@ -147,10 +147,14 @@ class _Lowering:
         ]
         found += [Unknowns(s.name, "s", s.name, s.units["s"], s.place) for s in m.states]
         found += [Unknowns(u.name, "e", u.name, u.units["e"], u.place) for u in m.unknowns]
+        integrated = {offset.label for offset in m.offsets}
         for kind, row_kind in (("kappa", "phi"), ("mu", "psi")):
             names = dict.fromkeys(row.name for row in m.of_kind(row_kind))
             places = {row.name: row.place for row in reversed(m.rows)}
-            found += [Unknowns(f"{n}.multiplier", kind, n, f"J/({m.labels[n]})", places[n]) for n in names]
+            # a flow constraint times its multiplier is power, also where it was integrated
+            power = {n: kind == "mu" or n in integrated for n in names}
+            units = {n: f"{'W' if power[n] else 'J'}/({m.labels[n]})" for n in names}
+            found += [Unknowns(f"{n}.multiplier", kind, n, units[n], places[n]) for n in names]
         found += [Unknowns(f"audit.{n}", "audit", n, "J", None) for n in AUDIT]
         return found
 
@@ -168,6 +172,7 @@ class _Lowering:
                 rows = [row for row in self.model.of_kind(kind) if row.name == name]
                 rate = all(self._has_rate(row) for row in rows)
                 unit = self.model.labels[name]
+                unit = f"{unit}.s" if kind == "phi" and any(o.label == name for o in self.model.offsets) else unit
                 declare(Equations(kind, name, name, kind, unit, rows[0].place, rate))
         for s in self.model.states:
             rows = [row for row in self.model.of_kind("lambda") if row.name == s.name]

@@ -59,9 +59,10 @@ def with_linkages(network: Network) -> Network:
     def law(branch: Branch) -> Branch:
         if branch.name not in constants or branch.law is None:
             return replace(branch, law=None if branch.law is None else held(branch.law))
+        shift = constant(branch.name, branch.at)
         if branch.side == "p":
-            return replace(branch, law=ex.sub(held(branch.law), constant(branch.name, branch.at)))
-        return replace(branch, law=held(branch.law))
+            return replace(branch, law=ex.sub(held(branch.law), shift), shift=shift)
+        return replace(branch, law=held(branch.law), shift=shift)
 
     def start(initial: Initial) -> Initial:
         target = initial.target

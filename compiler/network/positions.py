@@ -65,6 +65,39 @@ def from_stores(network: Network) -> Network:
     )
 
 
+def from_masses(network: Network) -> Network:
+    """Momenta of points, and their rates, as those of the kinetic stores that move with them."""
+    whole = massive(network)
+    held: dict[str, list[tuple[float, Branch, tuple[Node, ...]]]] = {}
+    for b in network.branches:
+        for terminal, sign in ((b.plus, 1.0), (b.minus, -1.0)):
+            if b.kind == "kinetic" and terminal is not None and terminal.node is not None:
+                held.setdefault(terminal.node, []).append((sign, b, terminal.at))
+
+    def stores(node: Node) -> Node:
+        """A store stands at all points of a family, or at one of them."""
+        terms = []
+        for sign, b, at in held.get(node.data[0], ()):
+            if not b.loops and at == node.args:
+                terms.append((sign, ex.var(b.name, "bp", *b.at, order=node.data[2])))
+            elif b.loops and node.data[0] in whole and at == tuple(ex.index(loop.index) for loop in b.loops):
+                here = dict(zip(at, node.args, strict=True))
+                own = (ex.substitute(a, here) for a in b.at)
+                terms.append((sign, ex.var(b.name, "bp", *own, order=node.data[2])))
+        return ex.linear(0.0, terms) if terms else node
+
+    def read(root: Node) -> Node:
+        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[1] == "np"]
+        return ex.substitute(root, {n: stores(n) for n in found}) if found else root
+
+    return replace(
+        network,
+        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
+        expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
+        dynamics=tuple(replace(d, expression=read(d.expression)) for d in network.dynamics),
+    )
+
+
 # -- quadratures -------------------------------------------------------------------------------------------
 
 

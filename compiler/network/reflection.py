@@ -4,8 +4,8 @@ Effort and flow, momentum and displacement, kinetic and potential stores, common
 V*, T and V, D and G change places (book, chapter 5).  What the primal arrows then call a displacement is a momentum,
 and Lagrange's equations of the reflection are the co-Lagrangian equations of the network: one lowering serves both.
 
-Signs carry over: a branch a -> b has e = e(a) - e(b) at common-effort and f = f(a) - f(b) at common-flow nodes.  An
-energy or content written over one node, or over the difference of two, is the element between them.  Displacements
+Signs carry over: a branch a -> b has e = e(a) - e(b) at common-effort and f = f(a) - f(b) at common-flow nodes.
+Energies and contents that are written over nodes and branches become elements first (`stated`).  Displacements
 that no potential store holds, and initial positions: see `positions`.
 """
 
@@ -14,11 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from sysdyn.compiler.model.terms import summands, vanishes
+from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.islands import grounded
 from sysdyn.compiler.network.linkages import with_linkages
-from sysdyn.compiler.network.positions import from_stores, massive, with_contents, with_quadratures
+from sysdyn.compiler.network.positions import from_masses, from_stores, massive, with_contents, with_quadratures
 from sysdyn.compiler.network.primal.reading import KINDS
+from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (
@@ -29,14 +30,14 @@ from sysdyn.dsl.model.network import (
     Energy,
     Network,
     Slope,
-    Terminal,
 )
+from sysdyn.dsl.model.paynter import REFLECTED, REFLECTED_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place
 
 _KINDS = {"be": "bf", "bf": "be", "bq": "bp", "bp": "bq", "ne": "nf", "nf": "ne"}
-_FUNCTIONS = {"T*": "V*", "V*": "T*", "T": "V", "V": "T", "D": "G", "G": "D"}
+_KINDS |= {f"b{name}": f"b{image}" for name, image in REFLECTED_FUNCTIONS.items()}
+_FUNCTIONS = REFLECTED_FUNCTIONS | {"kept kinetic": "kept potential", "kept potential": "kept kinetic"}
 _ELEMENTS = {"kinetic": "potential", "potential": "kinetic", "effort": "flow", "flow": "effort"}
-_SIDES = {"e": "f", "f": "e", "p": "q", "q": "p"}
 
 
 def reflect(network: Network) -> Network:
@@ -45,7 +46,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = with_linkages(from_stores(grounded(as_elements(network))))
+    bare = with_linkages(from_masses(from_stores(grounded(as_elements(network, ALL)))))
     network = with_contents(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
@@ -106,14 +107,17 @@ def _energy(e: Energy) -> Energy:
 
 def _branch(b: Branch) -> Branch:
     law = None if b.law is None else _node(b.law)
-    side = None if b.side is None else _SIDES[b.side]
-    return replace(b, domain=_domain(b.domain), kind=_ELEMENTS.get(b.kind, b.kind), side=side, law=law)
+    shift = None if b.shift is None else _node(b.shift)
+    energy = None if b.energy is None else _node(b.energy)
+    side = None if b.side is None else REFLECTED[b.side]
+    kind = _ELEMENTS.get(b.kind, b.kind)
+    return replace(b, domain=_domain(b.domain), kind=kind, side=side, law=law, shift=shift, energy=energy)
 
 
 def _coupling(c: Coupling) -> Coupling:
     ratio = _node(c.ratio)
     if c.kind == "transformer":
-        return replace(c, side=_SIDES[c.side], ratio=ratio)
+        return replace(c, side=REFLECTED[c.side], ratio=ratio)
     # e1 = r f2 reads f1 = r e2 in the reflection: e2 = f1/r and with e1 f1 + e2 f2 = 0 e1 = -f2/r
     return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), ratio)))
 
@@ -133,61 +137,12 @@ def _read(network: Network) -> Iterable[str]:
     return (n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] == "nf")
 
 
-# -- written energies as elements --------------------------------------------------------------------------
-
-_STORES = {
-    "V": ("potential", "nq", "bq", "e"),
-    "T*": ("kinetic", "nf", "bf", "p"),
-    "D": ("dissipator", "nf", "bf", "e"),
-}
-
-
-def as_elements(network: Network) -> Network:
-    """Energies and contents over one node, or over the difference of two, as the branches that they are."""
-    if not network.nodes:
-        return network
-    nodes = {n.name: n.domain for n in network.nodes}
-    kept, made = [], []
-    for number, energy in enumerate(network.energies):
-        for pieces in (summands(energy.expression), [energy.expression]):
-            names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]
-            found = [_element(energy, piece, name, nodes) for piece, name in zip(pieces, names, strict=True)]
-            branches = [b for b in found if b is not None]
-            if len(branches) == len(pieces):
-                made += branches
-                break
-        else:
-            kept.append(energy)
-    return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
-
-
-def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
-    """The branch whose law is the slope of an energy over u = x(a) - x(b), or None."""
-    store = _STORES.get(energy.function)
-    if store is None:
-        return None
-    kind, node_kind, own_kind, side = store
-    used = sorted((n for n in ex.variables(piece) if n.op == "var"), key=lambda n: n.number)
-    if not 1 <= len(used) <= 2 or any(n.data[1] != node_kind or n.data[2] for n in used):
-        return None
-    a, b = used[0], used[1] if len(used) == 2 else None
-    slope = ex.derivative(piece, a)
-    if b is not None and not vanishes(slope, ex.derivative(piece, b)):
-        return None
-    at = tuple(ex.index(loop.index) for loop in energy.loops)
-    own = ex.var(name, own_kind, *at)
-    law = ex.substitute(slope, {a: own} if b is None else {a: own, b: ex.const(0.0)})
-    minus = Terminal(None, ()) if b is None else Terminal(b.data[0], b.args)
-    plus = Terminal(a.data[0], a.args)
-    return Branch(name, at, energy.loops, nodes[a.data[0]], kind, side, law, plus, minus, None, energy.place)
-
-
 def unreflectable(network: Network) -> Diagnostic | None:
     """The first statement that reads a displacement or flow where only momenta and efforts may stand (E602)."""
-    network = as_elements(network)
+    network = as_elements(along(network, complementary=True), ALL)
     help_ = "formulation lagrangian, hamiltonian"
     statements: list[tuple[str, tuple[ex.Node, ...], Place]] = [
-        (f"energy {e.function}", (e.expression,), e.place) for e in network.energies
+        (f"energy {e.function}", (e.expression,), e.place) for e in network.energies if e.function in ALL
     ]
     statements += [("work", (w.effort, w.on), w.place) for w in network.works]
     gammas = [(f"gamma {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind == "gamma"]
@@ -199,10 +154,13 @@ def unreflectable(network: Network) -> Diagnostic | None:
             if node.op == "var" and node.data[1] in KINDS:
                 message = f"{what} is written in {node}: it has no counterpart in the complementary family"
                 return Diagnostic("E602", message, place, help_)
+    stated = {b.name for b in network.branches if b.stated}
     for what, roots, place in (*laws, *moduli, *gammas):
         own = what.removeprefix("law of ")
         for node in ex.topological(roots):
             if node.op == "var" and node.data[1] in ("nq", "bq") and node.data[0] != own:
+                if own in stated and node.data[0] in stated:  # one energy over the displacements of several ports
+                    continue
                 return Diagnostic("E602", f"{what} depends on displacement {node}", place, help_)
     wrong = next((b for b in network.branches if b.on is not None), None)
     if wrong is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sysdyn.dsl.elaborate.statements import Statements
+from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Shape
@@ -63,7 +64,13 @@ class Connections(Statements):
             case syntax.On():
                 value = self.resolver.scalar(connection.expr)
                 self._is_displacement(value.node, connection.expr)
-                return Ends(None, None, value, self._domain_on(connection.expr, value) or domain)
+                own = self._domain_on(connection.expr, value)
+                if own is not None and domain is not None and own.name != domain.name:
+                    message = f"'{s.decl.name}' is {domain.name}, '{self._text(connection.expr)}' is {own.name}"
+                    help_ = "a gyrator or transformer couples domains"
+                    raise self.resolver.fail("E401", message, connection.span, help=help_)
+                self._is_displacement_of(s, own or domain, value, connection)
+                return Ends(None, None, value, own or domain)
             case _:
                 raise self.resolver.fail(
                     "E407", f"'{s.component.names[0]}' has no port or input '{connection.name.name}'", connection.span
@@ -87,6 +94,17 @@ class Connections(Statements):
             message = f"both ends of '{s.decl.name}' are node {plus.node.name}"
             raise self.resolver.fail("E413", message, connection.span)
         return self._along(plus, minus, domains[0])
+
+    def _is_displacement_of(
+        self, s: syntax.Instance, domain: DomainSymbol | None, value: Typed, connection: syntax.On
+    ) -> None:
+        """E208: the expression along which an element acts is a displacement of its domain."""
+        if domain is None or value.dimension is None or value.dimension == domain.displacement.dimension:
+            return
+        wanted, found = dim.show(domain.displacement.dimension), dim.show(value.dimension)
+        message = f"'{s.decl.name}' acts along a displacement of '{domain.name}' in {wanted}, not in {found}"
+        help_ = self.resolver.missing(value.dimension, domain.displacement.dimension)
+        raise self.resolver.fail("E208", message, connection.span, help=help_)
 
     def _along(self, plus: End, minus: End, domain: DomainSymbol) -> Ends:
         """A branch that hangs on a coordinate acts along an expression."""

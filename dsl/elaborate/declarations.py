@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 
 from sysdyn.dsl.elaborate.parameters import Parameters
 from sysdyn.dsl.elaborate.parts import declared
@@ -120,7 +121,9 @@ class Declarations(Parameters):
             self._unknown(decl, "q", family, own.dimension, domain, co)
             place = self.place(decl.span)
             self.parts.coordinates.append(
-                Coordinate(family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place)
+                Coordinate(
+                    family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place, domain
+                )
             )
             if statement.init is not None:
                 self._own_initial(decl, "q", family, own.dimension, statement.init)
@@ -140,12 +143,11 @@ class Declarations(Parameters):
             self.add_initial(Initial(target, value, init.kind == "fixed", self.resolver.loops, self.place(init.span)))
 
     def add_initial(self, initial: Initial, override: bool = False) -> None:
-        """Enter an initial value; a scene's replaces the model's."""
-        for k, before in enumerate(self.parts.initials):
-            if before.target is initial.target and before.loops == initial.loops:
-                if override:
-                    self.parts.initials[k] = initial
-                    return
+        """Enter an initial value; override: of a scene.  What stands further outside goes before (language, 34)."""
+        path = self.current.path
+        initial = replace(initial, depth=0 if override else 2 + path.count(".") if path else 1)
+        for before in self.parts.initials:
+            if before.target is initial.target and before.loops == initial.loops and before.depth == initial.depth:
                 related = (Related("first here", before.place),)
                 message = f"'{initial.target}' gets its initial value twice"
                 self.report.error("E106", message, initial.place, related=related)

@@ -13,7 +13,7 @@ from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Dynamic, Initial, Loop, State
 from sysdyn.dsl.model.units import si
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.context import Failed, SeveralError
 from sysdyn.dsl.names.symbols import Definition, Scope, Space, Typed
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.tree import syntax
@@ -66,6 +66,8 @@ class Elaborator(Instances):
             with self.entering(pending.space):
                 try:
                     pending.resolve()
+                except SeveralError as several:
+                    self.resolver.spread(several, pending.span)
                 except Failed:
                     continue
         for space, _ in self.bodies:

@@ -29,7 +29,7 @@ class Pending:
     """A law to be resolved when every name of the model is known."""
 
     space: Space
-    loops: tuple[syntax.For, ...]
+    span: syntax.Span
     resolve: Callable[[], None]
 
 
@@ -121,7 +121,7 @@ class Elements(Connections):
                 self._branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))
             )
 
-        self.pending.append(Pending(self.current, (), resolve))
+        self.pending.append(Pending(self.current, span, resolve))
 
     def _branch(
         self,
@@ -166,7 +166,7 @@ class Elements(Connections):
                 Coupling(ratio.kind, first, second, whole, loops, ratio.side, ratio.ratio, place)
             )
 
-        self.pending.append(Pending(self.current, (), resolve))
+        self.pending.append(Pending(self.current, span, resolve))
 
     def _hidden(self, value: syntax.Expr, own: dict[str, Typed], name: str) -> None:
         """W101: an element's own variable hides an outer name in its law."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.network import Table
-from sysdyn.dsl.model.units import NONE, Unit, multiply
+from sysdyn.dsl.model.units import NONE, Unit, multiply, si
 from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import (
@@ -178,13 +178,15 @@ class FileScope:
                 case syntax.DomainPseudo():
                     pseudo = read_unit(part.unit, scope, source, self.report)
         place = Place(source, item.name.span)
-        missing = [k for k in ("effort", "flow", "momentum", "displacement") if k not in units]
+        missing = [k for k in ("effort", "flow", "displacement") if k not in units]
         if missing:
             self.report.error("E210", f"domain {item.name.name}: its {missing[0]} is not given", place)
             return
+        kinetic = "momentum" in units
+        units.setdefault("momentum", si(multiply(units["effort"].dimension, dim.TIME)))
         self._check_domain(item.name.name, units, pseudo, place)
         e, f, p, q = (units[k] for k in ("effort", "flow", "momentum", "displacement"))
-        yield DomainSymbol(item.name.name, e, f, p, q, common, pseudo is not None, place)
+        yield DomainSymbol(item.name.name, e, f, p, q, common, pseudo is not None, place, kinetic)
 
     def _check_domain(self, name: str, units: dict[str, Unit], pseudo: Unit | None, place: Place) -> None:
         power = multiply(units["effort"].dimension, units["flow"].dimension)

@@ -16,6 +16,7 @@ from sysdyn.dsl.elaborate.parameters import Argument
 from sysdyn.dsl.elaborate.parts import Nested, flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS, own_variables
 from sysdyn.dsl.names.symbols import (
@@ -39,6 +40,11 @@ from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
 
 BUILTINS = (*ONE_PORTS, *TWO_PORTS)
+
+
+def _range_text(bounds: tuple[Node, Node]) -> str:
+    first, last = map(ex.to_text, bounds)
+    return first if first == last else f"{first}..{last}"
 
 
 class Instances(Elements):
@@ -119,7 +125,7 @@ class Instances(Elements):
         number = len(symbol.spaces)
         scope = Scope(component.file_scope)
         space = Space(
-            path=path if not number else f"{path}#{number + 1}",
+            path=path if not number else f"{path}[{', '.join(map(_range_text, shape))}]",
             scope=scope,
             file_scope=component.file_scope,
             source=component.source,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sysdyn.dsl.elaborate.level_ports import level_ports
 from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.symbols import ComponentSymbol
 from sysdyn.dsl.text.diagnostics import Place
@@ -34,7 +35,10 @@ def choose_level(
         message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
         frame.report.error("E802", message, place or frame.place(s.component.span))
         raise Failed
-    return chosen, (*base, *_extended(frame, component, levels, levels[chosen], ()))
+    bodies = {name: _extended(frame, component, levels, level, ()) for name, level in levels.items()}
+    described = {name: (level, bodies[name]) for name, level in levels.items()}
+    level_ports(component.name, described, component.source, frame.report)
+    return chosen, (*base, *bodies[chosen])
 
 
 def elsewhere(component: ComponentSymbol, chosen: str | None) -> dict[str, str]:

@@ -27,7 +27,7 @@ from sysdyn.dsl.model.network import (
     Work,
 )
 from sysdyn.dsl.model.units import Unit
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.context import Failed, SeveralError
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol
 from sysdyn.dsl.names.unit_reading import read_unit
@@ -98,11 +98,22 @@ class Frame:
         for statement, loops in statements:
             try:
                 with self.inside(loops):
-                    do(statement)
+                    self.in_parts(lambda s=statement: do(s), statement.span)  # type: ignore[misc]
             except Failed:  # what it would have declared is not reported again where it is used
                 for decl in declared(statement):
                     if decl.name not in self.scope.symbols:
                         self.scope.broken.add(decl.name)
+
+    def in_parts(self, do: Callable[[], None], span: syntax.Span) -> None:
+        """Carry out a statement; for each part of a loop that runs over several statements of one label."""
+        try:
+            do()
+        except SeveralError as several:
+            if all(loop.index != several.loop for loop in self.resolver.loops):
+                raise self.resolver.spread(several, span) from None
+            for part in several.parts:
+                with self.resolver.narrowed(several, part):
+                    self.in_parts(do, span)
 
     @contextmanager
     def inside(self, loops: tuple[syntax.For, ...]) -> Iterator[None]:

@@ -147,16 +147,19 @@ class Statements(Declarations):
     def initial(self, s: syntax.Init, override: bool = False) -> None:
         """`init ref = value`, in a model or (override) in a scene."""
         with ExitStack() as stack:
-            target_syntax = self._sliced(s.target, stack)
-            with self.resolver.leniently():
-                target = self.resolver.scalar(target_syntax)
-            message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
-            value = self.resolver.wanted(s.initial.value, target.dimension or NONE, "E207", message)
-            for inner in ex.variables(value):
-                message = f"the initial value of '{target.node}' depends on '{inner}'"
-                raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
-            fixed = s.initial.kind == "fixed"
-            self.add_initial(Initial(target.node, value, fixed, self.resolver.loops, self.place(s.span)), override)
+            target = self._sliced(s.target, stack)
+            self.in_parts(lambda: self._initial(s, target, override), s.span)
+
+    def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool) -> None:
+        with self.resolver.leniently():
+            target = self.resolver.scalar(target_syntax)
+        message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
+        value = self.resolver.wanted(s.initial.value, target.dimension or NONE, "E207", message)
+        for inner in ex.variables(value):
+            message = f"the initial value of '{target.node}' depends on '{inner}'"
+            raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
+        fixed = s.initial.kind == "fixed"
+        self.add_initial(Initial(target.node, value, fixed, self.resolver.loops, self.place(s.span)), override)
 
     def _sliced(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
         """`x[1..n].f` becomes a loop over x[i].f."""

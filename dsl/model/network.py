@@ -38,6 +38,7 @@ class Domain:
     common: str
     pseudo: bool
     place: Place
+    kinetic: bool = True  # whether kinetic stores exist: the domain has a momentum
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ class Branch:
     Its effort, flow, displacement, momentum are var kinds be bf bq bp of its name at `at` (loop variables of `loops`,
     or constants).  kind: kinetic, potential, dissipator, effort, flow (sources), field (no law: it stands in energies
     and constraints), port (one side of a coupling).  law: side = law, side one of e f q p; law holds the branch's own
-    conjugate variable, and others where it is modulated.
+    conjugate variable, and others where it is modulated.  Its state functions are var kinds bT bT* bV bV* bD bG.
     """
 
     name: str
@@ -79,6 +80,9 @@ class Branch:
     minus: Terminal | None
     on: Node | None
     place: Place
+    shift: Node | None = None  # the law is over the own variable plus this constant
+    stated: bool = False  # its energy stands among the state functions, kept for the audit
+    energy: Node | None = None  # the state function of its own variable, where the author wrote that instead of the law
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +167,7 @@ class Coordinate:
     effort: Unit
     asserted: bool | None  # tangible, intangible, or not said
     place: Place
+    domain: Domain | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,6 +243,7 @@ class Initial:
 
     Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
     store: whose content that is, where no text says it; unit: of a displacement, of the rate of a momentum.
+    depth: 0 of a scene, 1 of the model, 2 of its components, ...: what has less goes before what has more.
     """
 
     target: Node
@@ -247,6 +253,7 @@ class Initial:
     place: Place
     store: str = ""
     unit: str = "1"
+    depth: int = 1
 
 
 @dataclass(frozen=True, slots=True)

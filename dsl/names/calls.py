@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
-from sysdyn.dsl.names.context import Context, Failed, Value
+from sysdyn.dsl.names.context import Context, Failed, SeveralError, Value
 from sysdyn.dsl.names.symbols import Definition, FunctionSymbol, Space, TableSymbol, Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.tree import syntax
@@ -25,10 +26,26 @@ class Calls(Context):
         if self._indexes_list(e):
             return self._unrolled(e, first, last)
         with self.loop(e.index.name, first, last, unique=True) as loop:
+            return self._reduced(e, loop)
+
+    def _reduced(self, e: syntax.Reduction, loop: Loop) -> Typed:
+        """The reduction over a loop in sight, cut where it runs over several statements of one label."""
+        try:
             body = self.scalar(e.body)
+        except SeveralError as several:
+            if several.loop != loop.index:
+                raise
+            parts = []
+            for part in several.parts:
+                with self.narrowed(several, part) as inner:
+                    parts.append(self._reduced(e, inner))
+            nodes = [p.node for p in parts]
+            if e.op in ("sum", "prod"):
+                return Typed(ex.add(*nodes) if e.op == "sum" else ex.mul(*nodes), parts[0].dimension)
+            return Typed(ex.call(e.op, *nodes), parts[0].dimension)
         if e.op == "prod" and body.dimension:
             raise self.fail("E203", "the factors of a product over a range are dimensionless", e.body.span)
-        return Typed(ex.reduction(e.op, loop.index, first, last, body.node), body.dimension)
+        return Typed(ex.reduction(e.op, loop.index, loop.first, loop.last, body.node), body.dimension)
 
     def _indexes_list(self, e: syntax.Reduction) -> bool:
         """Whether the body takes elements of an array whose items were written out one by one."""

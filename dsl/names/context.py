@@ -51,6 +51,23 @@ class Failed(Exception):  # noqa: N818
     """The expression is wrong and has been reported."""
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A range of a loop variable in which a label has one statement: that statement's space."""
+
+    space: Space
+    first: Node
+    last: Node
+
+
+class SeveralError(Failed):
+    """A loop runs over several statements of one label: whoever owns the loop cuts it into these parts."""
+
+    def __init__(self, label: str, key: tuple[int, tuple[Node, ...]], loop: str, parts: tuple[Part, ...]) -> None:
+        super().__init__(label)
+        self.label, self.key, self.loop, self.parts = label, key, loop, parts
+
+
 class Context:
     """What is in sight, and what has been learnt on the way."""
 
@@ -69,6 +86,7 @@ class Context:
         self._loops: list[Loop] = []
         self._bound: dict[str, Typed] = {}  # loop variables, function arguments, an element's own variables
         self._names: dict[str, int] = {}
+        self.chosen: dict[tuple[int, tuple[Node, ...]], Space] = {}  # the statement of a label that an index means
         self.scope = Scope()
         self.source = SourceText("", "")
         self.file_scope = self.scope
@@ -166,6 +184,24 @@ class Context:
         finally:
             self._loops.pop()
             self._bound = before
+
+    @contextmanager
+    def narrowed(self, several: SeveralError, part: Part) -> Iterator[Loop]:
+        """Inside one part of a loop that runs over several statements of a label."""
+        k = next(k for k, loop in enumerate(self._loops) if loop.index == several.loop)
+        loop = self._loops[k]
+        inner = Loop(loop.index, later(loop.first, part.first), earlier(loop.last, part.last))
+        self._loops[k], self.chosen[several.key] = inner, part.space
+        try:
+            yield inner
+        finally:
+            self._loops[k] = loop
+            del self.chosen[several.key]
+
+    def spread(self, several: SeveralError, span: syntax.Span) -> Failed:
+        """Report that nobody can cut the loop."""
+        message = f"'{several.label}' is declared in several places, over which {several.loop.rpartition('.')[2]} runs"
+        return self.fail("E806", message, span, help="one statement for each of these places")
 
     @property
     def loops(self) -> tuple[Loop, ...]:
@@ -277,3 +313,19 @@ class Context:
                 message = f"index {node} is not affine in one loop variable: the array would have to be unrolled"
                 raise self.fail("E806", message, index.span, help="i + c, or a table over the index")
         return node
+
+
+def later(a: Node, b: Node) -> Node:
+    """The larger of two bounds."""
+    apart = ex.sub(a, b)
+    if ex.is_const(apart):
+        return a if apart.data >= 0 else b
+    return ex.call("max", a, b)
+
+
+def earlier(a: Node, b: Node) -> Node:
+    """The smaller of two bounds."""
+    apart = ex.sub(a, b)
+    if ex.is_const(apart):
+        return a if apart.data <= 0 else b
+    return ex.call("min", a, b)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.context import Context, Failed
 from sysdyn.dsl.names.members import branch_dimension
-from sysdyn.dsl.names.symbols import BranchSymbol, Typed
+from sysdyn.dsl.names.symbols import BranchSymbol, Definition, Typed
 from sysdyn.dsl.tree import syntax
 
 ONE_PORTS = ("kinetic", "potential", "dissipator", "effort", "flow")
@@ -61,6 +62,10 @@ def law_of(
     kind = _EDGES.get(frozenset((side, others[0])))
     if kind is None:
         raise _off_diagram(context, side, others[0], span)
+    if wanted in ("effort", "flow") and _controlled(context, branch, value, node):
+        if side != wanted[0]:
+            raise context.fail("E303", f"'{branch.name}' is a {wanted} source, but its law gives {side}", span)
+        return LawOf(wanted, side, node)
     if wanted in ("effort", "flow"):
         help_ = f"that is a {kind}: '{kind}({side} = ...)'"
         raise context.fail(
@@ -69,8 +74,21 @@ def law_of(
     if wanted is not None and kind != wanted:
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
-    _alone(context, branch, kind, node, span)
     return LawOf(kind, side, node)
+
+
+def _controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:
+    """Whether a law reads an input, time or another element: that of a controlled source, whatever else it reads."""
+    for name in walk(value):
+        symbol = context.scope.find(name.name) if isinstance(name, syntax.Name) else None
+        if isinstance(symbol, Definition) and symbol.kind == "input":
+            return True
+    for node in ex.topological([law]):
+        if node.op == "time" or (node.op == "param" and node.data in context.inputs):
+            return True
+        if node.op == "var" and node.data[0] != branch.family.name:
+            return True
+    return False
 
 
 def _source(
@@ -98,19 +116,6 @@ def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> 
         f"a law must relate p-f, q-e or e-f; this one relates {side} and {other}, which {requirement} already fixes"
     )
     return context.fail("E301", message, span)
-
-
-def _alone(context: Context, branch: BranchSymbol, kind: str, node: Node, span: syntax.Span) -> None:
-    """E304: the law of a store may not depend on another displacement or momentum."""
-    if kind == "dissipator":
-        return
-    for other in sorted((n for n in ex.variables(node) if n.op == "var"), key=lambda n: n.number):
-        name, var_kind, _ = other.data
-        if name != branch.family.name and var_kind in ("q", "nq", "bq", "p", "np", "bp"):
-            what = "displacement" if var_kind.endswith("q") else "momentum"
-            message = f"{kind} law of '{branch.name}' depends on {what} {other}: the store works there too"
-            function = "T*" if kind == "kinetic" else "V"
-            raise context.fail("E304", message, span, help=f"energy {function} = ... with ports for both")
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Domain
+from sysdyn.dsl.model.paynter import MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
-from sysdyn.dsl.names.context import Failed, Quadrature, Use, Value
+from sysdyn.dsl.names.context import Failed, Part, Quadrature, SeveralError, Use, Value
 from sysdyn.dsl.names.names import Names
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
@@ -41,7 +42,7 @@ from sysdyn.dsl.tree import syntax
 
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE}
-BRANCH = ("e", "f", "q", "p", "power", "energy", "T", "Tstar", "V", "Vstar")
+BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +99,30 @@ class Members(Names):
         if len(base.indices) != count:
             raise self.index_count(symbol.name, count, len(base.indices), span)
         at = tuple(self.index(i) for i in base.indices)
-        for space in symbol.spaces:
-            own = space.prefix[len(space.prefix) - count :]
-            if all(o.op == "index" or o is a for o, a in zip(own, at, strict=True)):
-                self._remember(symbol, space, base, at, count)
-                change = dict(base.change)
-                change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
-                return space, change
-        raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
+        fitting = [s for s in symbol.spaces if _may_hold(s, at)]
+        if not fitting:
+            raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
+        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at)
+        self._remember(symbol, space, base, at, count)
+        own = space.prefix[len(space.prefix) - count :]
+        change = dict(base.change)
+        change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
+        return space, change
+
+    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...]) -> Space:
+        """The statement of a label that an element comes from; SeveralError where a loop runs over several."""
+        chosen = self.chosen.get((id(symbol), at))
+        if chosen is not None:
+            return chosen
+        for k, a in enumerate(at):
+            loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
+            ranges = [s.around[len(s.around) - len(at) + k] for s in spaces]
+            if loop is not None and len(set(ranges)) > 1:
+                offset = ex.sub(a, loop)
+                parts = (Part(s, *(ex.sub(b, offset) for b in r)) for s, r in zip(spaces, ranges, strict=True))
+                raise SeveralError(symbol.name, (id(symbol), at), loop.data, tuple(parts))
+        inside = [s for s in spaces if _holds(s, at)]
+        return (inside or spaces)[0]
 
     def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
         shape = space.around[len(space.around) - count :]
@@ -207,6 +224,8 @@ class Members(Names):
                 )
                 return self._changed(self.node_quantity(End(symbol, at, symbol.domain), e), base.change)
             case PortSymbol():
+                if symbol.end.domain.common == "flow" and e.name == "e":  # not that of the whole node
+                    raise self.no_member(shown, e, ("q", "f", "p"))
                 return self._changed(self.node_quantity(symbol.end, e), base.change)
             case BranchSymbol():
                 at = self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e))
@@ -234,9 +253,15 @@ class Members(Names):
             "p" if co else "q": ("q", symbol.dimension),
             "e" if co else "f": ("f", domain.effort.dimension if co else domain.flow.dimension),
         }
-        kinds.setdefault("p", ("p", domain.momentum.dimension))
+        # what the kinetic stores (potential stores, of momentum coordinates) that move with it hold, and its rate
+        held, rate = ("q", "f") if co else ("p", "e")
+        units = {"q": domain.displacement, "f": domain.flow, "p": domain.momentum, "e": domain.effort}
+        kinds[held] = ("p", units[held].dimension)
+        if e.name == rate:
+            node = ex.var(family, "p", *at, order=1)
+            return self._changed(Typed(node, units[rate].dimension), base.change)
         if e.name not in kinds:
-            raise self.no_member(symbol.name, e, sorted(kinds))
+            raise self.no_member(symbol.name, e, ("q", "f", "p", "e"))
         kind, dimension = kinds[e.name]
         return self._changed(Typed(ex.var(family, kind, *at), dimension), base.change)
 
@@ -252,12 +277,13 @@ class Members(Names):
             return Typed(ex.var(end.node.family.name, "ne", *end.at), domain.effort.dimension)
         kinds = {"q": ("nq", domain.displacement.dimension), "f": ("nf", domain.flow.dimension)}
         kinds["p"] = ("np", domain.momentum.dimension)
+        kinds["e"] = ("np", domain.effort.dimension)  # p' = e
         if e.name not in kinds:
             raise self.no_member(self._shown(e.base), e, kinds)
         kind, dimension = kinds[e.name]
         if end.node is None:
             return Typed(ex.const(0.0), dimension)
-        return Typed(ex.var(end.node.family.name, kind, *end.at), dimension)
+        return Typed(ex.var(end.node.family.name, kind, *end.at, order=int(e.name == "e")), dimension)
 
     def branch_quantity(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, e: syntax.Member) -> Typed:
         """Members e f q p of a branch, and the power it absorbs."""
@@ -270,8 +296,8 @@ class Members(Names):
             return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
         if name == "energy":
             return Typed(self._absorbed(symbol, at, power, e), multiply(power, dim.TIME))
-        if name in ("T", "Tstar", "V", "Vstar"):
-            return Typed(self._stored(symbol, at, name, power, e), multiply(power, dim.TIME))
+        if name in MEMBERS:
+            return self._state_function(symbol, at, name, power, e)
         return Typed(ex.var(family.name, f"b{name}", *at), branch_dimension(domain, name))
 
     def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
@@ -300,25 +326,17 @@ class Members(Names):
         self.quadratures.setdefault(name, Quadrature(rate, (), dimension, self.place(e.span), first))
         return ex.var(name, "s")
 
-    def _stored(
+    def _state_function(
         self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member
-    ) -> Node:
-        """Energies T, T*, V, V* of a store: half the product where the law is linear, else its power's integral."""
-        family = symbol.family.name
-        kind, other = ("kinetic", "f") if name.startswith("T") else ("potential", "e")
-        law = self.laws.get(family)
-        if law is None or law.kind != kind:
-            what = "a kinetic" if kind == "kinetic" else "a potential"
-            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{name}': it is not {what} store", e.span)
-        one = ex.var(family, "bp" if kind == "kinetic" else "bq", *at)
-        two = ex.var(family, f"b{other}", *at)
-        own = [n for n in ex.variables(law.law) if n.op == "var" and n.data[0] == family]
-        slope = ex.derivative(law.law, own[0]) if own else ex.const(0.0)
-        linear = own and not ex.variables(slope)
-        if linear and ex.is_const(ex.substitute(law.law, {own[0]: ex.const(0.0)}), 0.0):
-            return ex.scale(0.5, ex.mul(one, two))
-        energy = self._absorbed(symbol, at, power, e)
-        return ex.sub(ex.mul(one, two), energy) if name.endswith("star") else energy
+    ) -> Typed:
+        """T, T*, V, V* of a store (J), D, G of a dissipator (W): what the compiler makes of its law."""
+        function = MEMBERS[name]
+        law = self.laws.get(symbol.family.name)
+        if law is None or law.kind != function.edge:
+            what = "a dissipator" if function.edge == "dissipator" else f"a {function.edge} store"
+            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{name}': it is not {what}", e.span)
+        dimension = power if function.edge == "dissipator" else multiply(power, dim.TIME)
+        return Typed(ex.var(symbol.family.name, f"b{function.name}", *at), dimension)
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
@@ -434,6 +452,28 @@ class Members(Names):
             raise self.fail("E203", "a constant has no displacement", e.args[0].span)
         node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
         return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
+
+
+def _gaps(space: Space, at: tuple[Node, ...]) -> list[Node]:
+    """How far fixed indices lie behind the first and before the last element of a statement."""
+    ranges = space.around[len(space.around) - len(at) :]
+    found = []
+    for a, (first, last) in zip(at, ranges, strict=True):
+        if all(n.op != "index" for n in ex.topological([a])):
+            found += [ex.sub(a, first), ex.sub(last, a)]
+    return found
+
+
+def _may_hold(space: Space, at: tuple[Node, ...]) -> bool:
+    """Whether no index lies outside a statement's range for certain."""
+    own = space.prefix[len(space.prefix) - len(at) :]
+    fits = all(o.op == "index" or o is a or a.op != "const" for o, a in zip(own, at, strict=True))
+    return fits and not any(ex.is_const(gap) and gap.data < 0 for gap in _gaps(space, at))
+
+
+def _holds(space: Space, at: tuple[Node, ...]) -> bool:
+    """Whether every index lies inside a statement's range for certain."""
+    return all(ex.is_const(gap) and gap.data >= 0 for gap in _gaps(space, at))
 
 
 def branch_dimension(domain: DomainSymbol, letter: str) -> Dimension:

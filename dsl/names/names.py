@@ -9,7 +9,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, known
-from sysdyn.dsl.names.context import Context, Failed, Use, Value
+from sysdyn.dsl.names.context import Context, Failed, SeveralError, Use, Value
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
     BundleNode,
@@ -200,6 +200,11 @@ class Names(Context):
                 self._declared(symbol, value)
                 if self.virtual and symbol.kind in ("output", "input"):
                     value = _signal(value)
+        except SeveralError as several:
+            del self._values[key]  # where it is read, the range is known
+            if any(several.loop == n.node.data for n in placeholders.values()):
+                raise self.spread(several, symbol.span) from None
+            raise
         finally:
             self._active.pop()
         self._values[key] = value
@@ -269,9 +274,12 @@ class Names(Context):
         base = e.base.expr if isinstance(e.base, syntax.Group) else e.base
         value = self.resolve(base)
         if isinstance(value, Vector):
-            raise self.fail("E203", "an array stands where one number is wanted", e.span)
+            return Vector(tuple(self._rate_of(v, e.span) for v in value.items), value.first)
+        return self._rate_of(value, e.span)
+
+    def _rate_of(self, value: Typed, span: syntax.Span) -> Typed:
         dimension = None if value.dimension is None else dim.quotient(value.dimension, dim.TIME)
-        return Typed(self.rate(value.node, e.span), dimension)
+        return Typed(self.rate(value.node, span), dimension)
 
     def rate(self, node: Node, span: syntax.Span) -> Node:
         """The time derivative of a node."""

@@ -11,75 +11,9 @@ from collections.abc import Iterable
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Energy
 from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.rules.letters import letter, samples, unknowns_of
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
-
-_CLASS = {k: k[-1] for k in ("nq", "nf", "np", "bq", "bf", "bp")} | {"be": "e", "ne": "e"}
-
-
-def letter(node: Node) -> str:
-    """Kind q f p e s kappa mu audit: nodes' and branches' quantities count as those of coordinates."""
-    kind: str = node.data[1]
-    return _CLASS.get(kind, kind)
-
-
-def unknowns_of(node: Node, kinds: str = "") -> list[Node]:
-    """The unknowns of an expression (of those kinds) in the order of their making."""
-    found = (n for n in ex.variables(node) if n.op == "var" and (not kinds or letter(n) in kinds.split()))
-    return sorted(found, key=lambda n: n.number)
-
-
-def energies(model: Elaborator, report: Report) -> None:
-    """E307, E309, E312: the variables that each state function may have."""
-    for energy in model.parts.energies:
-        primal = energy.function in ("T*", "T", "V", "D")
-        for node in unknowns_of(energy.expression):
-            message, help_ = _misplaced(energy, node, primal)
-            if message:
-                code = "E309" if energy.function == "V" and letter(node) == "f" else "E307"
-                report.error(code, message, energy.place, help=help_)
-                break
-        if any(n.data[2] for n in unknowns_of(energy.expression)):
-            message = f"{energy.function} contains a second derivative: accelerations are results, not data"
-            report.error("E518", message, energy.place)
-    _twice(model, report)
-
-
-def _misplaced(energy: Energy, node: Node, primal: bool) -> tuple[str | None, str | None]:
-    kind = letter(node)
-    function = energy.function
-    if kind in ("kappa", "mu", "e", "audit"):
-        return f"{function} contains {node}: a state function depends on coordinates, rates, states and time", None
-    if kind == "f" and function == "V":
-        message = f"V contains the flow {node}: a velocity-dependent potential"
-        return message, "put the part linear in the flow into T*, or use 'work'"
-    if not primal:
-        return None, None
-    if kind == "p" and function != "T":
-        help_ = "energy T = ..." if function == "T*" else None
-        return (
-            f"{function} is a function of {'q and t' if function == 'V' else 'f, q and t'}; it holds momentum {node}",
-            help_,
-        )
-    if kind == "f" and function == "T":
-        return f"T is a function of p, q and t; it contains the flow {node}", "energy T* = ..."
-    return None, None
-
-
-def _twice(model: Elaborator, report: Report) -> None:
-    coenergy = {
-        n.data[0]: e for e in model.parts.energies if e.function == "T*" for n in unknowns_of(e.expression, "f")
-    }
-    for energy in model.parts.energies:
-        if energy.function == "T":
-            for node in unknowns_of(energy.expression, "p"):
-                if node.data[0] in coenergy:
-                    message = f"T and T* are both given for the store of '{node.data[0]}'"
-                    related = (Related("T* is given here", coenergy[node.data[0]].place),)
-                    help_ = "give one; the other is its Legendre transform"
-                    report.error("E312", message, energy.place, related=related, help=help_)
-                    break
 
 
 def families(model: Elaborator, report: Report) -> None:
@@ -141,18 +75,9 @@ def _nonlinear(expression: Node, flows: list[Node]) -> tuple[Node, Node] | None:
         slope = ex.derivative(expression, a)
         for b in flows[k:]:
             second = ex.derivative(slope, b)
-            if not ex.is_const(second, 0.0) and any(abs(v) > 1e-9 for v in _samples(second)):
+            if not ex.is_const(second, 0.0) and any(abs(v) > 1e-9 for v in samples(second)):
                 return a, b
     return None
-
-
-def _samples(node: Node) -> Iterable[float]:
-    leaves = [n for n in ex.topological([node]) if n.op in ("var", "param", "time", "index", "table")]
-    for seed in (1.0, 2.0, 3.0):
-        values = {n: 0.3 + ((k + 1) * seed * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
-        value = ex.evaluate([node], lambda n, v=values: v.get(n, 0.5))[0]  # type: ignore[misc]
-        if math.isfinite(value):
-            yield value
 
 
 def states(model: Elaborator, report: Report) -> None:
@@ -329,6 +254,6 @@ def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
 
 def run(model: Elaborator, report: Report, *, required: bool) -> None:
     """All rules; those with values only where every value is there."""
-    for rule in (energies, families, constraints, states, accelerations, results, smoothness):
+    for rule in (families, constraints, states, accelerations, results, smoothness):
         rule(model, report)
     parameters(model, report, required=required)

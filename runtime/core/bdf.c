@@ -267,7 +267,9 @@ static void reduce(sd_bdf *bdf, double ratio)
 static void fit_end(sd_bdf *bdf)
 {
     double left = bdf->t_end - bdf->t, h = bdf->h;
-    if (h >= left * (1.0 - 1e-12))
+    /* what a sum of fixed steps leaves is round-off: a step of that length would divide multipliers by it */
+    double slack = bdf->fixed_h > 0.0 ? 1e-3 : 1e-12;
+    if (h >= left * (1.0 - slack))
         h = left;
     else if (2.0 * h > left && bdf->taken > 0 && !(bdf->fixed_h > 0.0))
         h = 0.5 * left;

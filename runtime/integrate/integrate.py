@@ -113,7 +113,7 @@ class Integration:
         self._smooth = self.roles.smooth.astype(np.int32)
         method = self.method.contents
         method.rtol, method.t_end = request.rtol, self.segments[0].end
-        method.h_max = request.h_max or LONGEST * (request.t_end - self.start.t)
+        method.h_max = request.fixed_step or request.h_max or LONGEST * (request.t_end - self.start.t)
         method.fixed_h = request.fixed_step or 0.0
         method.atol = lib.pointer(self._atol)
         method.magnitude, method.met = lib.pointer(self.magnitude), lib.pointer(self._met)

@@ -27,6 +27,8 @@ NOISE = 1e-11
 POINTS = 3
 AMPLITUDES = (3e-2, 1e-3, 1e-5)
 """Of the displacements, to come to a nearby point."""
+BESIDE = 1e-3
+"""Amplitude of the displacements to points beside the start, off phi."""
 NEAR = 10.0
 """Amplitudes: what the way back onto phi leads farther than this may be another singular point."""
 _EPS = 1e-13
@@ -137,6 +139,41 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
                 shaken = solution.x
             found.append(starter.expand(shaken)[0])
             break
+    return found
+
+
+def vanished(system: System, state: ConsistentState) -> Ints:
+    """Constraints (places in `multipliers`) whose row of J is zero at the state and not beside it: there the
+    configuration is singular.  Beside: at seeded points that are not brought back onto phi, where a row that can be
+    zero on phi alone (a circle of radius 0) has its size.
+    """
+    y, yd = state.for_form(system)
+    here = _sizes(system, system.jacobian(state.t, y, yd)[0])
+    if not here.size:
+        return np.zeros(0, dtype=np.int32)
+    starter = Starter(system)
+    x = np.concatenate([state.y, state.yd[starter.rates]])
+    q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
+    size = np.where(q, starter.scale(state.t, x), 0.0)
+    random = np.random.default_rng(12)
+    there = np.full(here.size, np.inf)
+    for _ in range(POINTS):
+        shaken = x + BESIDE * size * random.standard_normal(x.size)
+        there = np.minimum(there, _sizes(system, system.jacobian(state.t, starter.expand(shaken)[0], yd)[0]))
+    return np.flatnonzero(here <= TOLERANCE * there).astype(np.int32)
+
+
+def _sizes(system: System, jy: Floats) -> Floats:
+    """The largest entry of each row of J, as written."""
+    columns = system.pattern.columns_of()
+    multipliers = np.flatnonzero(np.isin(system.kinds, ("kappa", "mu")))
+    dynamics = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        if group == "dynamics":
+            dynamics[first : first + system.description.rows[family].size] = True
+    take = np.flatnonzero(np.isin(columns, multipliers) & dynamics[system.pattern.row])
+    found = np.zeros(multipliers.size)
+    np.maximum.at(found, np.searchsorted(multipliers, columns[take]), np.abs(jy[take]))
     return found
 
 

@@ -18,7 +18,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions
+from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
 
 DENSE = 300
 MAX_INDEX = 6
@@ -148,15 +148,18 @@ def structure(system: System, state: ConsistentState) -> Structure:
     index, undetermined = index_of(system, state)
     found = reactions(system, jy)
     left = dependent(found)
-    lost = 0
+    zero = vanished(system, state)
+    lowest = np.union1d(left, zero).size
     if left.size:
         # a rank that is smaller here alone is the configuration's, not the constraints'
         for point in nearby(system, state):
             there = reactions(system, system.jacobian(state.t, point, yd)[0])
             fewer = dependent(there)
             if fewer.size < left.size:
-                lost += int(left.size - fewer.size)
                 found, left = there, fewer
+    # a row that is zero wherever phi holds, but not beside it, is no combination of others
+    left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
+    lost = lowest - int(left.size)
     n = int((system.kinds == "f").sum())
     m1, m2 = (int((system.kinds == kind).sum()) for kind in ("kappa", "mu"))
     rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())

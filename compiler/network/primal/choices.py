@@ -13,13 +13,30 @@ import numpy as np
 from sysdyn.compiler.network.primal.integrals import Rests, antiderivative, line, polynomial
 from sysdyn.compiler.network.primal.inverses import Inverse, inverse
 from sysdyn.compiler.network.primal.slopes import Slopes
-from sysdyn.dsl.model.expression import Node, const, mul, param, sub, substitute, to_text, topological, var, variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    const,
+    is_const,
+    mul,
+    neg,
+    param,
+    sub,
+    substitute,
+    to_text,
+    topological,
+    var,
+    variables,
+)
 from sysdyn.dsl.model.network import Branch, Table
+from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
 Notes = tuple[tuple[str, str], ...]
 OWN = {"kinetic": ("bf", "p"), "potential": ("bq", "e"), "dissipator": ("bf", "e")}
 """The variable of a law that is explicit, and the side that it gives."""
+ENERGY = {"kinetic": "T*", "potential": "V", "dissipator": "D"}
+"""The state function of that variable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,18 +112,60 @@ class Choice:
             return Law("energy", energy, notes, tables)
         if kinetic:
             text = f"the {self._kept} of {branch.name} is kept as a state: its law has no closed integral"
-            return Law("state", stated, (*notes, ("N604", text)), tables)
-        if branch.kind == "potential" and not pseudo:
+            kept = self._stored(law, v) if law is branch.law else None
+            return Law("state", stated, (*notes, ("N604", text)), tables, kept)
+        if branch.kind == "potential" and not pseudo and not branch.stated:
             notes = (*notes, ("N604", f"the energy of {branch.name} is counted as the integral of its power"))
         return Law("work", law, notes, tables)
 
     def _energy(self, law: Node, v: Node) -> Node | None:
         """The integral of a law; of dissipators that of polynomials only: works say theirs as well."""
+        if self.branch.energy is not None and law is self.branch.law:
+            return self.branch.energy
         if self.branch.kind == "dissipator" and polynomial(law, v) is None:
             return None
         rests: Rests = []
         energy = antiderivative(law, v, rests)
-        return energy if energy is not None and self._rest_on(rests) else None
+        if energy is None or not self._rest_on(rests):
+            return None
+        return self._from_rest(energy, v) if law is self.branch.law else self._from_origin(energy, v)
+
+    def _from_origin(self, energy: Node, v: Node) -> Node:
+        """The integral of an inverted law from where that of the law as written begins: its own variable is zero."""
+        assert self.branch.law is not None
+        origin = substitute(self.branch.law, {conjugate(self.branch): const(0.0)})
+        values = self.slopes.values(self.branch, origin)
+        if is_const(origin, 0.0) or values is None or not np.isfinite(values).all():
+            return energy
+        return sub(energy, substitute(energy, {v: origin}))
+
+    def functions(self, law: Law) -> dict[str, Node]:
+        """State functions of a store or dissipator, of both variables of its edge, as far as they are closed; each
+        adds up to the product of the two with its Legendre transform.
+        """
+        branch = self.branch
+        if branch.kind not in OWN or branch.law is None:
+            return {}
+        v, w = own(branch, OWN[branch.kind][0]), conjugate(branch)
+        name = ENERGY[branch.kind]
+        transform = STATE_FUNCTIONS[name].transform
+        whole = v if branch.shift is None else add(v, branch.shift)
+        if law.how == "energy" and law.stated is not None:
+            return {name: law.stated, transform: sub(mul(whole, w), law.stated)}
+        if law.kept is not None:
+            kept = {"kinetic": transform, "potential": name}[branch.kind]
+            return {kept: law.kept, STATE_FUNCTIONS[kept].transform: sub(mul(whole, w), law.kept)}
+        given, rests = (v if branch.side == OWN[branch.kind][1] else w), Rests()
+        area = branch.energy or antiderivative(branch.law, given, rests, valued=True)
+        if area is None or not self._rest_on(rests):
+            return {}
+        area = self._from_rest(area, v) if given is v else sub(mul(v, w), area)
+        return {name: area, transform: sub(mul(whole, w), area)}
+
+    def _from_rest(self, area: Node, v: Node) -> Node:
+        """An integral over the own variable from where that and its shift cancel."""
+        shift = self.branch.shift
+        return area if shift is None else sub(area, substitute(area, {v: neg(shift)}))
 
     def _rest_on(self, rests: Sequence[tuple[Node, int]]) -> bool:
         """Keep what a result rests on; False where that is not so."""
@@ -142,7 +201,8 @@ class Choice:
         branch, rests = self.branch, Rests()
         if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
             return None
-        area = antiderivative(law, given, rests)
+        written = branch.energy if law is branch.law else None
+        area = written or antiderivative(law, given, rests, valued=True)
         if area is None or not self._rest_on(rests):
             return None
         return area if given is own(branch, "bp") else sub(mul(given, law), area)

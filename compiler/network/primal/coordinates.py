@@ -39,7 +39,9 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     nodes = balances(incidence, classes.merged)
     said = laws(network, incidence.elements, sizes, reflected=reflected)
     potentials = Potentials(nodes.efforts)
-    reader = Reader(sizes, Book(_pieces(incidence.elements, classes), said.efforts, said.momenta, potentials.read))
+    pieces = _pieces(incidence.elements, classes)
+    book = Book(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
+    reader = Reader(sizes, book)
     initials = tuple(at_stores(network, incidence, reader))
     contents = Contents(reader, classes.members, initials, network.branches)
     found = replace(
@@ -48,7 +50,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
         coordinates=(*network.coordinates, *_node_coordinates(network), *classes.coordinates),
         unknowns=(*network.unknowns, *said.unknowns.values()),
         states=(*network.states, *said.states.values(), *contents.states),
-        initials=(*contents.resolved(), *unsaid(network, initials, sizes, reader, reflected=reflected)),
+        initials=(*contents.resolved(), *said.initials, *unsaid(network, initials, sizes, reader, reflected=reflected)),
         nodes=(),
         branches=(),
         couplings=(),

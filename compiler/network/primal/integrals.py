@@ -119,27 +119,46 @@ _PRIMITIVES: Mapping[str, Callable[[Node], Node]] = {
 }
 
 
-def antiderivative(root: Node, v: Node, rests: Rests) -> Node | None:
-    """Integral by v from 0, None where it is not found; what it rests on is added to `rests`."""
+def _ln_cosh(x: Node) -> Node:
+    """Without overflow; its second derivative at 0 is lost."""
+    size = call("abs", x)
+    return add(size, call("ln", scale(0.5, add(const(1.0), call("exp", scale(-2.0, size))))))
+
+
+_VALUED: Mapping[str, Callable[[Node], Node]] = {
+    "tanh": _ln_cosh,
+    "ln": lambda x: sub(mul(x, call("ln", x)), x),
+}
+"""Primitives whose values are right, but which are not to be differentiated; of ln where it is defined at 0."""
+
+
+def antiderivative(root: Node, v: Node, rests: Rests, *, valued: bool = False) -> Node | None:
+    """Integral by v from 0, None where it is not found; what it rests on is added to `rests`.
+
+    valued: only its value is wanted, it is not going to be differentiated.
+    """
     found = polynomial(root, v)
     if found is not None:
         return _of_polynomial(found, v)
     if root.op == "sum":
-        parts = [antiderivative(a, v, rests) for a in root.args]
+        parts = [antiderivative(a, v, rests, valued=valued) for a in root.args]
         if None in parts:
             return None
         pieces = [(c, part) for c, part in zip(root.data[1], parts, strict=True) if part is not None]
         return linear(0.0, [*pieces, (root.data[0], v)])
     if root.op == "mul" and any(v not in unknowns(a) for a in root.args):
         factors = list(zip(root.data, root.args, strict=True))
-        inner = antiderivative(product(1.0, ((e, a) for e, a in factors if v in unknowns(a))), v, rests)
+        inner = antiderivative(product(1.0, ((e, a) for e, a in factors if v in unknowns(a))), v, rests, valued=valued)
         outer = product(1.0, ((e, a) for e, a in factors if v not in unknowns(a)))
         return None if inner is None else mul(outer, inner)
     if root.op == "mul":
         return _over_root(root, v, rests)
-    if root.op == "call" and root.data in _PRIMITIVES and (inside := line(root.args[0], v)) is not None:
-        primitive = _PRIMITIVES[root.data]
+    primitives = {**_PRIMITIVES, **_VALUED} if valued else _PRIMITIVES
+    if root.op == "call" and root.data in primitives and (inside := line(root.args[0], v)) is not None:
+        primitive = primitives[root.data]
         rests.append((inside.slope, 0))
+        if root.data == "ln":
+            rests.append((inside.constant, 1))
         return div(sub(primitive(root.args[0]), primitive(inside.constant)), inside.slope)
     return None
 

@@ -17,12 +17,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
-from sysdyn.compiler.network.primal.choices import OWN, Choice, Law, own
+from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Choice, Law, conjugate, own
+from sysdyn.compiler.network.primal.fields import field_quantities
 from sysdyn.compiler.network.primal.incidence import Element
+from sysdyn.compiler.network.primal.reading import FUNCTIONS
 from sysdyn.compiler.network.primal.slopes import Slopes
+from sysdyn.dsl.model.dimensions import ENERGY as ENERGY_DIMENSION
 from sysdyn.dsl.model.expression import (
     Node,
     add,
+    const,
     derivative,
     index,
     mul,
@@ -38,6 +42,7 @@ from sysdyn.dsl.model.network import (
     Coupling,
     Dynamic,
     Energy,
+    Initial,
     Network,
     Slope,
     State,
@@ -45,15 +50,18 @@ from sysdyn.dsl.model.network import (
     Unknown,
     Work,
 )
-from sysdyn.dsl.model.units import Unit
-from sysdyn.dsl.text.diagnostics import Diagnostic
+from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
+from sysdyn.dsl.model.units import Unit, si
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
-ENERGY = {"kinetic": "T*", "potential": "V", "dissipator": "D"}
+JOULE = si(ENERGY_DIMENSION)
 
 
 @dataclass(slots=True)
 class Laws:
-    """What all laws say, and the efforts and momenta of branches by element number (over the element's own loops)."""
+    """What all laws say, and by element number the efforts, momenta and (of those that are asked for them) state
+    functions of branches, over the element's own loops.
+    """
 
     energies: list[Energy] = field(default_factory=list)
     works: list[Work] = field(default_factory=list)
@@ -64,6 +72,8 @@ class Laws:
     efforts: dict[int, Node] = field(default_factory=dict)
     momenta: dict[int, Node] = field(default_factory=dict)
     notes: list[Diagnostic] = field(default_factory=list)
+    initials: list[Initial] = field(default_factory=list)
+    functions: dict[int, dict[str, Node]] = field(default_factory=dict)
     slopes: tuple[Slope, ...] = ()
     tables: dict[str, Table] = field(default_factory=dict)
 
@@ -74,7 +84,12 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     found = Laws()
     slopes = Slopes(network)
     letters = dict(zip("efqp", "fepq" if reflected else "efqp", strict=True))
-    chosen = [(e, Choice(e.branch, slopes, network.tables, e.name in wanted, letters).law()) for e in elements]
+    choices = [(e, Choice(e.branch, slopes, network.tables, e.name in wanted, letters)) for e in elements]
+    chosen = [(e, choice.law()) for e, choice in choices]
+    asked = read_functions(network)
+    for (e, choice), (_, law) in zip(choices, chosen, strict=True):
+        if e.name in asked:
+            found.functions[e.number] = choice.functions(law)
     found.slopes = tuple(slopes.decided)
     names: dict[tuple[int, str], Part] = {}
     for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
@@ -83,9 +98,44 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
             names[e.number, suffix] = part
     for element, law in chosen:
         _Statement(element, law, names, found).say()
+    integrate_powers([e for e, _ in chosen if e.name in asked], found, reflected=reflected)
+    efforts, momenta = field_quantities(network, elements)
+    found.efforts.update(efforts)
+    found.momenta.update(momenta)
     for coupling, label in _ratios(network, elements, sizes):
         _couple(coupling, label, elements, sizes, found)
     return found
+
+
+def read_functions(network: Network) -> set[str]:
+    """Families of branches a state function of which is read."""
+    roots = [o.expression for o in network.observations] + [d.expression for d in network.dynamics]
+    roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
+    roots += [n for w in network.works for n in (w.effort, w.on)] + [c.expression for c in network.constraints]
+    roots += [e.expression for e in network.energies] + [c.ratio for c in network.couplings]
+    roots += [root for b in network.branches for root in (b.law, b.on) if root is not None]
+    roots += [n for i in network.initials for n in (i.target, i.value)]
+    return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] in FUNCTIONS}
+
+
+def integrate_powers(elements: Sequence[Element], found: Laws, *, reflected: bool) -> None:
+    """Energies of stores whose laws have no closed integral: the integral of the power, zero at the start (language,
+    section 11, 32).  E102 for dissipators, whose content is no integral by time.
+    """
+    open_ = [e for e in elements if e.branch.kind in OWN and not found.functions[e.number]]
+    for e, part in zip(open_, parts([(f"{e.name}.stored", e.named) for e in open_]), strict=True):
+        b = e.branch
+        if b.kind == "dissipator":
+            text = f"the contents of '{e.name.partition('#')[0]}' are not known: its law has no closed integral"
+            raise ModelError([Diagnostic("E102", text, b.place, "its power is known")])
+        found.states.setdefault(part.name, State(part.name, shape_of(part.box), JOULE, b.place))
+        stored, v = var(part.name, "s", *b.at), own(b, OWN[b.kind][0])
+        found.dynamics.append(Dynamic(stored, mul(own(b, "be"), own(b, "bf")), b.loops, b.place))
+        found.initials.append(Initial(stored, const(0.0), True, b.loops, b.place))
+        own_variable = var(b.name, "bq" if b.kind == "potential" else "bp", *b.at)
+        name = {"kinetic": "T", "potential": "V"}[b.kind]
+        product = mul(own_variable, conjugate(b) if b.kind == "potential" else v)
+        found.functions[e.number] = {name: stored, STATE_FUNCTIONS[name].transform: sub(product, stored)}
 
 
 def _read_efforts(network: Network) -> set[str]:
@@ -138,7 +188,8 @@ class _Statement:
 
     def _work(self, effort: Node) -> None:
         b = self.branch
-        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, self.place, self.law.kept is not None))
+        kept = self.law.kept is not None or b.stated
+        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, self.place, kept))
 
     def _row(self, kind: str, equation: Node | None, unit: Unit) -> None:
         b = self.branch

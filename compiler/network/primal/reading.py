@@ -37,10 +37,13 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.network import Loop
+from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 Result = TypeVar("Result")
-KINDS = frozenset(("be", "bf", "bq", "bp", "ne", "nf", "nq", "np"))
+FUNCTIONS = frozenset(f"b{name}" for name in STATE_FUNCTIONS)
+"""State functions of branches."""
+KINDS = frozenset(("be", "bf", "bq", "bp", "ne", "nf", "nq", "np")) | FUNCTIONS
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,7 @@ class Piece:
 class Book:
     """All that is needed to read: pieces by family, efforts and momenta by element, contents by element.
 
-    A content is the name of a constant, and whether that is a parameter.
+    A content is the name of a constant, and whether that is a parameter.  functions: state functions by name.
     """
 
     pieces: dict[str, list[Piece]]
@@ -83,6 +86,7 @@ class Book:
     momenta: dict[int, Node]
     nodes: Callable[[Reader, Node, Ranges, tuple[Node, ...]], Node]
     contents: dict[int, tuple[str, bool]] = field(default_factory=dict)
+    functions: dict[int, dict[str, Node]] = field(default_factory=dict)
 
 
 def touches_network(root: Node) -> bool:
@@ -203,6 +207,9 @@ class Reader:
         piece = self.piece(name, node.args, ranges)
         if kind in ("bq", "bf"):
             return self._moving(node, piece, ranges, inside)
+        if kind in FUNCTIONS:
+            function = self.book.functions[piece.element.number][kind[1:]]
+            return self.resolve(self.at_piece(function, piece, node.args), ranges, inside)
         known = self.book.efforts if kind == "be" else self.book.momenta
         if piece.element.number in known:
             return self.resolve(self.at_piece(known[piece.element.number], piece, node.args), ranges, inside)

@@ -1,0 +1,172 @@
+"""Written energies and contents as the elements that they are.
+
+An energy over one node, over the difference of two, or over branches without a law stands for laws (Paynter's diagram):
+
+    V(q) e = dV/dq      T*(f) p = dT*/df      D(f) e = dD/df
+    T(p) f = dT/dp      V*(e) q = dV*/de      G(e) f = dG/de
+
+The primal family lowers V, T* and D over nodes and over several branches as they stand, so there only functions of the
+other three become elements, and those of one branch; the reflection needs all of them.  An energy over several branches
+gives each of them a law that reads the others, and is kept for the audit: each port keeps its own q or p (language,
+section 11, 16).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from sysdyn.compiler.model.terms import summands, vanishes
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Domain, Energy, Network, Terminal
+from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
+
+ALL = frozenset(STATE_FUNCTIONS)
+FOREIGN = frozenset(("T", "V*", "G"))
+"""Functions of variables that the primal family does not have as unknowns of nodes and branches."""
+_AT_NODES = {"V": "nq", "T*": "nf", "D": "nf", "T": "np", "V*": "ne", "G": "ne"}
+_QUANTITIES = ("be", "bf", "bq", "bp")
+
+
+def as_elements(network: Network, functions: frozenset[str]) -> Network:
+    """The network with the written state functions of those names as branches, as far as they are such."""
+    if not network.nodes and not network.branches:
+        return network
+    network = _on_branches(network, functions)
+    if functions == FOREIGN:  # momenta of points are unknowns of the primal family
+        functions = functions - {"T"}
+    nodes = {n.name: n.domain for n in network.nodes}
+    kept, made = [], []
+    for number, energy in enumerate(network.energies):
+        for pieces in (summands(energy.expression), [energy.expression]) if energy.function in functions else ():
+            names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]
+            found = [_element(energy, piece, name, nodes) for piece, name in zip(pieces, names, strict=True)]
+            branches = [b for b in found if b is not None]
+            if len(branches) == len(pieces):
+                made += branches
+                break
+        else:
+            kept.append(energy)
+    return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
+
+
+def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
+    """The branch whose law is the slope of an energy over u = x(a) - x(b), or None."""
+    function = STATE_FUNCTIONS[energy.function]
+    used = sorted((n for n in ex.variables(piece) if n.op == "var"), key=lambda n: n.number)
+    if not 1 <= len(used) <= 2 or any(n.data[1] != _AT_NODES[function.name] or n.data[2] for n in used):
+        return None
+    a, b = used[0], used[1] if len(used) == 2 else None
+    slope = ex.derivative(piece, a)
+    if b is not None and (function.name == "T" or not vanishes(slope, ex.derivative(piece, b))):
+        return None
+    at = tuple(ex.index(loop.index) for loop in energy.loops)
+    own = ex.var(name, f"b{function.own}", *at)
+    law = ex.substitute(slope, {a: own} if b is None else {a: own, b: ex.const(0.0)})
+    minus = Terminal(None, ()) if b is None else Terminal(b.data[0], b.args)
+    plus = Terminal(a.data[0], a.args)
+    domain = nodes[a.data[0]]
+    side = function.conjugate
+    return Branch(name, at, energy.loops, domain, function.edge, side, law, plus, minus, None, energy.place)
+
+
+# -- over branches without a law ---------------------------------------------------------------------------
+
+
+def _on_branches(network: Network, functions: frozenset[str]) -> Network:
+    """Branches without a law whose only statements are state functions of one name, with the laws that these give."""
+    fields = {b.name: b for b in network.branches if b.kind == "field"}
+    said = _statements(network, fields)
+    chosen = [
+        e
+        for e in network.energies
+        if _over_fields(e, fields, said) and (e.function in functions or len(ex.variables(e.expression)) == 1)
+    ]
+    chosen = _closed(chosen, fields, said)
+    if not chosen:
+        return network
+    laws: dict[str, Branch] = {}
+    for name in dict.fromkeys(n for e in chosen for n in _owners(e)):
+        laws[name] = _with_law(fields[name], [e for e in chosen if name in _owners(e)])
+    several = [e for e in chosen if any(laws[name].stated for name in _owners(e))]
+    return replace(
+        network,
+        branches=tuple(laws.get(b.name, b) for b in network.branches),
+        energies=(*(e for e in network.energies if e not in chosen), *(_kept(e) for e in several if _is_store(e))),
+    )
+
+
+def _is_store(energy: Energy) -> bool:
+    return STATE_FUNCTIONS[energy.function].edge != "dissipator"
+
+
+def _owners(energy: Energy) -> list[str]:
+    """The branches that an energy reads."""
+    return list(dict.fromkeys(n.data[0] for n in _read(energy.expression)))
+
+
+def _read(root: Node) -> list[Node]:
+    found = (n for n in ex.variables(root) if n.op == "var" and n.data[1] in _QUANTITIES)
+    return sorted(found, key=lambda n: n.number)
+
+
+def _statements(network: Network, fields: dict[str, Branch]) -> dict[str, set[str]]:
+    """What is said of each branch: names of state functions, and `other` for works and constraints."""
+    said: dict[str, set[str]] = {name: set() for name in fields}
+    roots: list[tuple[str, Node]] = [(e.function, e.expression) for e in network.energies]
+    roots += [("other", n) for w in network.works for n in (w.on,)]
+    roots += [("other", c.expression) for c in network.constraints if c.kind != "gamma"]
+    for what, root in roots:
+        for node in _read(root):
+            if node.data[0] in said:
+                said[node.data[0]].add(what)
+    return said
+
+
+def _over_fields(energy: Energy, fields: dict[str, Branch], said: dict[str, set[str]]) -> bool:
+    """Whether an energy is a function of own variables of branches without a law, each at its own indices."""
+    function = STATE_FUNCTIONS[energy.function]
+    unknowns = [n for n in ex.variables(energy.expression) if n.op == "var" and n.data[1] != "s"]
+    if not unknowns or any(n.data[1:] != (f"b{function.own}", 0) or n.data[0] not in fields for n in unknowns):
+        return False
+    branches = [fields[n.data[0]] for n in unknowns]
+    placed = all(b.at == n.args and b.loops == energy.loops for b, n in zip(branches, unknowns, strict=True))
+    return placed and all(said[b.name] == {function.name} for b in branches)
+
+
+def _closed(chosen: Iterable[Energy], fields: dict[str, Branch], said: dict[str, set[str]]) -> list[Energy]:
+    """Statements all of whose branches stand in such statements only."""
+    kept = list(chosen)
+    while True:
+        count = dict.fromkeys(fields, 0)
+        for e in kept:
+            for name in _owners(e):
+                count[name] += 1
+        whole = {name for name in fields if len(said[name]) == 1 and count[name]}
+        rest = [e for e in kept if set(_owners(e)) <= whole]
+        if len(rest) == len(kept):
+            return kept
+        kept = rest
+
+
+def _with_law(branch: Branch, energies: list[Energy]) -> Branch:
+    """The branch with the slope of its energies as law."""
+    function = STATE_FUNCTIONS[energies[0].function]
+    own = ex.var(branch.name, f"b{function.own}", *branch.at)
+    law = ex.add(*(ex.derivative(e.expression, own) for e in energies))
+    stated = any(len(_owners(e)) > 1 for e in energies)
+    energy = None if stated else ex.add(*(e.expression for e in energies))
+    return replace(branch, kind=function.edge, side=function.conjugate, law=law, stated=stated, energy=energy)
+
+
+def _kept(energy: Energy) -> Energy:
+    """What stores of several branches hold: T or V, also where their transform is written."""
+    function = STATE_FUNCTIONS[energy.function]
+    held = energy.expression
+    if function.name in ("T*", "V*"):
+        products = [
+            ex.mul(n, ex.var(n.data[0], f"b{function.conjugate}", *n.args)) for n in _read(energy.expression)
+        ]
+        held = ex.sub(ex.add(*products), held)
+    return replace(energy, function=f"kept {function.edge}", expression=held)

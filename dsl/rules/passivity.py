@@ -1,0 +1,63 @@
+"""E313: the law of a dissipator with power e f below zero somewhere: an active element.
+
+Judged with the values bound, at both signs over the decades; a linear law is judged by its slope (E325), one that reads
+other unknowns not at all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Network
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.text.diagnostics import Report
+
+DECADES = tuple(s * m * 10.0**k for k in range(-9, 4) for m in (1.0, 3.0) for s in (1.0, -1.0))
+"""Where laws are looked at, in SI units: a polynomial beyond any sensible range is the author's."""
+ROUND_OFF = 1e-9
+"""Of the largest value so far: what a difference of exponentials loses next to zero."""
+
+
+def passivity(network: Network, known: Values, report: Report) -> None:
+    """Dissipators whose law is a function of their own variable alone; e f of a pseudo domain is no power."""
+    for branch in network.branches:
+        if branch.kind == "dissipator" and branch.law is not None and not branch.domain.pseudo:
+            _judge(branch, branch.law, known, report)
+
+
+def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
+    nodes = ex.topological([law])
+    own = [n for n in nodes if n.op == "var"]
+    if len(own) != 1 or own[0].data[0] != branch.name or any(n.op in ("time", "table") for n in nodes):
+        return
+    slope = ex.derivative(law, own[0])
+    if ex.is_const(ex.substitute(law, {own[0]: ex.const(0.0)}), 0.0) and not ex.variables(slope):
+        return
+    bound: dict[Node, float] = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
+    held = {n: known.number(n, bound) for n in nodes if n.op == "param"} | bound
+    found = _active(law, own[0], held)
+    if found is not None:
+        x, value = found
+        domain, letter = branch.domain, own[0].data[1][1]
+        unit = domain.flow if letter == "f" else domain.effort
+        name = branch.name.partition("#")[0]
+        message = f"dissipator '{name}': e*f = {x * value:.3g} W < 0 at {letter} = {x:g} {unit.text}"
+        report.error("E313", f"{message} (active element)", branch.place, help="an effort or flow source with that law")
+
+
+def _active(law: Node, own: Node, held: Mapping[Node, float]) -> tuple[float, float] | None:
+    """The smallest own variable at which the law delivers power, and the law there."""
+    if any(math.isnan(v) for v in held.values()):
+        return None
+    largest: Sequence[float] = (0.0, 0.0)
+    for x in DECADES:
+        value = ex.evaluate([law], lambda n, x=x: x if n is own else held.get(n, math.nan))[0]  # type: ignore[misc]
+        if not math.isfinite(value):
+            continue
+        if x * value < 0.0 and abs(value) > ROUND_OFF * largest[0]:
+            return x, value
+        largest = (max(largest[0], abs(value)), x)
+    return None
