@@ -38,5 +38,4 @@ def ran(folder, text, **options):
     outcome = found.outcome
     if outcome.failure is not None:
         return Ran(str(outcome.failure), False, outcome)
-    met = not any("was not reached" in warning for warning in outcome.warnings)
-    return Ran("", met, outcome, Trace.open(outcome.trace))
+    return Ran("", outcome.met, outcome, Trace.open(outcome.trace))
