@@ -24,6 +24,7 @@ from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
+from sysdyn.compiler.forms.steepness import scaled
 from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
@@ -125,7 +126,7 @@ def compile_network(
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
     with _timed("descriptor", timings):
-        form = replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation)
+        form = scaled(replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation))
         descriptor.verify_descriptor(form)
     with _timed("program", timings):
         program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))

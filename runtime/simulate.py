@@ -80,10 +80,10 @@ def _controlled(runs: Runs, options: Options) -> Achieved | None:
     if runs.method == "euler":
         if options.euler_step is None:
             raise WrongOption("method euler needs a step")
-        runs.run(options.rtol or 1e-6, options.atol, None)
+        runs.run(options.rtol or 1e-6, options.atol)
         return None
     if own_tolerances(options):
-        runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol, None)
+        runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol)
         return None
     return _chosen(runs, options) if options.method == "auto" else _achieved(runs, options)
 
@@ -96,9 +96,9 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
     return (Estimate(name, achieved.error_estimate, asked, time),)
 
 
-def _achieved(runs: Runs, options: Options) -> Achieved:
+def _achieved(runs: Runs, options: Options, *, doubted: bool = False) -> Achieved:
     finest = FINEST_RADAU if runs.method == "radau" else FINEST
-    return control(runs.sampled, _targets(runs, options), finest)
+    return control(runs.sampled, _targets(runs, options), finest, doubted=doubted)
 
 
 def _chosen(runs: Runs, options: Options) -> Achieved:
@@ -116,7 +116,7 @@ def _chosen(runs: Runs, options: Options) -> Achieved:
         if limited or failure.cause in ("max_wall", "memory"):
             raise
         runs.method, runs.patience = "bdf" if runs.method == "radau" else "radau", None
-        return _achieved(runs, options)
+        return _achieved(runs, options, doubted=failure.cause != "max_steps")
 
 
 def simulate(

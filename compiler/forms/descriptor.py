@@ -25,6 +25,11 @@ BLOCKS = (
     "phi_rate", "phi_acceleration", "psi", "psi_rate", "gamma", "gamma_rate", "lambda", "observe", "observe_rate",
     "observe_scale", "audit", "ledger", "initial",
 )  # fmt: skip
+# the blocks that Newton sees: those of steep rows have a block `<name>_scale` (steepness.py)
+SCALED = (
+    "dynamics", "phi_reaction", "psi_reaction", "momentum", "momentum_rate", "phi", "phi_rate", "phi_acceleration",
+    "psi", "psi_rate", "gamma", "lambda",
+)  # fmt: skip
 # the block whose row families a block shares
 HOME = {
     "dynamics_rate": "dynamics", "phi_reaction": "dynamics", "psi_reaction": "dynamics",
@@ -32,8 +37,12 @@ HOME = {
     "phi_acceleration": "phi", "psi_rate": "psi", "gamma_rate": "gamma", "observe_rate": "observe",
     "observe_scale": "observe",
 }  # fmt: skip
-# blocks that Newton never sees: rows without Jacobian entries
-WITHOUT_ENTRIES = frozenset(("observe", "observe_rate", "observe_scale", "audit", "ledger"))
+HOME |= {f"{name}_scale": HOME.get(name, name) for name in SCALED}
+# rows without Jacobian entries: Newton never sees them, or only to judge others
+WITHOUT_ENTRIES = frozenset((
+    "observe", "observe_rate", "observe_scale", "audit", "ledger",
+    *(f"{n}_scale" for n in SCALED),
+))
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +133,7 @@ def verify_descriptor(form: DescriptorForm) -> None:
     known = {(f.owner, f.kind) for f in form.families}
     assert len(known) == len(form.families), "two families of one owner and kind"
     for block in form.blocks:
-        assert block.name in BLOCKS, block.name
+        assert block.name in BLOCKS or block.name.removesuffix("_scale") in SCALED, block.name
         home = HOME.get(block.name, block.name)
         for kernel in block.kernels:
             bound = {f"#{k}" for k in range(len(kernel.nest))}

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#define FAINT 1e-9 /* of the magnitude of an unknown that happens to be zero */
+
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r)
 {
     memset(r, 0, (size_t)system->rows * sizeof *r);
@@ -47,6 +49,28 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
         jyd[system->held_slot[i]] = 0.0;
     }
     system->jacobian_evaluations++;
+}
+
+int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
+                       const double *g, const double *scale, double *s)
+{
+    memset(s, 0, (size_t)system->rows * sizeof *s);
+    for (int32_t c = 0; c < system->scales; c++)
+        system->scale[c].rows(&system->scale[c].frame, t, y, rate, s);
+    for (int32_t i = 0; i < system->held; i++)
+        s[system->held_row[i]] = 0.0;
+    for (int32_t i = 0; i < system->rows && g; i++)
+        s[i] = -s[i]; /* what is known already is not added to */
+    for (int32_t j = 0; j < system->unknowns && g; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            if (!(s[system->row[e]] < 0.0))
+                s[system->row[e]] += fabs(g[e]) * (fabs(y[j]) + FAINT * scale[j]);
+    for (int32_t i = 0; i < system->rows; i++)
+        s[i] = fabs(s[i]);
+    for (int32_t i = 0; i < system->rows; i++)
+        if (s[i] != 0.0 && !(fabs(r[i]) <= limit * s[i])) /* 0: not steep, or every term is zero */
+            return i;
+    return -1;
 }
 
 int32_t sd_first_bad(int32_t n, const double *x)

@@ -13,6 +13,7 @@
  *   held_row, held_unknown, held_slot [held]   rows that read "unknown = 0" in the place of their equation (the
  *                                      multiplier of a redundant constraint), with their entry
  *   cleared [clear]                    the other entries of these rows
+ *   scale [scales]                     calls of the scale blocks of steep rows (none: no row is steep)
  * All arrays belong to the caller.
  */
 #ifndef SYSDYN_ASSEMBLY_H
@@ -37,6 +38,8 @@ typedef struct sd_system {
     const double *k_scale;
     int32_t held, clear;
     const int32_t *held_row, *held_unknown, *held_slot, *cleared;
+    int32_t scales;
+    const sd_call *scale;
     double *v;
     const int32_t *stop; /* nonzero: a callback of the caller failed, give up */
     int64_t residual_evaluations, jacobian_evaluations;
@@ -46,6 +49,12 @@ typedef struct sd_system {
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r);
 /* jy := dF/dy, jyd := dF/dyd */
 void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd);
+/* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one
+ * holds.  rate [unknowns]: magnitudes of the derivatives, as the method makes them of values; s [rows]: work.
+ * g [entries], scale [unknowns]: with them the other rows are judged too, by the terms |g y| of the linear model, scale
+ * the magnitudes of y; NULL: they are not. */
+int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
+                       const double *g, const double *scale, double *s);
 /* position of the first number that is not finite, -1 where all are */
 int32_t sd_first_bad(int32_t n, const double *x);
 

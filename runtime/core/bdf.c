@@ -13,6 +13,8 @@
 #define STAGNANT 0.1        /* of the tolerance: corrections this small that do not shrink are round-off */
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
+#define LAX 3.0             /* a steep row may be off by as many tolerances of its terms */
+#define FINEST_ROW 1e-9     /* part of a steep row's terms that round-off of its unknowns leaves */
 
 static int step(void *bdf)
 {
@@ -35,7 +37,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     if (!bdf)
         return NULL;
     size_t n = (size_t)system->unknowns, nnz = (size_t)system->entries, m = n > 0 ? n : 1;
-    bdf->memory = calloc((SD_MAX_ORDER + 2 + 9) * m + 3 * (nnz + 1), sizeof(double));
+    bdf->memory = calloc((SD_MAX_ORDER + 2 + 11) * m + 3 * (nnz + 1), sizeof(double));
     if (!bdf->memory) {
         free(bdf);
         return NULL;
@@ -44,8 +46,8 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
     double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->delta,
-                          &bdf->predicted, &bdf->predicted_d, &bdf->scale};
-    for (int i = 0; i < 9; i++, next += m)
+                          &bdf->predicted, &bdf->predicted_d, &bdf->scale, &bdf->terms, &bdf->rate};
+    for (int i = 0; i < 11; i++, next += m)
         *vectors[i] = next;
     bdf->jy = next;
     bdf->jyd = bdf->jy + nnz + 1;
@@ -178,15 +180,27 @@ static double newton_norm(const sd_bdf *bdf, const double *x)
     return sqrt(sum / bdf->n);
 }
 
+/* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an
+ * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
+static int rows_hold(sd_bdf *bdf, double t)
+{
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->magnitude[i]);
+    double limit = fmin(1.0, fmax(FINEST_ROW, LAX * bdf->rtol));
+    const double *g = bdf->linear->rank < bdf->n ? bdf->g : NULL;
+    return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, g, bdf->scale, bdf->terms) < 0;
+}
+
 /* Newton's iteration from the prediction with the present factors */
 static int iterate(sd_bdf *bdf, double t)
 {
     int32_t n = bdf->n;
     double first = 0.0;
+    int converged = 0, judged = bdf->system->scales > 0;
     memcpy(bdf->y, bdf->predicted, (size_t)n * sizeof(double));
     memcpy(bdf->yd, bdf->predicted_d, (size_t)n * sizeof(double));
     memset(bdf->ee, 0, (size_t)n * sizeof(double));
-    for (int m = 0; m < ITERATIONS; m++) {
+    for (int m = 0; m < ITERATIONS + judged; m++) {
         double *d = bdf->delta;
         sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
         bdf->newton_iterations++;
@@ -197,6 +211,11 @@ static int iterate(sd_bdf *bdf, double t)
             bdf->bad_row = bad;
             return SD_NONFINITE;
         }
+        if (converged && rows_hold(bdf, t))
+            return SD_FINE;
+        if (m == ITERATIONS)
+            break;
+        converged = 0;
         sd_linear_solve(bdf->linear, d);
         double size = newton_norm(bdf, d);
         if (!isfinite(size))
@@ -208,19 +227,21 @@ static int iterate(sd_bdf *bdf, double t)
         }
         if (m == 0) {
             first = size;
-            if (size <= 100.0 * DBL_EPSILON)
-                return SD_FINE;
+            converged = size <= 100.0 * DBL_EPSILON;
         } else {
             double rate = pow(size / first, 1.0 / m);
-            if (rate > SLOW)
-                return size <= STAGNANT ? SD_FINE : SD_NEWTON;
-            bdf->contraction = rate / (1.0 - rate);
+            if (rate > SLOW && size > STAGNANT)
+                return SD_NEWTON;
+            converged = rate > SLOW;
+            if (!converged)
+                bdf->contraction = rate / (1.0 - rate);
             if (rate > SLUGGISH)
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
         /* a first correction is not believed beyond this, however fast earlier steps converged */
         double contraction = m == 0 ? fmax(bdf->contraction, TRUST) : bdf->contraction;
-        if (contraction * size <= NEWTON_TOLERANCE)
+        converged = converged || contraction * size <= NEWTON_TOLERANCE;
+        if (converged && !judged)
             return SD_FINE;
     }
     return SD_NEWTON;
@@ -283,7 +304,7 @@ static void fit_end(sd_bdf *bdf)
 static int too_small(const sd_bdf *bdf)
 {
     double left = bdf->t_end - bdf->t;
-    return bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), left) && bdf->h < left;
+    return bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), SD_SHORT * left) && bdf->h < left;
 }
 
 /* The new point moved onto every constraint; the correction moves with it, and so do the differences made of it. */

@@ -35,7 +35,8 @@ typedef struct sd_bdf {
     double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
         gamma[SD_MAX_ORDER + 2];
     double *phi[SD_MAX_ORDER + 2];
-    double *y, *yd, *ee, *weight, *newton_weight, *delta, *predicted, *predicted_d, *scale, *jy, *jyd, *g, *memory;
+    double *y, *yd, *ee, *weight, *newton_weight, *delta, *predicted, *predicted_d, *scale;
+    double *terms, *rate, *jy, *jyd, *g, *memory;
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations;

@@ -9,3 +9,14 @@ void sd_linear_z_bad(const sd_linear_z *linear, int32_t *row, int32_t *column)
     *row = linear->bad_row;
     *column = linear->bad_column;
 }
+
+void sd_linear_z_allow(sd_linear_z *linear, double null_pivot, const int32_t *idle)
+{
+    linear->null_pivot = null_pivot;
+    linear->idle = idle;
+}
+
+int32_t sd_linear_z_rank(const sd_linear_z *linear)
+{
+    return linear->rank;
+}

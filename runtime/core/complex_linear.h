@@ -12,6 +12,9 @@ void sd_linear_z_free(sd_linear_z *linear);
 /* as sd_linear_factor */
 int sd_linear_z_factor(sd_linear_z *linear, const double complex *values, const double *scale);
 void sd_linear_z_solve(sd_linear_z *linear, double complex *x);
+/* null_pivot and idle of linear.h; the rank of the last factors */
+void sd_linear_z_allow(sd_linear_z *linear, double null_pivot, const int32_t *idle);
+int32_t sd_linear_z_rank(const sd_linear_z *linear);
 /* where the last factorisation found its smallest pivot */
 void sd_linear_z_bad(const sd_linear_z *linear, int32_t *row, int32_t *column);
 

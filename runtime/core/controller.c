@@ -116,7 +116,7 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
 double sd_bdf_first_step(const sd_bdf *bdf, const double *yd, double span)
 {
     double change = sqrt(bdf->rtol > 0.0 ? bdf->rtol : 1e-6) * sd_bdf_norm(bdf, yd, NULL, NULL);
-    double h = 1e-3 * span, least = 1e3 * DBL_EPSILON * fmax(fabs(bdf->t), span);
+    double h = 1e-3 * span, least = 1e3 * DBL_EPSILON * fmax(fabs(bdf->t), SD_SHORT * span);
     if (isfinite(change) && change * h > 0.5)
         h = 0.5 / change;
     return fmax(h, fmin(least, span));

@@ -117,7 +117,7 @@ void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd
         h = 1e-2 * span;
         if (isfinite(change) && change > 0.0)
             h = fmin(h, pow(dopri->rtol, 0.125) / change);
-        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), span), span));
+        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
     }
     dopri->h = fmin(dopri->fixed_h > 0.0 ? dopri->fixed_h : h, dopri->h_max);
     dopri->h_used = 0.0;
@@ -263,7 +263,7 @@ int sd_dopri_step(sd_dopri *dopri)
     for (;;) {
         fit_end(dopri);
         double left = dopri->t_end - dopri->t;
-        if (dopri->h < 4.0 * DBL_EPSILON * fmax(fabs(dopri->t), left) && dopri->h < left) {
+        if (dopri->h < 4.0 * DBL_EPSILON * fmax(fabs(dopri->t), SD_SHORT * left) && dopri->h < left) {
             dopri->cause = cause ? cause : SD_STEP;
             return dopri->cause;
         }

@@ -32,7 +32,9 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
     linear->row = row;
     linear->row_scale = calloc(2 * m + 1, sizeof(double));
     linear->work = calloc(2 * m + nnz + 1, sizeof(sd_number));
-    linear->pivot = calloc(m + 1, sizeof(int32_t));
+    linear->pivot = calloc(2 * m + 1, sizeof(int32_t));
+    linear->place = linear->pivot ? linear->pivot + m : NULL;
+    linear->rank = n;
     if (order)
         linear->sparse = sd_sparse_new(n, column, row, order);
     else
@@ -66,7 +68,19 @@ static void equilibrate(sd_linear *linear, const sd_number *values, const double
         linear->scaled[e] *= linear->row_scale[linear->row[e]];
 }
 
-/* LU of the scaled matrix by columns with row exchanges */
+static void swap_columns(sd_number *a, int32_t n, int32_t j, int32_t k, int32_t *place)
+{
+    int32_t p = place[j];
+    place[j] = place[k];
+    place[k] = p;
+    for (int32_t i = 0; i < n && j != k; i++) {
+        sd_number swap = a[(size_t)j * n + i];
+        a[(size_t)j * n + i] = a[(size_t)k * n + i];
+        a[(size_t)k * n + i] = swap;
+    }
+}
+
+/* LU of the scaled matrix by columns with row exchanges; columns without a pivot, where they are allowed, come last */
 static int dense_factor(sd_linear *linear)
 {
     int32_t n = linear->n;
@@ -76,22 +90,28 @@ static int dense_factor(sd_linear *linear)
         for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
             a[(size_t)j * n + linear->row[e]] += linear->scaled[e];
     for (int32_t i = 0; i < n; i++)
-        linear->pivot[i] = i;
+        linear->pivot[i] = linear->place[i] = i;
     linear->smallest = 1.0;
-    for (int32_t k = 0; k < n; k++) {
+    linear->rank = n;
+    for (int32_t k = 0; k < linear->rank; k++) {
         sd_number *ck = a + (size_t)k * n;
         double size = 0.0;
         int32_t best = k;
         for (int32_t i = k; i < n; i++)
             if (sd_size(ck[i]) > sd_size(ck[best]))
                 best = i;
-        for (int32_t e = linear->column[k]; e < linear->column[k + 1]; e++)
+        int32_t c = linear->place[k];
+        for (int32_t e = linear->column[c]; e < linear->column[c + 1]; e++)
             size = fmax(size, sd_size(linear->scaled[e]));
         double relative = size > 0.0 ? sd_size(ck[best]) / size : 0.0;
+        if (relative < linear->null_pivot && linear->idle[c]) {
+            swap_columns(a, n, k--, --linear->rank, linear->place);
+            continue;
+        }
         if (!(relative >= linear->smallest)) {
             linear->smallest = relative;
             linear->bad_row = linear->pivot[best];
-            linear->bad_column = k;
+            linear->bad_column = c;
         }
         if (!(sd_size(ck[best]) > 0.0) || !isfinite(sd_size(ck[best])))
             return 1;
@@ -125,14 +145,16 @@ static void dense_solve(const sd_linear *linear, sd_number *x, sd_number *work)
     const sd_number *a = linear->dense;
     for (int32_t i = 0; i < n; i++)
         work[i] = x[linear->pivot[i]];
-    for (int32_t k = 0; k < n; k++) {
+    for (int32_t k = 0; k < linear->rank; k++) {
         const sd_number *ck = a + (size_t)k * n;
         for (int32_t i = k + 1; i < n; i++)
             work[i] -= ck[i] * work[k];
     }
-    for (int32_t k = n - 1; k >= 0; k--) {
+    for (int32_t k = linear->rank; k < n; k++)
+        x[linear->place[k]] = 0.0;
+    for (int32_t k = linear->rank - 1; k >= 0; k--) {
         const sd_number *ck = a + (size_t)k * n;
-        sd_number v = x[k] = work[k] / ck[k];
+        sd_number v = x[linear->place[k]] = work[k] / ck[k];
         for (int32_t i = 0; i < k; i++)
             work[i] -= ck[i] * v;
     }

@@ -29,6 +29,12 @@ typedef struct sd_linear {
     double smallest;             /* smallest pivot relative to its column: 0 singular */
     int32_t bad_row, bad_column; /* where it was found */
     int64_t factorisations, pivotings;
+    /* A column that nothing determines, where `idle` allows it: its solution is zero, the row that is left over holds or
+     * not.  (Laws whose slopes underflow: the node between two diodes that block.)  Of dense matrices alone. */
+    double null_pivot;           /* part of its column below which a pivot is none; 0: every pivot counts */
+    const int32_t *idle;         /* [n] 1: the column may be left; of the caller */
+    int32_t *place;              /* [n] column that is eliminated k-th */
+    int32_t rank;                /* of the last factors: n where no column was left */
 } sd_linear;
 
 /* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */

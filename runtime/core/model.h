@@ -27,6 +27,8 @@
  *   observe           one row family a traced quantity (and each side of an expect); reads y, yd and the audit
  *   observe_rate      their time derivatives, where known
  *   observe_scale     sum of the magnitudes of the terms of each
+ *   B_scale           for a block B of the above that Newton sees: the sum of the magnitudes of its terms, for the row
+ *                     families that hold a steep law alone (missing where none does)
  *   audit             kinetic energy T, potential energy V, power dissipated, power supplied; four rows a ledger (ledgers.h)
  *   ledger            what each element stores; the kind of a row: the number of its ledger, then `inertia` where the sign
  *                     of that is the sign of an inertia

@@ -8,6 +8,7 @@
 
 #define ITERATIONS 7       /* of Newton a step */
 #define PATIENT 30         /* the same where the step is fixed: nothing is gained by giving up early */
+#define DAMPED 15          /* with corrections shortened */
 #define SAFETY 0.9
 #define GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
 #define SHRINK 0.2
@@ -20,6 +21,11 @@
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
 #define KEEP_HIGH 1.2
 #define SINGULAR 6         /* halvings after a singular matrix */
+#define LAX 100.0          /* a steep row may be off by as many times Newton's tolerance times the method's */
+#define NULL_PIVOT 1e-10   /* part of its column below which a pivot determines no better than Newton's test asks */
+#define LEAST_PIVOT 1e-290 /* the same where every pivot but zero counts */
+#define LEAST_PART 1e-7    /* of a correction that is still tried */
+#define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
 
 static const double c[SD_STAGES] = {0.15505102572168219018, 0.64494897427831780982, 1.0};
 static const double inverse_a[SD_STAGES][SD_STAGES] = {
@@ -69,7 +75,9 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *comple
                           &radau->slope[2], &radau->point, &radau->point_d,
                           &radau->z[0], &radau->z[1], &radau->z[2], &radau->kept[0], &radau->kept[1], &radau->kept[2],
                           &radau->d[0], &radau->d[1], &radau->d[2], &radau->y, &radau->rate, &radau->ee,
-                          &radau->weight, &radau->newton_weight, &radau->scale};
+                          &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms,
+                          &radau->base[0], &radau->base[1], &radau->base[2],
+                          &radau->full[0], &radau->full[1], &radau->full[2]};
     size_t number = sizeof vectors / sizeof *vectors;
     radau->memory = calloc(number * m + 3 * nnz, sizeof(double));
     radau->w = calloc(m + nnz, sizeof(double complex));
@@ -141,6 +149,13 @@ static double tested_norm(const sd_radau *radau, const double *x)
     return radau->tested ? sqrt(sum / radau->tested) : 0.0;
 }
 
+/* the part of its column below which a pivot is none; columns of multipliers and states always have one */
+static void leave_below(sd_radau *radau, double null_pivot)
+{
+    radau->linear->null_pivot = null_pivot;
+    sd_linear_z_allow(radau->complex_linear, null_pivot, radau->linear->idle);
+}
+
 void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd, double h)
 {
     size_t size = (size_t)radau->n * sizeof *y;
@@ -161,12 +176,13 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
         h = 1e-2 * span;
         if (isfinite(change) && change > 0.0)
             h = fmin(h, 0.1 * pow(radau->tolerance, 0.25) / change);
-        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), span), span));
+        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
     }
     radau->h = fmin(radau->fixed_h > 0.0 ? radau->fixed_h : h, radau->h_max);
     radau->h_used = radau->h_before = 0.0;
     radau->error_accepted = 0.0;
     radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
+    leave_below(radau, radau->linear->idle ? LEAST_PIVOT : 0.0);
     radau->theta = 1.0;
 }
 
@@ -239,11 +255,30 @@ static int residuals(sd_radau *radau)
     return SD_FINE;
 }
 
-/* one Newton step from the residuals in d; the size of the correction in Newton's weights */
+/* The residuals in d, behind the last correction, are small in every steep row beside the row's own terms: on an
+ * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
+static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
+{
+    double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
+    int judged = all || radau->linear->rank < radau->n || sd_linear_z_rank(radau->complex_linear) < radau->n;
+    for (int s = 0; s < SD_STAGES; s++) {
+        for (int32_t i = 0; i < radau->n; i++) {
+            radau->y[i] = radau->phi[i] + radau->z[s][i];
+            radau->rate[i] = (fabs(radau->y[i]) + radau->magnitude[i]) / radau->h;
+        }
+        if (sd_first_unmet(radau->system, radau->t + c[s] * radau->h, radau->y, radau->rate, radau->d[s], limit,
+                           judged ? radau->g : NULL, radau->scale, radau->terms) >= 0)
+            return 0;
+    }
+    return 1;
+}
+
+/* One Newton step from the residuals in d; the size of the correction in Newton's weights, and that of what carries the
+ * state in state_size. */
 static double correct(sd_radau *radau)
 {
     int32_t n = radau->n;
-    double *d1 = radau->d[0], *d2 = radau->d[1], *d3 = radau->d[2], sum = 0.0;
+    double *d1 = radau->d[0], *d2 = radau->d[1], *d3 = radau->d[2], sum = 0.0, state = 0.0;
     double complex *w = radau->w;
     for (int32_t i = 0; i < n; i++) {
         double r1 = -d1[i], r2 = -d2[i], r3 = -d3[i];
@@ -259,9 +294,12 @@ static double correct(sd_radau *radau)
             double v = dz * radau->newton_weight[i];
             radau->z[s][i] += dz;
             sum += v * v;
+            if (radau->linear->idle && !radau->linear->idle[i])
+                state += v * v;
         }
     }
     radau->newton_iterations++;
+    radau->state_size = sqrt(state / (3.0 * n));
     return sqrt(sum / (3.0 * n));
 }
 
@@ -272,30 +310,41 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
     double before = 0.0, ratio_before = 0.0, trust = 1.0;
     int patient = full || radau->fixed_h > 0.0;
     *retry = 0.5;
-    for (int m = 1; m <= (patient ? PATIENT : ITERATIONS); m++) {
+    int most = patient ? PATIENT : ITERATIONS, converged = 0;
+    for (int m = 1; m <= most + (radau->system->scales > 0); m++) {
         int cause = residuals(radau);
         if (cause)
             return cause;
+        if (converged && rows_hold(radau, tolerance, 0))
+            return SD_FINE;
+        if (m > most)
+            break;
         double size = correct(radau);
         *used = m;
         if (!isfinite(size))
             return SD_NEWTON;
+        converged = 0;
         if (m > 1) {
             double ratio = size / before;
             radau->theta = m == 2 ? ratio : sqrt(ratio * ratio_before);
             ratio_before = ratio;
-            if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2))
-                return size <= STAGNANT * tolerance ? SD_FINE : SD_NEWTON;
+            if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2)) {
+                if (size > STAGNANT * tolerance)
+                    return SD_NEWTON;
+                converged = 1;
+            }
             trust = radau->theta < SLOW ? radau->theta / (1.0 - radau->theta) : 1.0 / DBL_EPSILON;
             double end = trust * size * pow(radau->theta, ITERATIONS - 1 - m) / tolerance;
-            if (!patient && end >= 1.0 && trust * size > tolerance) {
+            if (!converged && !patient && end >= 1.0 && trust * size > tolerance) {
                 double far = fmax(1e-4, fmin(20.0, end));
                 *retry = 0.8 * pow(far, -1.0 / (4 + ITERATIONS - 1 - m));
                 return SD_NEWTON;
             }
         }
         before = fmax(size, DBL_MIN);
-        if (trust * size <= tolerance && !(full && m == 1)) /* far up an exponential every correction is small */
+        /* far up an exponential every correction is small */
+        converged = converged || (trust * size <= tolerance && !(full && m == 1));
+        if (converged && radau->system->scales == 0)
             return SD_FINE;
         if (full) {
             radau->old_jacobian = 0;
@@ -304,6 +353,89 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
         }
     }
     return SD_NEWTON;
+}
+
+/* z := base + part (z_full - base), residuals there in d */
+static int trial(sd_radau *radau, double part)
+{
+    for (int s = 0; s < SD_STAGES; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->z[s][i] = radau->base[s][i] + part * radau->full[s][i];
+    return residuals(radau);
+}
+
+/* the part of the correction `full` of size `size` that is taken: the next one with the same factors is smaller
+ * (natural monotonicity, Deuflhard 2004); residuals in d.  0: there is none */
+static double damped_part(sd_radau *radau, double size)
+{
+    for (double part = 1.0; part >= LEAST_PART; part *= 0.5) {
+        int cause = trial(radau, part);
+        if (cause == SD_STOPPED)
+            return 0.0;
+        if (cause == SD_FINE) {
+            double next = correct(radau);
+            cause = trial(radau, part);
+            /* up an exponential every correction is as large as the last */
+            if (cause == SD_FINE && next <= size * (part < 1.0 ? 1.0 - 0.25 * part : 1.0)) {
+                radau->theta = next / size;
+                return part;
+            }
+        }
+    }
+    return 0.0;
+}
+
+/* The full correction at the present stages, with fresh slopes: base and full, its size; z has it. */
+static int full_correction(sd_radau *radau, double *size)
+{
+    radau->old_jacobian = 0;
+    int cause = factorise(radau, 1);
+    if (cause)
+        return cause;
+    for (int s = 0; s < SD_STAGES; s++)
+        memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
+    if ((cause = residuals(radau)))
+        return cause;
+    *size = correct(radau);
+    for (int s = 0; s < SD_STAGES; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->full[s][i] = radau->z[s][i] - radau->base[s][i];
+    return isfinite(*size) ? SD_FINE : SD_NEWTON;
+}
+
+/* Newton's iteration with fresh slopes each time and corrections shortened where they lead astray: for steep laws.  What
+ * follows from the state through slopes near round-off does not converge (on the tail of an exponential every correction
+ * is 1/a, on its underflow it is noise).  So the state is judged by its correction, the rest by the rows, each in the
+ * scale of its terms. */
+static int iterate_damped(sd_radau *radau, int *used)
+{
+    double tolerance = fmax(10.0 * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
+    double size;
+    int cause = residuals(radau);
+    if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
+        for (int s = 0; s < SD_STAGES; s++)
+            memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
+        cause = SD_FINE;
+    }
+    for (int m = 1; m <= DAMPED && cause == SD_FINE; m++) {
+        *used = m;
+        leave_below(radau, NULL_PIVOT);
+        cause = full_correction(radau, &size);
+        leave_below(radau, LEAST_PIVOT);
+        if (cause)
+            break;
+        if (radau->state_size <= tolerance && residuals(radau) == SD_FINE && rows_hold(radau, tolerance, 1))
+            return SD_FINE;
+        if (radau->linear->rank < radau->n) {
+            for (int s = 0; s < SD_STAGES; s++)
+                memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
+            if ((cause = full_correction(radau, &size)))
+                break;
+        }
+        if (damped_part(radau, fmax(size, DBL_MIN)) == 0.0)
+            return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
+    }
+    return cause ? cause : SD_NEWTON;
 }
 
 /* error of the step in the weights, filtered once more where it is large after a rejection or at the start */
@@ -418,7 +550,7 @@ int sd_radau_step(sd_radau *radau)
     for (;;) {
         fit_end(radau);
         double left = radau->t_end - radau->t;
-        if (radau->h < 4.0 * DBL_EPSILON * fmax(fabs(radau->t), left) && radau->h < left) {
+        if (radau->h < 4.0 * DBL_EPSILON * fmax(fabs(radau->t), SD_SHORT * left) && radau->h < left) {
             radau->cause = radau->cause ? radau->cause : SD_STEP;
             return radau->cause;
         }
@@ -432,6 +564,12 @@ int sd_radau_step(sd_radau *radau)
         if (cause == SD_FINE) {
             radau->theta = 0.0; /* one iteration: the Jacobian is good enough */
             cause = iterate(radau, failures > 1 || leap == 1, &iterations, &retry);
+        }
+        int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
+        if (stuck && leap != 1 && radau->system->scales > 0) {
+            sd_radau_extrapolate(radau, radau->h);
+            cause = iterate_damped(radau, &iterations);
+            fresh = 1;
         }
         if (cause == SD_FINE && !(radau->fixed_h > 0.0)) {
             cause = estimate_error(radau, &error);

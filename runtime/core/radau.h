@@ -35,7 +35,7 @@ typedef struct sd_radau {
     const int32_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative */
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
-    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta;
+    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
     int32_t ready, old_jacobian, rejected;
     int32_t creeping;                               /* steps in a row for which Newton failed at first */
     double *phi, *yd;         /* [n] the last accepted point */
@@ -44,8 +44,9 @@ typedef struct sd_radau {
     int32_t refined[SD_STAGES];                     /* they are settled */
     double *z[SD_STAGES], *kept[SD_STAGES];         /* of this step, of the last accepted one */
     double *d[SD_STAGES];                           /* right sides and corrections */
+    double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it */
     double *point, *point_d;  /* [written and more] */
-    double *y, *rate, *ee, *weight, *newton_weight, *scale, *jy, *jyd, *g, *memory;
+    double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
     double complex *w, *gz;
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;

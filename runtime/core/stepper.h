@@ -42,6 +42,8 @@ typedef struct sd_stepper {
     double *const *node_y, *const *node_yd;
 } sd_stepper;
 
+#define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */
+
 /* The largest |y| met so far, and the magnitude that grows with it. */
 static inline void sd_met(double size, double *met, double *magnitude)
 {

@@ -2,8 +2,9 @@
 
 The same problem is integrated with falling tolerances; two runs are compared at common instants.  With
 error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as measured
-over three runs, at most CREDIT.  The finest run is handed back
-with its estimate; the magnitudes of the unknowns met by a run serve the next.
+over three runs, at most CREDIT.  The finest run is handed back with its estimate.  Each run finds the magnitudes of its
+unknowns for itself: those that an earlier run met late would hide what is small early and grows.  Two runs that took
+the same steps say nothing: a third takes steps of half the length at other instants.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 
@@ -34,13 +36,13 @@ ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 @dataclass(frozen=True, slots=True)
 class Sampled:
     """What a run hands to the comparison.  values [instants, quantities]; largest [quantities] against
-    which errors are relative; magnitude [unknowns].
+    which errors are relative; steps: accepted.
     """
 
     tolerance: float
     values: Floats
     largest: Floats
-    magnitude: Floats
+    steps: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +58,13 @@ class Achieved:
     tolerance: float
 
 
-Run = Callable[[float, Floats | None], Sampled]
-"""Integrates with a tolerance and known magnitudes (None: unknown)."""
+Run = Callable[[float, float | None], Sampled]
+"""Integrates with a tolerance and a longest step as part of the span (None: the usual one)."""
 
 
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
-    """(largest relative difference, the same over the accuracy wanted) of two runs."""
-    size = np.maximum(coarse.largest, fine.largest)
+    """(largest relative difference, the same over the accuracy wanted) of two runs, in the finer one's sizes."""
+    size = fine.largest
     use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
     if not use.any() or not fine.values.size:
         return 0.0, 0.0
@@ -86,10 +88,22 @@ def _achieved(estimate: float, met: bool, runs: int, tolerance: float) -> Achiev
     return Achieved(estimate, estimate < ROUND_OFF, met, runs, tolerance)
 
 
-def control(run: Run, target: Floats, finest: float = FINEST) -> Achieved:
+def _shifted(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
+    """The verdict on two runs that took the same steps: what a run with other steps differs by."""
+    try:
+        # at most half the mean step: so the instants of the steps are others
+        now = run(last.tolerance, 0.5 * min(LONGEST, 1.0 / max(last.steps, 1)))
+    except SolverFailure:
+        return Achieved(None, False, False, number + 1, last.tolerance)
+    apart, over = difference(last, now, target)
+    return _achieved(apart, over <= 1.0, number + 1, last.tolerance)
+
+
+def control(run: Run, target: Floats, finest: float = FINEST, *, doubted: bool = False) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
 
-    finest: the smallest tolerance that makes sense for the method.
+    finest: the smallest tolerance that makes sense for the method; doubted: another method failed here, and the first
+    pair of runs is not believed on its own.
 
     Raises SolverFailure where the first runs fail.
     """
@@ -108,25 +122,27 @@ def control(run: Run, target: Floats, finest: float = FINEST) -> Achieved:
     estimate, relative = np.inf, np.inf
     for number in range(2, RUNS + 1):
         try:
-            now = run(tolerance, last.magnitude)
+            now = run(tolerance, None)
         except SolverFailure as failure:
             if failure.cause in ("max_steps", "max_wall") or number == 2:
                 raise
             return _achieved(relative, False, number, last.tolerance)
         step = float(np.log10(last.tolerance / now.tolerance))
         apart, over = difference(last, now, target)
+        if now.steps == last.steps and apart < ROUND_OFF:
+            return _shifted(run, now, target, number)
         if before is not None and before > 0.0 and 0.0 < over < before and last_step > 0.0:
             power = float(np.clip(np.log10(before / over) / last_step, 0.3, 1.0))
         shrink = _shrink(min(power, CREDIT), step)
         if before is not None and over > before:
             shrink = 1.0  # no convergence seen: no credit for the smaller tolerance
         estimate, relative = over * shrink, apart * shrink
-        if estimate <= 1.0:
+        if estimate <= 1.0 and not (doubted and number == 2):
             return _achieved(relative, True, number, now.tolerance)
         if now.tolerance <= 1.01 * finest:
             return _achieved(relative, False, number, now.tolerance)
         before, last, last_step = over, now, step
         # the tolerance at which the next run should do, with the estimate's own safety
-        drop = np.clip((1.0 / (1.5 * estimate)) ** (1.0 / max(power, CREDIT)), 1e-3, 0.2)
+        drop = np.clip((1.0 / max(1.5 * estimate, 1e-300)) ** (1.0 / max(power, CREDIT)), 1e-3, 0.2)
         tolerance = max(float(drop) * now.tolerance, finest)
     return _achieved(relative, False, RUNS, last.tolerance)

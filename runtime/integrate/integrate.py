@@ -36,6 +36,9 @@ CHUNK_SECONDS = 0.05
 CHUNK_STEPS = 1 << 20
 PROJECTED = ("1", "0")
 """Forms whose rows let the constraints drift: accepted points are moved onto them."""
+CRAWL = 200_000
+"""Steps after which a run must have got CREPT of the span further: else it would take for ever."""
+CREPT = 1e-7
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -78,9 +81,6 @@ class Integration:
 
     def _magnitudes(self) -> Floats:
         found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd)
-        if self.request.magnitude is not None:
-            known = self.request.magnitude
-            found[: known.size] = np.where(known > 0.0, known, found[: known.size])
         return np.ascontiguousarray(found)
 
     def _linear(self, jy: Floats, jyd: Floats) -> None:
@@ -112,6 +112,9 @@ class Integration:
         self._met = np.zeros(self.system.unknowns)
         self._smooth = self.roles.smooth.astype(np.int32)
         method = self.method.contents
+        self._idle = self.roles.idle.astype(np.int32)
+        if self.system.form.scales and self.underlying is None:
+            self.linear.contents.idle = lib.pointer(self._idle)
         method.rtol, method.t_end = request.rtol, self.segments[0].end
         method.h_max = request.fixed_step or request.h_max or LONGEST * (request.t_end - self.start.t)
         method.fixed_h = request.fixed_step or 0.0
@@ -262,6 +265,7 @@ class Integration:
     def _advance(self, sink: Sink, progress: Progress | None, began: float) -> None:
         """To the end of a segment."""
         request, method = self.request, self.method.contents
+        marked, at = method.steps, method.t
         while True:
             left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
             before = time.process_time()
@@ -281,6 +285,10 @@ class Integration:
                 raise self._failure("max_wall")
             if state == 1:
                 break
+            if method.steps - marked >= CRAWL:
+                if method.t - at < CREPT * (request.t_end - self.start.t):
+                    raise self._failure("step_too_small")
+                marked, at = method.steps, method.t
 
     def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
         """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""

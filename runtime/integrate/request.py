@@ -21,12 +21,11 @@ class Request:
 
     t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
     (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
-    absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; magnitude [unknowns as
-    written] known from an earlier run (else tracked); method: bdf, radau or dopri (form 0); fixed_step [s]: no error
-    test (bdf with max_order 1: the implicit Euler method); h_max [s]: longest step, None: LONGEST of the span; stops
-    [s] ascending: instants at which a step ends and the integration restarts (segments.py); least_norm: rows hold the
-    least multipliers of redundant constraints; stiff_steps: dopri gives up where stability holds it to more steps than
-    these.
+    absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; method: bdf, radau or dopri
+    (form 0); fixed_step [s]: no error test (bdf with max_order 1: the implicit Euler method); h_max [s]: longest step,
+    None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the integration restarts
+    (segments.py); least_norm: rows hold the least multipliers of redundant constraints; stiff_steps: dopri gives up
+    where stability holds it to more steps than these.
     """
 
     t_end: float
@@ -38,7 +37,6 @@ class Request:
     atol: float | None = None
     max_steps: int | None = None
     max_wall: float | None = None
-    magnitude: Floats | None = None
     index: int = 3
     method: str = "bdf"
     max_order: int = lib.MAX_ORDER

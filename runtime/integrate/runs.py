@@ -17,7 +17,7 @@ import numpy as np
 from sysdyn.runtime.integrate.accuracy import Sampled
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
-from sysdyn.runtime.integrate.request import COMPARED, STEP, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints, element
 from sysdyn.runtime.model.scales import ROUND_OFF
@@ -78,8 +78,8 @@ class Runs:
         self.done: tuple[Finished, list[Floats], TraceWriter] | None = None
         self.samplings: tuple[tuple[Floats, Sampled], ...] = ()
 
-    def request(self, rtol: float, atol: float | None, magnitude: Floats | None) -> Request:
-        """One integration's request."""
+    def request(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Request:
+        """One integration's request; longest: step, as part of the span."""
         options = self.options
         left = None if options.max_wall is None else options.max_wall - (time.monotonic() - self.began)
         return Request(
@@ -92,7 +92,7 @@ class Runs:
             atol=atol,
             max_steps=self.most_steps,
             max_wall=left,
-            magnitude=magnitude,
+            h_max=longest * (options.t_end - options.t_start),
             index=self.index,
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
@@ -139,7 +139,7 @@ class Runs:
             spent = time.monotonic() - self.run_began
             options.progress(fraction, spent * (1.0 - fraction) / fraction if fraction > 0.01 else None)
 
-    def run(self, rtol: float, atol: float | None, magnitude: Floats | None) -> Finished:
+    def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
         self.number += 1
         first = self.done is None
@@ -153,7 +153,7 @@ class Runs:
         self.rows, self.samples = [], []
         self.run_began = wall = time.monotonic()
         self.writer = TraceWriter(target, self.columns, len(self.names), attributes, self.options.parameters)
-        integration = Integration(self.system, self.start, self.request(rtol, atol, magnitude))
+        integration = Integration(self.system, self.start, self.request(rtol, atol, longest))
         try:
             finished = integration.run(self._write, self._progress)
         except BaseException:
@@ -234,13 +234,13 @@ class Runs:
             "wall_total_s": total,
         }
 
-    def sampled(self, tolerance: float, magnitude: Floats | None) -> Sampled:
-        """One run of the accuracy control."""
-        finished = self.run(tolerance, None, magnitude)
+    def sampled(self, tolerance: float, longest: float | None) -> Sampled:
+        """One run of the accuracy control; longest: step, as part of the span (None: LONGEST)."""
+        finished = self.run(tolerance, None, LONGEST if longest is None else longest)
         places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
         rows = np.concatenate(self.rows) if self.rows else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
         sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
-        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.magnitude)
+        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps)
         self.samplings = (*self.samplings[-1:], (rows[:, 0], found))
         return found
 
@@ -270,7 +270,7 @@ class Runs:
         if len(self.samplings) < 2 or self.samplings[0][1].values.shape != self.samplings[1][1].values.shape:
             return name, asked.get(name, 0.0), None
         (time, one), (_, two) = self.samplings
-        size = np.maximum(one.largest, two.largest)
+        size = two.largest
         with np.errstate(all="ignore"):
             ratio = np.abs(two.values - one.values) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))

@@ -3,7 +3,9 @@
 Error test: displacements, momenta, dynamic variables, flows with inertia.  Left out: multipliers, implicit efforts,
 flows of massless coordinates (they follow from the others; their accuracy is that of the state, and on index 2 their
 local error is one order larger than what it does to the solution).  Where nothing else is left, they are tested.
-Newton's test: multipliers and other index-2 unknowns with h, index-3 multipliers with h^2 (Petzold & Lötstedt 1986).
+Newton's test: multipliers with h, index-3 multipliers with h^2 (Petzold & Lötstedt 1986).  The theory bounds what an
+error of a multiplier does to the state; an implicit effort's own row may be as nonlinear as it likes: it counts as it
+is.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ class Roles:
     """test [unknowns]: -1 left out, 0 tested, 1 tested with h; power [unknowns]: of h in Newton's norm.
 
     state [unknowns]: carry the state; differential [unknowns]: their derivative occurs;
-    smooth [unknowns]: it is determined.
+    smooth [unknowns]: it is determined; idle [unknowns]: steep laws may leave them open where their slopes underflow.
     """
 
     test: Ints
@@ -30,6 +32,7 @@ class Roles:
     state: NDArray[np.bool_]
     differential: NDArray[np.bool_]
     smooth: NDArray[np.bool_]
+    idle: NDArray[np.bool_]
 
 
 def roles(system: System, jyd: Floats, index: int) -> Roles:
@@ -44,7 +47,7 @@ def roles(system: System, jyd: Floats, index: int) -> Roles:
     power = np.zeros(system.unknowns, dtype=np.int32)
     multiplier = np.isin(kinds, ("kappa", "mu", "nu"))
     if index >= 2:
-        power[multiplier | (kinds == "e") | ((kinds == "f") & ~differential)] = 1
+        power[multiplier] = 1
     if index >= 3:
         power[np.isin(kinds, ("kappa", "mu"))] = 2
         power[np.isin(kinds, ("f", "p")) & state] = 1
@@ -53,4 +56,5 @@ def roles(system: System, jyd: Floats, index: int) -> Roles:
         test[kinds == "f"] = 0
     if (test < 0).all():
         test[:] = 0
-    return Roles(test.astype(np.int32), power, state, differential, unique(system, jyd))
+    idle = multiplier | (kinds == "e") | ((kinds == "f") & ~differential)
+    return Roles(test.astype(np.int32), power, state, differential, unique(system, jyd), idle)

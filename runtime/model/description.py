@@ -34,6 +34,8 @@ BASE = {
     "observe_scale": "observe",
 }
 """The block whose row families another block shares."""
+SCALE = "_scale"
+"""Behind the name of a block: the sums of the magnitudes of its terms, for the row families of steep laws."""
 
 
 def count(shape: Shape) -> int:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from sysdyn.runtime.model.description import BASE, Description, Ints, RowFamily, element
+from sysdyn.runtime.model.description import BASE, SCALE, Description, Ints, RowFamily, element
 from sysdyn.runtime.model.failures import ContractError, RowLabel
 
 NOWHERE = -(2**30)
@@ -89,7 +89,7 @@ class Form:
 
     written: unknowns as written (nu stand behind them); at: places of the families, audit families behind
     the written ones (`extended` in all); kind: of each unknown; k_row, k_q, k_f: the rows q' - f;
-    groups: (name of the group, row family, first row), ascending.
+    groups: (name of the group, row family, first row), ascending; scales: calls of the scale blocks of steep rows.
     """
 
     name: str
@@ -104,6 +104,7 @@ class Form:
     k_q: Ints
     k_f: Ints
     groups: tuple[tuple[str, int, int], ...]
+    scales: tuple[Planned, ...]
 
     def row_label(self, description: Description, row: int) -> RowLabel:
         """The author's label of a row."""
@@ -183,6 +184,7 @@ def plan(description: Description, name: str) -> Form:
     tables: dict[str, Ints] = {}
     groups: list[tuple[str, int, int]] = []
     calls: list[Planned] = []
+    scales: list[Planned] = []
     stabilised = name == "2" and "phi" in description.blocks
     normal = "phi_normal" if "phi_normal" in description.blocks else "phi_reaction"
     for block, group in FORMS[name]:
@@ -205,6 +207,8 @@ def plan(description: Description, name: str) -> Form:
             calls.append(Planned(block, nu, _stabilised(description.rows, BASE.get(block, block), first)))
         else:
             calls.append(Planned(block, at, tables[group]))
+            if block + SCALE in description.blocks:
+                scales.append(Planned(block + SCALE, at, tables[group]))
     return Form(
         name=name,
         written=written,
@@ -218,4 +222,5 @@ def plan(description: Description, name: str) -> Form:
         k_q=np.zeros(0, np.int32) if bare else k_q,
         k_f=np.zeros(0, np.int32) if bare else k_f,
         groups=tuple(groups),
+        scales=tuple(scales),
     )

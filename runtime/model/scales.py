@@ -17,6 +17,8 @@ from sysdyn.runtime.model.system import System
 
 ROUND_OFF = 1e-12
 """Of the largest quantity of the same unit: smaller ones are what is left of a zero."""
+NOTHING = 1e-14
+"""Of the largest of the same kind and unit: less is what arithmetic leaves of a zero."""
 GROUP = 1e-3
 SPAN = 1e-2
 NOISE = 1e-6
@@ -25,6 +27,12 @@ QUIET = 1e-9
 """Efforts below this part of (largest energy) / q are round-off."""
 _SAMPLES = 16
 _SWEEPS = 8
+
+
+def _grouped(system: System, known: Floats) -> Floats:
+    """What is not zero counts as it is, be it ever so small: it may grow.  Zeros count as GROUP of their like."""
+    largest = group_maximum(system, known)
+    return np.where(known > NOTHING * largest, known, GROUP * largest)
 
 
 def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
@@ -46,7 +54,7 @@ def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: floa
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
     form, size, rate = system.form, group_maximum(system, np.abs(y)), np.abs(yd)
     # values that are nothing beside what their rate makes of them are round-off
-    real = state & (size > 1e-9 * rate * span) & (rate > 0.0)
+    real = state & (size > ROUND_OFF * rate * found) & (rate > 0.0)
     found = min(found, float((size[real] / rate[real]).min(initial=np.inf)))
     both = (size[form.k_q] > 0.0) & (rate[form.k_f] > 0.0)
     return min(found, float(np.sqrt(size[form.k_q][both] / rate[form.k_f][both]).min(initial=np.inf)))
@@ -181,14 +189,16 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     form = system.form
     flows = np.maximum(known, GROUP * group_maximum(system, known))[form.k_f]
     moves[form.k_q[np.abs(y[form.k_f]) < QUIET * flows]] = 0.0  # rates that are round-off
-    known = np.maximum(np.abs(y), moves)
-    known = np.maximum(known, GROUP * group_maximum(system, known))
+    known = _grouped(system, np.maximum(np.abs(y), moves))
     found = np.where(system.nominal > 0.0, system.nominal, known)
     found = _flows(system, found, span)
     size = np.abs(jy) + np.abs(jyd) / tau
     size = np.where(np.isfinite(size), size, 0.0)
     pattern = system.pattern
     rows, columns, kinds = pattern.row.astype(np.int64), pattern.columns_of(), alike(system)
+    # what round-off leaves of a zero is nothing beside what the sources will make of it
+    driven = propagate(np.zeros(found.size), rows, columns, size, excited, kinds, capped=True)
+    found = np.where(carries & (found < ROUND_OFF * driven), driven, found)
     # momenta and dynamic variables are balanced against flows, what follows from the state against all of it: so
     # round-off of a start does not pass for a magnitude
     kept = np.where(np.isin(system.kinds, ("q", "f")) & carries, found, 0.0)

@@ -102,6 +102,10 @@ class System:
                 call.block, call.at, call.to, form.rows, dy=slots[2 * k + 2], dyd=slots[2 * k + 3]
             )
         self.calls, self._slots = calls, slots
+        scales = (lib.Call * max(len(form.scales), 1))()
+        for k, scale in enumerate(form.scales):
+            scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
+        self._scales = scales
         self.kinematic_scale = np.ones(form.k_row.size)
         self._scratch = np.zeros(entries)
         cleared = np.flatnonzero(np.isin(self.pattern.row, held[0])).astype(np.int32)
@@ -128,6 +132,8 @@ class System:
             held_unknown=lib.pointer(held_unknown),
             held_slot=lib.pointer(slots[-1]),
             cleared=lib.pointer(cleared),
+            scales=len(form.scales),
+            scale=c.addressof(scales),
             v=lib.pointer(self._scratch),
             stop=lib.pointer(self.failure.flag),
         )
@@ -210,6 +216,17 @@ class System:
         full = np.zeros((self.rows, self.unknowns))
         full[self.pattern.row, self.pattern.columns_of()] = values
         return full
+
+    def steep_rows(self, t: float) -> Mask:
+        """Rows that hold a steep law [rows]: those for which a scale is compiled."""
+        found = np.zeros(max(self.rows, 1))
+        ones = self._buffer(np.ones(self.form.written))
+        for k in range(len(self.form.scales)):
+            call = self._scales[k]
+            function = lib.ROWS(call.rows)
+            function(c.addressof(call.frame), t, *(lib.pointer(item) for item in (ones, ones, found)))
+        self.failure.check()
+        return np.asarray(found[: self.rows] != 0.0)
 
     def _evaluate(self, block: str, t: float, y: Floats, yd: Floats) -> Floats:
         call = self.observer(block)

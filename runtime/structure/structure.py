@@ -22,6 +22,8 @@ from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, 
 
 DENSE = 300
 MAX_INDEX = 6
+ROUSED = 1e-2
+"""Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,19 @@ def _label(system: System, multiplier: int) -> RowLabel:
     return RowLabel(family.owner, block)
 
 
+def _roused(system: System, t: float, jy: Floats) -> Floats:
+    """dF/dy [entries] in sizes of the unknowns, with slopes of steep laws that are nearly zero here as large as they
+    are elsewhere: a diode at rest determines its voltage as well as one that conducts.
+    """
+    rows = system.pattern.row
+    largest = np.zeros(system.rows)
+    np.maximum.at(largest, rows, np.abs(jy))
+    # numbers that no symmetry makes dependent
+    least = ROUSED * (1.0 + np.arange(jy.size) / max(jy.size, 1)) * largest[rows]
+    asleep = system.steep_rows(t)[rows] & (np.abs(jy) < least) & (jy != 0.0)
+    return np.where(asleep, np.copysign(least, jy), jy)
+
+
 def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
     """Index of the form as written, and the undetermined unknowns where there is none."""
     y, yd = state.for_form(system)
@@ -136,7 +151,9 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
         size = balanced(system, y, jy)[system.pattern.columns_of()]
         jy, jyd = jy * size, jyd * size
         if null_place(system, jy, jyd)[0]:
-            return None, names
+            jy = _roused(system, state.t, jy)
+            if null_place(system, jy, jyd)[0]:
+                return None, names
     return pencil_index(system.dense(jyd), system.dense(jy)), ()
 
 

@@ -5,13 +5,14 @@ import pytest
 from sysdyn.runtime.integrate.accuracy import ROUND_OFF, Sampled, control
 
 
-def sampled(tolerance, values):
+def sampled(tolerance, values, steps=None):
     values = np.asarray(values, dtype=np.float64).reshape(-1, 1)
-    return Sampled(tolerance, values, np.abs(values).max(axis=0), np.ones(1))
+    steps = round(1.0 / tolerance) if steps is None else steps
+    return Sampled(tolerance, values, np.abs(values).max(axis=0), steps)
 
 
 def test_runs_that_never_agree_leave_no_estimate():
-    def run(tolerance, magnitude):
+    def run(tolerance, longest):
         return sampled(tolerance, [1.0, np.nan])
 
     achieved = control(run, np.array([1e-4]))
@@ -22,10 +23,42 @@ def test_runs_that_never_agree_leave_no_estimate():
 
 @pytest.mark.parametrize(("part", "below"), [(1e-3, False), (1e-16, True)])
 def test_an_estimate_below_round_off_says_so(part, below):
-    def run(tolerance, magnitude):
+    def run(tolerance, longest):
         return sampled(tolerance, [1.0, 0.5 + part * tolerance])
 
     achieved = control(run, np.array([1e-4]))
     assert achieved.met
     assert achieved.below_round_off is below
     assert (achieved.error_estimate < ROUND_OFF) is below
+
+
+@pytest.mark.parametrize("moved", [0.0, 3e-6, 3e-3])
+def test_two_runs_with_the_same_steps_are_no_estimate(moved):
+    def run(tolerance, longest):
+        return sampled(tolerance, [1.0, 0.5 + moved * (longest is not None)], steps=20 if longest is None else 40)
+
+    achieved = control(run, np.array([1e-4]))
+    assert achieved.met is (moved < 1e-4)
+    assert achieved.below_round_off is (moved == 0.0)
+    assert achieved.error_estimate == pytest.approx(moved, rel=1e-12)
+
+
+@pytest.mark.parametrize(("doubted", "runs"), [(False, 2), (True, 3)])
+def test_a_method_that_took_over_is_not_believed_on_its_first_pair(doubted, runs):
+    def run(tolerance, longest):
+        return sampled(tolerance, [1.0, 0.5 + 0.1 * tolerance])
+
+    achieved = control(run, np.array([1e-4]), doubted=doubted)
+    assert achieved.met
+    assert achieved.runs == runs
+
+
+def test_errors_are_taken_in_the_sizes_of_the_finer_run():
+    def run(tolerance, longest):
+        exploded = tolerance > 5e-5
+        found = sampled(tolerance, [1.0, 0.5 + tolerance])
+        return Sampled(tolerance, found.values, found.largest * (1e16 if exploded else 1.0), found.steps)
+
+    achieved = control(run, np.array([1e-6]))
+    assert achieved.met
+    assert achieved.error_estimate >= 0.5 * achieved.tolerance

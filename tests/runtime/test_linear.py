@@ -95,3 +95,19 @@ def test_singular_matrix_names_its_place(n):
     values[matrix.indptr[3] : matrix.indptr[4]] = 0.0
     assert solver.factor(values) == 1
     assert solver.linear.contents.bad_column == 3
+
+
+def test_a_column_without_a_pivot_stays_where_it_may():
+    # two nodes that nothing ties to the rest but their difference: the second may float
+    matrix = csc_array(np.array([[2.0, -2.0, 0.0], [-2.0, 2.0, 1e-300], [0.0, 1e-300, 3.0]]))
+    solver = Solver(matrix)
+    idle = np.array([0, 1, 0], dtype=np.int32)
+    linear = solver.linear.contents
+    linear.null_pivot, linear.idle = 1e-10, lib.pointer(idle)
+    assert solver.factor(matrix.data) == 0
+    assert linear.rank == 2
+    x = solver.solve([4.0, -4.0, 6.0])
+    assert x == pytest.approx([2.0, 0.0, 2.0], abs=1e-12)
+    idle[1] = 0
+    solver.factor(matrix.data)
+    assert linear.rank == 3

@@ -1,0 +1,41 @@
+"""One run of a text by the command's own function, and what a test asks of it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from sysdyn.cli.run.running import Request, run
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.trace.trace import Trace
+
+
+@dataclass(frozen=True)
+class Ran:
+    """refused: why there is no complete trace, "" where there is one; met: by the run's own estimate."""
+
+    refused: str
+    met: bool
+    outcome: object = None
+    trace: object = None
+
+    def at(self, name, times):
+        """Values at instants of the trace [s]; after a jump where one is there twice."""
+        stored = np.asarray(self.trace.time)
+        place = np.searchsorted(stored, times + 1e-9 * (stored[-1] - stored[0]), side="right") - 1
+        assert np.abs(stored[place] - times).max() <= 1e-8 * (stored[-1] - stored[0])
+        return np.asarray(self.trace[name])[place]
+
+
+def ran(folder, text, **options):
+    """A run of a text (or of a file that exists)."""
+    path = Path(text) if isinstance(text, Path) else folder / "model.sd"
+    if path.parent == folder:
+        path.write_text(text, encoding="utf-8")
+    report = Report()
+    found = run(Request(str(path), output=str(folder / "trace.h5"), **options), report)
+    if found is None:
+        return Ran(" ".join(d.code for d in report.diagnostics if d.severity == "error") or "no run", False)
+    outcome = found.outcome
+    if outcome.failure is not None:
+        return Ran(str(outcome.failure), False, outcome)
+    return Ran("", outcome.met, outcome, Trace.open(outcome.trace))

@@ -1,0 +1,86 @@
+"""Published stiff problems: the end values at accuracies from 1e-2 to 1e-9, or a refusal; never a wrong end in silence.
+
+End values: Test Set for IVP Solvers, Mazzia and Magherini.  Relative to the largest of each quantity over the span, as
+an accuracy is.  A slice runs always, SYSDYN_LONG=1 runs all accuracies.
+"""
+
+import importlib.util
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from running import ran
+
+LONG = os.environ.get("SYSDYN_LONG") == "1"
+ROOT = Path(__file__).resolve().parents[2]
+ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+SLOW = ("ring",)
+HARD = {("tube", 1e-5)}  # friction jumps where the flow turns turbulent, and with it what is compared
+OREGONATOR = {0: 0.1000814870318523e1, 1: 0.1228178521549917e4, 2: 0.1320554942846706e3}
+# mu = 10^6 from (2, 0) over 2 mu seconds: SciPy's Radau at 1e-9 and 3e-9, which agree to 2e-12 (finer ones run away)
+VDPOL = {0: 1.70554621753, 1: -0.89347636255e-6}
+VDPOL_ERROR = 3e-8  # of that: as far as two other runs agree with it
+FAMILIES = ("rober", "vdpol", "vdpol_million", "hires", "ring", "beam", "tube", "oregonator")
+
+
+@pytest.fixture(scope="session")
+def published():
+    """The published problems of the shared folder."""
+    shared = os.environ.get("SYSDYN_SHARED")
+    if not shared:
+        pytest.skip("SYSDYN_SHARED names the folder with benchmark/problems.py")
+    spec = importlib.util.spec_from_file_location("problems", Path(shared) / "benchmark" / "problems.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["problems"] = module  # its dataclasses look themselves up
+    spec.loader.exec_module(module)
+    return module
+
+
+def ended(folder, published, family, accuracy):
+    """(refusal or "", largest error over the accuracy asked)."""
+    if family == "oregonator":
+        path, wanted, more = Path(__file__).with_name("oregonator.sd"), OREGONATOR, {}
+    elif family == "vdpol_million":
+        path, wanted = ROOT / "models/benchmark/vdpol.sd", VDPOL
+        more = {"settings": (("mu", "1e6"),), "until": "2e6 s"}
+    else:
+        found = getattr(published, family)
+        path, wanted, more = ROOT / f"models/benchmark/{family}.sd", (found() if callable(found) else found).ref, {}
+    run = ran(folder, path, scene="reference", accuracy=accuracy, max_wall="60", **more)
+    if run.refused or not run.met:
+        return run.refused or "not met", 0.0
+    worst = 0.0
+    for number, value in wanted.items():
+        values = np.asarray(run.trace[f"y{number}"])
+        worst = max(worst, abs(values[-1] - value) / max(np.abs(values).max(), abs(value)))
+    known = VDPOL_ERROR if family == "vdpol_million" else 0.0
+    return "", max(worst - known, 0.0) / accuracy
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-5])
+@pytest.mark.parametrize("family", [name for name in FAMILIES if name not in SLOW])
+def test_published_end_values(tmp_path, published, family, accuracy):
+    refused, error = ended(tmp_path, published, family, accuracy)
+    assert not refused or (family, accuracy) in HARD
+    assert error <= 3.0
+
+
+@pytest.mark.skipif(not LONG, reason="SYSDYN_LONG=1 runs every accuracy")
+def test_every_accuracy_is_met_or_refused(tmp_path, published):
+    found = {(f, a): ended(tmp_path, published, f, a) for f in FAMILIES for a in ACCURACIES}
+    assert not [key for key, (refused, error) in found.items() if not refused and error > 3.0], found
+    assert not [key for key, (refused, _) in found.items() if refused and key[1] >= 1e-3], found
+    assert sum(not refused for refused, _ in found.values()) >= 0.8 * len(found), found
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+def test_robertson_keeps_its_invariant_with_tolerances_of_its_own(tmp_path, published, method):
+    run = ran(tmp_path, ROOT / "models/benchmark/rober.sd", scene="reference", method=method, rtol=1e-4, atol=1e-14)
+    assert not run.refused
+    parts = [np.asarray(run.trace[f"y{k}"]) for k in range(3)]
+    assert np.abs(sum(parts) - 1.0).max() <= 1e-6
+    assert min(part.min() for part in parts) >= -1e-10
+    wanted = published.rober() if callable(published.rober) else published.rober
+    assert parts[0][-1] == pytest.approx(wanted.ref[0], rel=0.01)
