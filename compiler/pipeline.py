@@ -31,8 +31,9 @@ from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.precedence import outermost
 from sysdyn.compiler.network.primal import Step, primal
-from sysdyn.compiler.network.reflection import reflect
+from sysdyn.compiler.network.reflection import reflect, relabelled
 from sysdyn.compiler.network.stated import FOREIGN, as_elements
+from sysdyn.compiler.network.verify import verify_network
 from sysdyn.compiler.program import build
 from sysdyn.compiler.program import program as program_
 from sysdyn.compiler.program.emit_c import emit_c
@@ -61,8 +62,12 @@ class Timing:
 
 @dataclass(frozen=True, slots=True)
 class CompiledModel:
-    """A model in one formulation: every stage's value, the generated text, and how long each stage took."""
+    """A model in one formulation: every stage's value, the generated text, and how long each stage took.
 
+    family: nodes and branches of the formulation's family; network: the same in coordinates.
+    """
+
+    family: Network
     network: Network
     energies: EnergyModel
     form: DescriptorForm
@@ -87,6 +92,10 @@ class CompiledModel:
     def manifest(self, binding: Binding, index: int | None = None) -> dict[str, Any]:
         """The object of manifest.json."""
         return manifest.manifest(self.network, self.form, self.program, binding, index)
+
+    def lettered(self, network: Network) -> Network:
+        """A network of this model in the letters of the author's text."""
+        return relabelled(network) if self.form.formulation.startswith("co_") else network
 
     def structure(self) -> dict[str, Any]:
         """The manifest's `structure` alone."""
@@ -113,8 +122,10 @@ def compile_network(
     reflected = formulation.startswith("co_")
     with _timed("primal", timings):
         network = along(outermost(network), complementary=reflected)
-        network = reflect(network) if reflected else as_elements(network, FOREIGN)
-        network, inverted, steps = primal(network, reflected=reflected)
+        family = reflect(network) if reflected else as_elements(network, FOREIGN)
+        verify_network(family)
+        network, inverted, steps = primal(family, reflected=reflected)
+        verify_network(network, coordinates=True)
     with _timed("energies", timings):
         model = anchored(energies.energies(network))
         energies.verify_energies(model)
@@ -134,7 +145,7 @@ def compile_network(
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *found)
-    return CompiledModel(network, model, form, program, backend, text, said, steps, tuple(timings))
+    return CompiledModel(family, network, model, form, program, backend, text, said, steps, tuple(timings))
 
 
 @contextmanager

@@ -20,12 +20,14 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
 from sysdyn.dsl.text.diagnostics import Report
 
+STAGES = ("network", "reflected", "coordinates", "energies", "descriptor", "program")
+
 
 @with_console("compile")
 @click.argument("file")
 @chosen
 @click.option("-o", "folder", metavar="DIR", help="Where residual.c (or .py) and manifest.json go. Default: here.")
-@click.option("--dump", type=click.Choice(["network", "energies", "descriptor", "program"]), help="Print a stage.")
+@click.option("--dump", type=click.Choice(STAGES), help="Print a stage.")
 @click.option("--explain", is_flag=True, help="List what was pruned, integrated and inverted, and why.")
 def command(
     console: Console,
@@ -61,7 +63,10 @@ def command(
         if prepared is None:
             return console.finish(1)
         if dump:
+            made = prepared.compiled
             stages = {
+                "reflected": lambda: network_text.show(made.lettered(made.family)),
+                "coordinates": lambda: network_text.show(made.lettered(made.network)),
                 "energies": lambda: energies.show(prepared.compiled.energies),
                 "descriptor": lambda: descriptor.show(prepared.compiled.form),
                 "program": lambda: program_text.show(prepared.compiled.program),

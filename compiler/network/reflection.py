@@ -50,6 +50,11 @@ def reflect(network: Network) -> Network:
     network = with_contents(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
+    return replace(relabelled(network), slopes=tuple(_moduli(network.couplings)), read=read)
+
+
+def relabelled(network: Network) -> Network:
+    """The same statements with the letters of the other family; twice is the network itself."""
     return replace(
         network,
         coordinates=tuple(_coordinate(c) for c in network.coordinates),
@@ -68,8 +73,6 @@ def reflect(network: Network) -> Network:
         nodes=tuple(replace(n, domain=_domain(n.domain)) for n in network.nodes),
         branches=tuple(_branch(b) for b in network.branches),
         couplings=tuple(_coupling(c) for c in network.couplings),
-        slopes=tuple(_moduli(network.couplings)),
-        read=read,
     )
 
 

@@ -1,10 +1,12 @@
-"""A network as text, for `--dump network`."""
+"""A network as text, for `--dump network`, `reflected` and `coordinates`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from sysdyn.dsl.model.network import Loop, Network, Shape
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Coupling, Loop, Network, Shape, Terminal
+from sysdyn.dsl.model.units import si_text
 
 
 def show(network: Network) -> str:
@@ -17,7 +19,15 @@ def _lines(n: Network) -> Iterator[str]:
     yield f"model {n.model}{scene}"
     for p in n.parameters:
         values = ", ".join(map(str, p.values)) or "no value"
-        yield f"  param {p.name}{_shape(p.shape)} = {values} [{p.unit.text}]"
+        yield f"  param {p.name}{_shape(p.shape)} = {values} [{si_text(p.unit.dimension)}]"
+    for t in n.tables:
+        yield f"  table {t.name}: {len(t.values)} values, {t.method}, {t.outside}"
+    for node in n.nodes:
+        yield f"  node {node.name}{_shape(node.shape)}: {node.domain.name}, common {node.domain.common}"
+    for b in n.branches:
+        yield f"  {_branch(b)}{_loops(b.loops)}"
+    for two in n.couplings:
+        yield f"  {_coupling(two)}{_loops(two.loops)}"
     for s in n.elements:
         yield f"  set {s.name}[{', '.join(map(str, s.at))}] = {s.value}"
     for c in n.coordinates:
@@ -39,6 +49,33 @@ def _lines(n: Network) -> Iterator[str]:
         yield f"  init {i.target} {'=' if i.fixed else '~'} {i.value}{_loops(i.loops)}"
     for o in n.observations:
         yield f"  trace {o.name} = {o.expression} [{o.unit.text}]"
+    for x in (*n.expectations, *n.statics):
+        yield f"  {x.text}"
+
+
+def _branch(b: Branch) -> str:
+    ends = f"on {b.on}" if b.on is not None else f"{_terminal(b, b.plus)} -> {_terminal(b, b.minus)}"
+    name = b.name + _at(b.at)
+    law = "" if b.law is None else f": {name}.{b.side} = {b.law}"
+    over = "" if b.shift is None else f" over {b.shift} + its own variable"
+    return f"{b.kind} {name} {ends}{law}{over}"
+
+
+def _terminal(b: Branch, end: Terminal | None) -> str:
+    if end is None or end.node is None:
+        return f"ground of {b.domain.name}"
+    return end.node + _at(end.at)
+
+
+def _coupling(c: Coupling) -> str:
+    first, second = c.first + _at(c.at), c.second + _at(c.at)
+    if c.kind == "transformer":
+        return f"transformer {first}.{c.side} = ({c.ratio})*{second}.{c.side}"
+    return f"gyrator {first}.e = ({c.ratio})*{second}.f"
+
+
+def _at(at: tuple[Node, ...]) -> str:
+    return f"[{', '.join(map(str, at))}]" if at else ""
 
 
 def _shape(shape: Shape) -> str:
