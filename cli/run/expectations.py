@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.starting import holds
+from sysdyn.cli.run.starting import holds, where_holds
 from sysdyn.dsl.model.network import Expectation, Golden
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.integrate.options import Watch
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import Outcome
 
@@ -24,6 +28,35 @@ class Claim:
     time: float | None
 
 
+def watch(prepared: Prepared) -> Watch:
+    """What the claims need of a run, whatever its length: the first sample that breaks each, and those at instants."""
+    claims = list(enumerate(prepared.network.expectations))
+
+    def of_run(names: tuple[str, ...]) -> Callable[[Floats, Floats], NDArray[np.bool_]]:
+        column = {name: j for j, name in enumerate(names)}
+        open_ = {k for k, e in claims if e.moment == "always"}
+
+        def wanted(time: Floats, values: Floats) -> NDArray[np.bool_]:
+            kept = np.zeros(time.size, dtype=bool)
+            for k, e in claims:
+                if e.at is not None:
+                    kept |= _near(time, prepared.binding.evaluate(e.at))
+                elif k in open_:
+                    left, right, within = _columns(values, column, k, e)
+                    broken = np.flatnonzero(~where_holds(e.operator, left, right, within))
+                    kept[broken[:1]] = True
+                    open_.difference_update({k} if broken.size else ())
+            return kept
+
+        return wanted
+
+    return of_run
+
+
+def _near(time: Floats, at: float) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(time - at) <= 1e-12 * max(abs(at), 1.0))
+
+
 def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: bool) -> tuple[Claim, ...]:
     """All expectations of the scene; those that fail are reported as E909."""
     claims = [_claim(prepared, outcome, k, e, report, finished) for k, e in enumerate(prepared.network.expectations)]
@@ -33,14 +66,14 @@ def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: boo
 
 def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report: Report, finished: bool) -> Claim:
     text = e.text.removeprefix("expect ")
-    time, left, right, within = _sides(prepared, outcome, k, e)
+    time, left, right, within = _sides(outcome, k, e)
     if e.moment == "finally":
         if not finished:
             return Claim(text, None, None, None)
         time, left, right, within = time[-1:], left[-1:], right[-1:], within[-1:]
     elif e.at is not None:
         at = prepared.binding.evaluate(e.at)
-        here = np.flatnonzero(np.abs(time - at) <= 1e-12 * max(abs(at), 1.0))
+        here = np.flatnonzero(_near(time, at))
         if not here.size and not finished:
             return Claim(text, None, None, None)
         if not here.size:
@@ -87,17 +120,20 @@ def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report
 
 
 def _sides(
-    prepared: Prepared, outcome: Outcome, k: int, e: Expectation
+    outcome: Outcome, k: int, e: Expectation
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     samples = outcome.samples
     column = {name: j for j, name in enumerate(samples.names)}
+    return samples.time, *_columns(samples.values, column, k, e)
 
-    def side(name: str, missing: bool = False) -> np.ndarray:
-        if missing:
-            return np.zeros(samples.time.size)
-        return np.asarray(samples.values[:, column[f"expect {k} {name}"]])
 
-    return samples.time, side("left"), side("right"), side("within", e.within is None)
+def _columns(
+    values: Floats, column: dict[str, int], k: int, e: Expectation
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Left, right and tolerance of a claim at each sample."""
+    left, right = (values[:, column[f"expect {k} {name}"]] for name in ("left", "right"))
+    within = np.zeros(len(values)) if e.within is None else values[:, column[f"expect {k} within"]]
+    return left, right, within
 
 
 def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, float], report: Report) -> None:

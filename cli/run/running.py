@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.expectations import Claim, judge
+from sysdyn.cli.run.expectations import Claim, judge, watch
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started, start
@@ -200,6 +200,7 @@ def options_of(
         max_steps=steps,
         max_wall=wall,
         sample_steps=any(e.moment == "always" for e in prepared.network.expectations),
+        watch=watch(prepared) if prepared.network.expectations else None,
         timings=request.timings,
         cpu_compile=prepared.cpu_compile_s,
         wall_began=began,

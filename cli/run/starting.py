@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from sysdyn.cli.run.prepare import Prepared, place_at, prepare
@@ -220,12 +221,19 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
 
 def holds(operator: str, left: float, right: float, within: float) -> bool:
     """Whether left op right, a tolerance granted to the author's side."""
+    return bool(where_holds(operator, np.float64(left), np.float64(right), np.float64(within)))
+
+
+def where_holds(operator: str, left: Any, right: Any, within: Any) -> Any:
+    """The same of arrays, sample by sample."""
     match operator:
         case "==":
-            return abs(left - right) <= within
+            return np.abs(left - right) <= within
         case "!=":
-            return abs(left - right) > within
+            return np.abs(left - right) > within
         case "<" | "<=":
-            return left <= right + within if operator == "<=" or within else left < right
+            loose = (operator == "<=") | (within != 0.0)
+            return np.where(loose, left <= right + within, left < right)
         case _:
-            return left >= right - within if operator == ">=" or within else left > right
+            loose = (operator == ">=") | (within != 0.0)
+            return np.where(loose, left >= right - within, left > right)

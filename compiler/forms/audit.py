@@ -115,7 +115,7 @@ def _entries(model: EnergyModel) -> Iterator[Entry]:
         for term in model.function(f"kept {stored}"):
             works = [w for w in model.works if w.kept and w.place == term.place]
             owners = tuple(n.data[0] for w in works for n in _driven(w, m.coordinate))
-            yield Entry(stored, owners, term.loops, term.expression, term.place)
+            yield Entry(stored, (*owners, *_filling(model, term)), term.loops, term.expression, term.place)
     for term in model.function(m.content):
         yield _entry("dissipated", term, _along(term.expression, m.rate), (m.rate,))
     for work in (w for w in model.works if not w.kept):
@@ -130,6 +130,24 @@ def _entries(model: EnergyModel) -> Iterator[Entry]:
             kind = m.coordinate if row.kind == "phi" else m.rate
             owners = tuple(n.data[0] for t in row.terms for n in local_variables(t.expression, kind))
             yield Entry("supplied", owners, term.loops, mul(multiplier, still), row.place)
+
+
+def _filling(model: EnergyModel, term: Term) -> Iterator[str]:
+    """The coordinates through which a store beside the state functions is filled.
+
+    They stand in its energy, in the rates of the states that it is written in, or its works are done on them by an
+    implicit unknown that stands there.
+    """
+    m = model.mirror
+    roots = [term.expression]
+    states = {n.data[0] for n in local_variables(term.expression, "s")}
+    roots += [t.expression for row in model.of_kind("lambda") if row.name in states for t in row.terms]
+    implicit = {n.data[0] for root in roots for n in local_variables(root, "e")}
+    for work in model.works:
+        if work.kept and any(n.data[0] in implicit for n in local_variables(work.effort, "e")):
+            roots.append(work.on)
+    for root in roots:
+        yield from (n.data[0] for n in local_variables(root, (m.coordinate, m.rate, m.conjugate)))
 
 
 def _driven(work: Virtual, kind: str) -> list[Node]:

@@ -75,7 +75,11 @@ void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const doubl
         for (int32_t i = 0; i < ledgers->elements; i++) {
             if (!(fabs(ledgers->value[i]) <= ledgers->most[i]))
                 ledgers->most[i] = fabs(ledgers->value[i]);
-            if (ledgers->inertia[i] && ledgers->value[i] < -NEGATIVE * ledgers->most[i] && ledgers->lost < 0)
+            /* a modulus may be negative from the start: what was positive must not become so */
+            if (ledgers->inertia[i] == SD_INERTIA && ledgers->value[i] > NEGATIVE * ledgers->most[i])
+                ledgers->inertia[i] = SD_POSITIVE;
+            if (ledgers->inertia[i] == SD_POSITIVE && ledgers->value[i] < -NEGATIVE * ledgers->most[i] &&
+                ledgers->lost < 0)
                 ledgers->lost = i;
         }
     }

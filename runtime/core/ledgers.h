@@ -18,11 +18,17 @@ typedef struct sd_record {
     int32_t ledger;
 } sd_record;
 
+enum sd_inertia {
+    SD_NO_INERTIA = 0, /* its sign says nothing */
+    SD_INERTIA = 1,    /* its sign is that of an inertia */
+    SD_POSITIVE = 2,   /* and was positive */
+};
+
 typedef struct sd_ledgers {
     int32_t count, elements;
     const sd_call *contents;       /* block ledger; NULL: no element stores */
     const int32_t *of;             /* [elements] ledger of each */
-    const int32_t *inertia;        /* [elements] whether its sign is that of an inertia */
+    int32_t *inertia;              /* [elements] sd_inertia: what its sign says of an inertia */
     /* results */
     double *gross;                 /* [count] int of the magnitudes of both powers, and what impulses brought */
     double *most;                  /* [elements] largest magnitude stored */

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.integrate.request import COMPARED, STEP, TRACE
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
@@ -20,6 +21,8 @@ COMPARISONS = 200
 
 Progress = Callable[[float, float | None], None]
 """Fraction of the span done, seconds left (None: not known yet)."""
+Watch = Callable[[tuple[str, ...]], Callable[[Floats, Floats], NDArray[np.bool_]]]
+"""Names of block observe -> a watcher of one run: instants [k] (s), values [k, observed] -> the rows that it wants."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,7 @@ class Options:
     off; euler_step: of method "euler"; stops: ascending instants at which the text jumps or has kinks: a step ends and
     the integration restarts there; redundancy: what becomes of redundant constraints: drop (the last written of each
     dependent group is left out), minimum_norm (the least multipliers), error (the caller has seen to it);
-    sample_steps: hand the sides of expects back at accepted steps too.
+    sample_steps: the watcher sees accepted steps too; watch: what of a run the samples are to hold.
     """
 
     output: str | Path
@@ -53,6 +56,7 @@ class Options:
     max_steps: int | None = None
     max_wall: float | None = None
     sample_steps: bool = False
+    watch: Watch | None = None
     timings: bool = True
     cpu_compile: float = 0.0
     wall_began: float | None = None

@@ -40,10 +40,10 @@ METERS = {
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """All quantities of block observe at trace instants and (with sample_steps) accepted steps.
+    """Quantities of block observe at the rows that the watcher kept, and at the last one.
 
     names [observed]; time [k]; kind [k] (TRACE, STEP, a sum); values [k, observed]; energy [k] (J) and constraints [k]
-    are the meters.  Where no quantity asks for samples there is the last row alone.
+    are the meters.
     """
 
     names: tuple[str, ...]
@@ -121,15 +121,12 @@ class Runs:
         if compared.size:
             self.rows.append(compared)
         taken = rows[(kind & (TRACE | STEP)) > 0]
-        if self._keeps:
-            self.samples.append(taken)
-        elif taken.size:
-            self.samples = [taken[-1:]]
+        if taken.size:
+            kept = taken[self.watched(taken[:, 0], self._observed(taken))] if self.watched is not None else taken[:0]
+            self.samples = [*self.samples[:-1], *([kept] if kept.size else []), taken[-1:]]
 
-    @property
-    def _keeps(self) -> bool:
-        """Rows are kept for expects: some quantity of observe is not stored."""
-        return self.options.sample_steps or len(self.columns) < len(self.names)
+    def _observed(self, rows: Floats) -> Floats:
+        return rows[:, lib.ROW_HEAD : lib.ROW_HEAD + len(self.names)]
 
     def _progress(self, t: float) -> None:
         options = self.options
@@ -151,6 +148,7 @@ class Runs:
             "atol": float(atol or 0.0),
         }
         self.rows, self.samples = [], []
+        self.watched = self.options.watch(self.names) if self.options.watch is not None else None
         self.run_began = wall = time.monotonic()
         self.writer = TraceWriter(target, self.columns, len(self.names), attributes, self.options.parameters)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest))
@@ -284,8 +282,9 @@ class Runs:
         """Samples of the run that stands in the trace."""
         parts = self.samples if self.done is None else self.done[1]
         rows = np.concatenate(parts) if parts else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
-        values = rows[:, lib.ROW_HEAD : lib.ROW_HEAD + len(self.names)]
-        return Samples(self.names, rows[:, 0], rows[:, 1].astype(np.int32), values, rows[:, 6], rows[:, 7])
+        return Samples(
+            self.names, rows[:, 0], rows[:, 1].astype(np.int32), self._observed(rows), rows[:, 6], rows[:, 7]
+        )
 
 
 def _observed_names(description: Description) -> tuple[str, ...]:

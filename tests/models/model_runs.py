@@ -22,5 +22,6 @@ def trace_of(tmp_path, text, **options):
     """The trace of a run that must succeed."""
     ran, report = attempt(tmp_path, text, **options)
     assert ran is not None, [f"{d.code} {d.message}" for d in report]
-    assert ran.exit == 0, (ran.failure, [c for c in ran.claims if not c.ok])
+    said = [f"{d.code} {d.message}" for d in report]
+    assert ran.exit == 0, (ran.failure, said, [c for c in ran.claims if not c.ok])
     return Trace.open(tmp_path / "trace.h5")
