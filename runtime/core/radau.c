@@ -9,6 +9,7 @@
 #define ITERATIONS 7       /* of Newton a step */
 #define PATIENT 30         /* the same where the step is fixed: nothing is gained by giving up early */
 #define DAMPED 15          /* with corrections shortened */
+#define WALK 45            /* with whole ones: back down an exponential of all digits, one 1/a each, and a few more */
 #define SAFETY 0.9
 #define GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
 #define SHRINK 0.2
@@ -77,7 +78,9 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *comple
                           &radau->d[0], &radau->d[1], &radau->d[2], &radau->y, &radau->rate, &radau->ee,
                           &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms,
                           &radau->base[0], &radau->base[1], &radau->base[2],
-                          &radau->full[0], &radau->full[1], &radau->full[2]};
+                          &radau->full[0], &radau->full[1], &radau->full[2],
+                          &radau->stage[0], &radau->stage[1], &radau->stage[2],
+                          &radau->stage_d[0], &radau->stage_d[1], &radau->stage_d[2]};
     size_t number = sizeof vectors / sizeof *vectors;
     radau->memory = calloc(number * m + 3 * nnz, sizeof(double));
     radau->w = calloc(m + nnz, sizeof(double complex));
@@ -96,7 +99,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *comple
     radau->complex_linear = complex_linear;
     radau->n = system->unknowns;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
-                                  &radau->taken, step, dense, refine, start};
+                                  &radau->taken, step, dense, refine, start, 0, c, radau->stage, radau->stage_d};
     return radau;
 }
 
@@ -169,6 +172,8 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     memmove(radau->yd, yd, size);
     memcpy(radau->slope[0], radau->yd, size);
     radau->refined[0] = 1; /* a start is settled */
+    /* what is interpolated meets no steep law: its powers are those of the stages */
+    radau->stepper.nodes = radau->system->scales > 0 ? SD_STAGES : 0;
     radau->h = 1.0;
     set_weights(radau);
     double span = radau->t_end - t, change = tested_norm(radau, yd) * radau->tolerance;
@@ -417,7 +422,7 @@ static int iterate_damped(sd_radau *radau, int *used)
             memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
         cause = SD_FINE;
     }
-    for (int m = 1; m <= DAMPED && cause == SD_FINE; m++) {
+    for (int m = 1; m <= WALK && cause == SD_FINE; m++) {
         *used = m;
         leave_below(radau, NULL_PIVOT);
         cause = full_correction(radau, &size);
@@ -432,7 +437,8 @@ static int iterate_damped(sd_radau *radau, int *used)
             if ((cause = full_correction(radau, &size)))
                 break;
         }
-        if (damped_part(radau, fmax(size, DBL_MIN)) == 0.0)
+        double part = damped_part(radau, fmax(size, DBL_MIN));
+        if (part == 0.0 || (m >= DAMPED && part < 1.0))
             return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
     }
     return cause ? cause : SD_NEWTON;
@@ -502,11 +508,15 @@ static void accept(sd_radau *radau, double error, int iterations)
     radau->refined[0] = 0;
     radau->h_before = radau->h_used;
     radau->h_used = h;
-    for (int32_t i = 0; i < radau->n; i++) {
-        radau->phi[i] += z[2][i];
-        radau->yd[i] =
-            (inverse_a[2][0] * z[0][i] + inverse_a[2][1] * z[1][i] + inverse_a[2][2] * z[2][i]) / h;
+    for (int s = 0; s < SD_STAGES; s++) {
+        const double *a = inverse_a[s];
+        for (int32_t i = 0; i < radau->n; i++) {
+            radau->stage[s][i] = radau->phi[i] + z[s][i];
+            radau->stage_d[s][i] = (a[0] * z[0][i] + a[1] * z[1][i] + a[2] * z[2][i]) / h;
+        }
     }
+    memcpy(radau->phi, radau->stage[2], size);
+    memcpy(radau->yd, radau->stage_d[2], size);
     memcpy(radau->slope[0], radau->yd, size);
     for (int s = 0; s < SD_STAGES; s++) {
         double *swap = radau->kept[s];

@@ -70,6 +70,38 @@ static void sample(sd_run *run, double t)
     audit(run, t, run->aux, run->aux_d, run->sample);
 }
 
+/* int_0^to of the polynomial of degree `nodes` that is 1 at node k and 0 at the others and at the step's start (k -1: at
+ * the start), by Gauss's rule of degree 3 */
+static double share(const sd_stepper *stepper, int32_t k, double to)
+{
+    static const double gauss = 0.28867513459481288225; /* 1/(2 sqrt(3)) */
+    double sum = 0.0, own = k < 0 ? 0.0 : stepper->node[k];
+    for (int side = -1; side <= 1; side += 2) {
+        double s = to * (0.5 + side * gauss), value = 1.0;
+        for (int32_t j = -1; j < stepper->nodes; j++) {
+            double other = j < 0 ? 0.0 : stepper->node[j];
+            value *= j == k ? 1.0 : (s - other) / (own - other);
+        }
+        sum += value;
+    }
+    return 0.5 * to * sum;
+}
+
+/* the method's own quadrature: its powers at the start and at the nodes of the last step, up to the part `part` of it */
+static void integrate_nodes(sd_run *run, double part)
+{
+    const sd_stepper *stepper = run->stepper;
+    double from = run->t_from, h = *stepper->t - from;
+    if (part < 1.0) { /* the whole step takes nothing of its start */
+        memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
+        weigh(run, h * share(stepper, -1, part));
+    }
+    for (int32_t k = 0; k < stepper->nodes; k++) {
+        audit(run, from + stepper->node[k] * h, stepper->node_y[k], stepper->node_yd[k], run->sample);
+        weigh(run, h * share(stepper, k, part));
+    }
+}
+
 /* run->integral [audited]: of the powers from the start of the last step to `to`, within that step */
 static void integrate(sd_run *run, double to)
 {
@@ -79,13 +111,8 @@ static void integrate(sd_run *run, double to)
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
     if (!run->audit || half == 0.0)
         return;
-    if (stepper->nodes && to == *stepper->t) {
-        for (int32_t k = 0; k < stepper->nodes; k++) {
-            if (stepper->node_weight[k] == 0.0)
-                continue;
-            audit(run, from + stepper->node[k] * (to - from), stepper->node_y[k], stepper->node_yd[k], run->sample);
-            weigh(run, (to - from) * stepper->node_weight[k]);
-        }
+    if (stepper->nodes) {
+        integrate_nodes(run, to == *stepper->t ? 1.0 : (to - from) / (*stepper->t - from));
         return;
     }
     memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));

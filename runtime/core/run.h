@@ -2,10 +2,11 @@
  *
  * An output row is [t, kind, kinetic, potential, dissipated, supplied, energy, constraints,
  *                   observe [observed], observe_rate [observed]]   (SI units; kind, a sum: 1 row of the
- * trace, 2 accepted step, 4 instant at which runs are compared).  At the instants the dense output is moved onto the constraints and their hidden
- * derivatives (settle.h), so multipliers and accelerations are as exact as positions.
- * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt, the integrals by the method's own
- * quadrature, or the 4-point Gauss-Lobatto rule (exact to degree 5) on the dense output of each accepted step.
+ * trace, 2 accepted step, 4 instant at which runs are compared).  At the instants the dense output is moved onto the
+ * constraints and their hidden derivatives (settle.h), so multipliers and accelerations are as exact as positions.
+ * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt.  The integrals of each accepted step:
+ * where laws are steep by the method's stages, at which they hold, else by the 4-point Gauss-Lobatto rule (exact to
+ * degree 5) on the dense output.
  * Where an integration restarts after a jump, what T + V gained there was supplied by the impulses that forced it.
  */
 #ifndef SYSDYN_RUN_H

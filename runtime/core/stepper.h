@@ -35,10 +35,10 @@ typedef struct sd_stepper {
     void (*refine)(void *self, sd_settle *settle);
     /* from (t, y, yd) with step h (0: chosen) */
     void (*start)(void *self, double t, const double *y, const double *yd, double h);
-    /* a quadrature of the method's own order over the last step (nodes 0: values of `dense` serve): instants and
-     * weights as parts of the step, y, yd [n] there */
+    /* where the method's equations hold within the last step (nodes 0: values of `dense` serve): instants as parts of
+     * the step, at most three, and y, yd [n] there; a quadrature through them and the start is of the method's order */
     int32_t nodes;
-    const double *node, *node_weight;
+    const double *node;
     double *const *node_y, *const *node_yd;
 } sd_stepper;
 

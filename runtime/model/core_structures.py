@@ -109,7 +109,7 @@ class Stepper(c.Structure):
         ("n", _I),
         *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
         ("nodes", _I),
-        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd"]],
+        *[(name, _P) for name in ["node", "node_y", "node_yd"]],
     ]
 
 
@@ -203,7 +203,7 @@ class Radau(c.Structure):
         *[(name, _P) for name in ["phi", "yd", "last", "before"]],
         ("slope", _P * STAGES),
         ("refined", _I * STAGES),
-        *[(name, _P * STAGES) for name in ["z", "kept", "d", "base", "full"]],
+        *[(name, _P * STAGES) for name in ["z", "kept", "stage", "stage_d", "d", "base", "full"]],
         *[(name, _P) for name in ["point", "point_d", "y", "rate", "ee", "weight", "newton_weight", "scale"]],
         *[(name, _P) for name in ["terms", "jy", "jyd", "g", "memory"]],
         *[(name, _P) for name in ["w", "gz"]],
