@@ -24,7 +24,7 @@ from sysdyn.runtime.integrate.unknown_roles import Roles, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
-from sysdyn.runtime.model.scales import ROUND_OFF, confirmed, magnitudes
+from sysdyn.runtime.model.scales import ROUND_OFF, confirmed, magnitudes, unresolved
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.start.restart import Restart
@@ -39,6 +39,8 @@ PROJECTED = ("1", "0")
 CRAWL = 200_000
 """Steps after which a run must have got CREPT of the span further: else it would take for ever."""
 CREPT = 1e-7
+UNRESOLVED = 8.0
+"""Times what round-off leaves open of an unknown: the least that its error test asks for."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -59,6 +61,9 @@ class Integration:
         # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, jyd, request.index)
+        state = np.isin(system.kinds, ("q", "f"))
+        # a tolerance below what round-off leaves open is one that no step meets
+        self._least = np.where(state, UNRESOLVED * unresolved(system, self.y, jy), 0.0) / max(request.rtol, 1e-15)
         self.magnitude = self._magnitudes()
         if system.form.name == "2":
             jy, jyd = self._weighted(jy, jyd)
@@ -81,7 +86,7 @@ class Integration:
 
     def _magnitudes(self) -> Floats:
         found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd)
-        return np.ascontiguousarray(found)
+        return np.maximum(found, self._least)
 
     def _linear(self, jy: Floats, jyd: Floats) -> None:
         self.underlying: Underlying | None = None

@@ -19,6 +19,8 @@ ROUND_OFF = 1e-12
 """Of the largest quantity of the same unit: smaller ones are what is left of a zero."""
 NOTHING = 1e-14
 """Of the largest of the same kind and unit: less is what arithmetic leaves of a zero."""
+FRESH = 1e-9
+"""Of what a rate makes of a quantity in the time scale known so far: a start below this part of it is round-off."""
 GROUP = 1e-3
 SPAN = 1e-2
 NOISE = 1e-6
@@ -54,7 +56,7 @@ def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: floa
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
     form, size, rate = system.form, group_maximum(system, np.abs(y)), np.abs(yd)
     # values that are nothing beside what their rate makes of them are round-off
-    real = state & (size > ROUND_OFF * rate * found) & (rate > 0.0)
+    real = state & (size > FRESH * rate * found) & (rate > 0.0)
     found = min(found, float((size[real] / rate[real]).min(initial=np.inf)))
     both = (size[form.k_q] > 0.0) & (rate[form.k_f] > 0.0)
     return min(found, float(np.sqrt(size[form.k_q][both] / rate[form.k_f][both]).min(initial=np.inf)))
@@ -164,6 +166,25 @@ def balanced(system: System, y: Floats, jy: Floats) -> Floats:
     found = propagate(np.abs(y), rows, columns, size, np.zeros(system.rows), alike(system), largest=True)
     found = np.maximum(found, GROUP * group_maximum(system, found))
     return np.where(found > 0.0, found, 1.0)
+
+
+def unresolved(system: System, y: Floats, jy: Floats) -> Floats:
+    """What round-off leaves open of each unknown [unknowns]: of the terms of the constraints that it stands in.
+
+    A charge of 1e-17 C in a sum with one of 0.1 C is known to 1e-17 C, whatever tolerance is asked of it.
+    """
+    rows, columns = system.pattern.row, system.pattern.columns_of()
+    constraint = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        if group.startswith(("phi", "psi")):
+            constraint[first : first + system.description.rows[family].size] = True
+    take = constraint[rows] & np.isfinite(jy) & (jy != 0.0)
+    i, j, slope = rows[take], columns[take], np.abs(jy[take])
+    size = np.zeros(system.rows)
+    np.maximum.at(size, i, slope * np.abs(y[j]))
+    found = np.zeros(system.unknowns)
+    np.maximum.at(found, j, np.finfo(np.float64).eps * size[i] / slope)
+    return found
 
 
 def _with_momentum(system: System) -> NDArray[np.bool_]:
