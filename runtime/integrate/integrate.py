@@ -60,7 +60,7 @@ class Integration:
         self._restart: Restart | None = None
         # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
-        self.roles: Roles = roles(system, jyd, request.index)
+        self.roles: Roles = roles(system, start.t, jyd, request.index)
         state = np.isin(system.kinds, ("q", "f"))
         # a tolerance below what round-off leaves open is one that no step meets
         self._least = np.where(state, UNRESOLVED * unresolved(system, self.y, jy), 0.0) / max(request.rtol, 1e-15)

@@ -3,9 +3,9 @@
 Error test: displacements, momenta, dynamic variables, flows with inertia.  Left out: multipliers, implicit efforts,
 flows of massless coordinates (they follow from the others; their accuracy is that of the state, and on index 2 their
 local error is one order larger than what it does to the solution).  Where nothing else is left, they are tested.
-Newton's test: multipliers with h, index-3 multipliers with h^2 (Petzold & Lötstedt 1986).  The theory bounds what an
-error of a multiplier does to the state; an implicit effort's own row may be as nonlinear as it likes: it counts as it
-is.
+Newton's test: multipliers and other index-2 unknowns with h, index-3 multipliers with h^2 (Petzold & Lötstedt 1986):
+their round-off grows as h falls, and the theory bounds what their error does to the state.  It does so for rows that
+are nearly linear: an unknown of a steep law counts as it is.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ class Roles:
     idle: NDArray[np.bool_]
 
 
-def roles(system: System, jyd: Floats, index: int) -> Roles:
+def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     """Roles in one form at index `index` of that form (as written: the model's; 2: 2; 1: 1).
 
-    jyd: dF/dyd at the start, which shows the flows with inertia.
+    t, jyd: of the start, where dF/dyd shows the flows with inertia.
     """
     kinds = system.kinds
     differential = system.differential(jyd)
@@ -47,7 +47,9 @@ def roles(system: System, jyd: Floats, index: int) -> Roles:
     power = np.zeros(system.unknowns, dtype=np.int32)
     multiplier = np.isin(kinds, ("kappa", "mu", "nu"))
     if index >= 2:
-        power[multiplier] = 1
+        steep = np.zeros(system.unknowns, dtype=bool)
+        steep[system.pattern.columns_of()[system.steep_rows(t)[system.pattern.row]]] = True
+        power[multiplier | (((kinds == "e") | ((kinds == "f") & ~differential)) & ~steep)] = 1
     if index >= 3:
         power[np.isin(kinds, ("kappa", "mu"))] = 2
         power[np.isin(kinds, ("f", "p")) & state] = 1
