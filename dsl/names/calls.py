@@ -111,8 +111,10 @@ class Calls(Context):
         values: list[Typed] = []
         for arg in e.args:
             value = self.resolve(arg.value)
-            spread = isinstance(value, Vector) and count == -1
-            values += value.items if spread else [self.one_number(value, arg.value)]
+            if isinstance(value, Vector) and count == -1:
+                values += value.items
+            else:
+                values.append(self.one_number(value, arg.value))
         if (count == -1 and not values) or (count >= 0 and len(values) != count):
             wants = "at least one argument" if count == -1 else f"{count} argument{'s' * (count != 1)}"
             raise self.fail("E206", f"{name} takes {wants}, {len(values)} given", e.span)

@@ -12,7 +12,7 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Loop, Shape
+from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Loop, NodeFamily, Shape, State, Unknown
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.letters import letter, samples, unknowns_of
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
@@ -228,11 +228,12 @@ def _sizes(model: Elaborator, known: Values, report: Report) -> None:
 def _elements(model: Elaborator, known: Values, report: Report) -> None:
     """E119: arrays and loops of more elements than there is memory for."""
     parts = model.parts
-    families = [(p, budget.NUMBER) for p in parts.parameters.values()]
-    families += [(f, budget.UNKNOWN) for g in (parts.coordinates, parts.unknowns, parts.states, parts.nodes) for f in g]  # type: ignore[attr-defined]
-    counted = [(f.name, _volume(f.shape, known), f.place, price) for f, price in families]
-    rows = (*parts.branches, *parts.constraints)
-    counted += [(r.name, _count(r.loops, known), r.place, budget.UNKNOWN) for r in rows]  # type: ignore[attr-defined]
+    unknowns: list[Coordinate | Unknown | State | NodeFamily] = [*parts.coordinates, *parts.unknowns]
+    unknowns += [*parts.states, *parts.nodes]
+    counted = [(p.name, _volume(p.shape, known), p.place, budget.NUMBER) for p in parts.parameters.values()]
+    counted += [(u.name, _volume(u.shape, known), u.place, budget.UNKNOWN) for u in unknowns]
+    rows: list[Branch | Constraint] = [*parts.branches, *parts.constraints]
+    counted += [(r.name, _count(r.loops, known), r.place, budget.UNKNOWN) for r in rows]
     left = float(budget.granted())
     for name, count, place, price in counted:
         left -= count * price
