@@ -17,7 +17,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
-from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, least_residual, solve, where_light
+from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, Work, least_residual, solve, where_light
 from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import STATE, WEIGHT, Mask, Starter, problem_of, row_scale
 
@@ -28,6 +28,8 @@ _FEW = 3
 EXACT = 1e-9
 OWN = 1e-6
 BACK = 1e-9
+EXPLAINED = 0.3
+"""Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,8 @@ def _trials(gentle: Problem, problem: Problem, x: Floats) -> Iterator[Solution]:
     yield solve(gentle, x, _FEW)
     yield solve(problem, x)
     for z in _shaken(x, problem.free, problem.scale):
+        if problem.work.done:
+            return
         yield solve(problem, z)
 
 
@@ -111,7 +115,9 @@ def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) 
     """
     at, best = x, Solution(x, np.inf, np.zeros(0))
     empty = None
-    for _ in range(_RESCALINGS):
+    for k in range(_RESCALINGS):
+        if k and starter.work.done:
+            break
         scale = starter.scale(t, at)
         found = solve(problem_of(starter, t, at, guess, rows=starter.every, free=free), best.x)
         if empty is not None and found.residual >= EXACT and not found.residual < best.residual:
@@ -213,7 +219,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
         return best, True
     best, holds = _rescaled(starter, t, x, guess, free)
     for shaken in _shaken(x, free, starter.scale(t, x)):
-        if holds:
+        if holds or starter.work.done:
             break
         found, holds = _rescaled(starter, t, shaken, guess, free)
         if holds or found.residual < best.residual:
@@ -253,6 +259,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
+    starter.work = Work(EXPLAINED)
     x, scaled = best.x, best.scaled
     if x.size <= DENSE:
         problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
@@ -310,6 +317,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     best, holds = _attempt(starter, t0, guess, free)
     if not holds:
         raise _explain(starter, t0, guess, free, best)
+    starter.work = Work(EXPLAINED)
     best = _steadied(starter, t0, best, guess, free)
     y, yd = starter.expand(best.x)
     counted = Starter(system) if starter.missed.size else starter
