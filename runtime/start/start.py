@@ -60,10 +60,17 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     written = starter.guessed & ~starter.unsaid
     if not written.any():
         return guess
-    rows = written | starter.groups("phi", "psi")
     free = free & (np.arange(free.size) < starter.n)
+    # an expression gives its own unknown where the others are guessed by numbers: of several roots that one is meant
+    own = free & ~starter.written
+    given = False
+    if own.any():
+        found = solve(problem_of(starter, t, guess, guess, rows=written, free=own), guess)
+        given = found.residual < EXACT
+        guess = found.x if given else guess
+    rows = written | starter.groups("phi", "psi")
     found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-    return found.x if np.isfinite(found.residual) else guess
+    return found.x if found.residual < EXACT or (np.isfinite(found.residual) and not given) else guess
 
 
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
@@ -247,10 +254,35 @@ def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[
     places = np.flatnonzero(
         given.written & ~given.fixed & (change > 1e-9 * np.maximum(np.abs(given.guess), 1e-3 * scale[: starter.n]))
     )
-    return tuple(
+    found = [
         (starter.system.name(int(k)), float(given.guess[k]), float(x[k]), _asked(starter, t, x, int(k)))
         for k in places[:100]
-    )
+    ]
+    return (*found, *_missed(starter, t, x, scale))
+
+
+def _missed(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[tuple[str, float, float, str]]:
+    """Guesses by expressions that the start does not meet: name of what the expression guesses, its value, the start's.
+
+    Where a row guesses several unknowns at once its label stands for them, and 0 for what it would miss.
+    """
+    rows = starter.guessed & ~starter.unsaid
+    if not rows.any():
+        return
+    misses = starter.settled.residual(t, *starter.expand(x))
+    size = row_scale(starter, t, x, scale)
+    values = starter.jacobian(t, x)
+    for row in np.flatnonzero(rows & (np.abs(misses) * size > 1e-9))[:100]:
+        mine = (starter.rows == row) & (starter.columns < starter.n) & (values != 0.0)
+        own = mine & ~starter.written[starter.columns]
+        if own.sum() == 1:
+            (entry,) = np.flatnonzero(own)
+            k = int(starter.columns[entry])
+            guess = float(x[k] - misses[row] / values[entry])
+            yield starter.system.name(k), guess, float(x[k]), _asked(starter, t, x, k)
+        else:
+            label = starter.settled.row_label(int(row))
+            yield f"guess of line {label.line}", 0.0, float(misses[row]), "what its two sides differ by"
 
 
 def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
