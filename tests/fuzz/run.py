@@ -75,7 +75,7 @@ def _judged(status: int, log: Path, memory: int, cpu: float) -> str | None:
     if memory > MEMORY:
         return f"{memory >> 20} MB"
     strange = next((line for line in said.splitlines() if line.strip() and not FINDING.match(line)), None)
-    if strange is not None and not any(sign in strange for sign in ("|", "^", "   ...")):
+    if strange is not None and not any(sign in strange for sign in ("|", "^", "  ...")):
         return f"on the streams: {strange[:200]}"
     control = next((c for c in said if ord(c) < 32 and c != "\n"), None)
     return None if control is None else f"a control character on the streams: {control!r}"
