@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import click
 from sysdyn.cli.failures import envelope, plain, shown
-from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report, shortened
 
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
 
@@ -51,7 +51,7 @@ class Console:
 
     def finish(self, code: int = 0) -> int:
         """Show the findings; the exit code (1 where there are errors)."""
-        found = self.report.diagnostics
+        found = shortened(self.report.diagnostics)
         if code == 0 and self.report.failed:
             code = 1
         if self.as_json:
@@ -71,7 +71,7 @@ class Console:
         shown = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
         for diagnostic in shown:
             print(render(diagnostic, color=self.color), file=sys.stderr)
-        errors = sum(d.severity == "error" for d in shown)
+        errors = sum(d.severity == "error" for d in self.report)
         if errors > 1:
             print(f"{errors} errors", file=sys.stderr)
 

@@ -40,6 +40,7 @@ from sysdyn.compiler.program.emit_c import emit_c
 from sysdyn.compiler.program.emit_numpy import emit_numpy
 from sysdyn.compiler.program.program import Program
 from sysdyn.compiler.program.program_text import verify_program
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
@@ -118,6 +119,14 @@ def compile_network(
 
     traced: where the text traces nothing, every coordinate and every dynamic variable is.
     """
+    with budget.drawn():
+        try:
+            return _compiled(network, formulation, backend, integrating=integrating, traced=traced)
+        except budget.SpentError as spent:
+            raise ModelError([spent.diagnostic(network.place)]) from spent
+
+
+def _compiled(network: Network, formulation: str, backend: str, *, integrating: bool, traced: bool) -> CompiledModel:
     timings: list[Timing] = []
     reflected = formulation.startswith("co_")
     with _timed("primal", timings):

@@ -13,6 +13,7 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.parts import Parts
 from sysdyn.dsl.elaborate.scenes import SceneReader
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network, Scene
@@ -87,11 +88,15 @@ def network(
 ) -> Network | None:
     """The network of a model under a scene; settings are (name, value), levels (path, name) of the command line.
 
-    None where the report has errors, or N608: a network that lacks a part of the text
-    is none.  required: parameters and inputs must have values.
+    None where the report has errors, or N608: a network that lacks a part of the text is none, and where a statement
+    could not be read only names and units are judged.  required: parameters and inputs must have values.
     """
-    with _deep():
-        return _network(document, model, scene, report, settings, levels, required=required)
+    with _deep(), budget.drawn():
+        try:
+            return _network(document, model, scene, report, settings, levels, required=required)
+        except budget.SpentError as spent:
+            report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
+            return None
 
 
 def _network(
@@ -126,6 +131,8 @@ def _network(
     read_scene: Scene | None = None
     if scene is not None:
         read_scene = reader.read(scene, Place(document.file.source, scene.name.span))
+    if _unread(elaborator, scene):
+        return None  # what is missing would be found missing again, in other words
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     known = Values(elaborator.parts.parameters, reader.elements)
@@ -135,6 +142,13 @@ def _network(
     found = _result(elaborator, reader, read_scene)
     laws.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
+
+
+def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:
+    """Whether a statement of the model, of a component in it, of the scene, or one that it needs could not be read."""
+    bodies = [statement for _, body in elaborator.bodies for statement, _ in body]
+    said = [*bodies, *(scene.body if scene else ())]
+    return elaborator.files.scope.missed or any(isinstance(s, syntax.Broken) for s in said)
 
 
 def _unused_levels(elaborator: Elaborator, report: Report) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from sysdyn.cli.page.panels import Panel, curve, panels_of, styled, time_unit, unit_text
+from sysdyn.dsl.text.render import printable
 from sysdyn.runtime.trace.trace import Trace
 
 STYLES = ("-", "--", ":", "-.")
@@ -78,14 +79,14 @@ def _style(defaults: Any) -> Any:
 def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:
     """Titles: what was run on the left, how on the right."""
     titles = dict.fromkeys(str(t.attributes.get("title", label)) for label, t in traces)
-    axes[0].set_title(" and ".join(titles), fontweight="bold", fontsize=11, pad=10)
+    axes[0].set_title(_legible(" and ".join(titles)), fontweight="bold", fontsize=11, pad=10)
     if len(traces) > 1:
         return
     trace = traces[0][1]
     how = [str(trace.attributes[a]) for a in ("formulation", "method") if trace.attributes.get(a)]
     if not trace.final:
         how.append("not final")
-    axes[-1].set_title(", ".join(how), loc="right", fontsize=8.5, color="#7b828c", pad=10)
+    axes[-1].set_title(_legible(", ".join(how)), loc="right", fontsize=8.5, color="#7b828c", pad=10)
 
 
 def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float) -> None:
@@ -107,5 +108,6 @@ def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: f
 
 
 def _legible(label: str) -> str:
-    """Matplotlib leaves labels that begin with '_' out of a legend."""
+    """A name as it is drawn: control characters are no XML; what begins with '_' Matplotlib leaves out of a legend."""
+    label = printable(label)
     return f"\u2009{label}" if label.startswith("_") else label

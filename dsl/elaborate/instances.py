@@ -7,14 +7,17 @@ elaborated under the label's path.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from sysdyn.dsl.elaborate.elements import Elements
+from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.head import Head
 from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.parameters import Argument
 from sysdyn.dsl.elaborate.parts import Nested, flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.context import Failed
@@ -52,6 +55,7 @@ class Instances(Elements):
 
     def __init__(self, report: Report) -> None:
         super().__init__(report)
+        self.files: FileScope
         self.bodies: list[tuple[Space, list[Nested]]] = []
         self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
         self._waiting: dict[int, list[Callable[[], None]]] = {}  # instances not yet elaborated, by their symbol
@@ -120,6 +124,7 @@ class Instances(Elements):
         if component.name in chain:
             around = (*chain[chain.index(component.name) :], component.name)
             raise self.resolver.fail("E801", f"component contains itself: {' -> '.join(around)}", s.component.span)
+        budget.charge(budget.INSTANCE, f"instances of component '{component.name}'")
         at, shape = self._label(s)
         path = self.current.family(s.decl.name).name
         number = len(symbol.spaces)
@@ -143,8 +148,9 @@ class Instances(Elements):
         self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: list[Nested]
     ) -> None:
         head = Head(body)
-        arguments = self._arguments(s, component, head, space)
-        inputs = self._connect(s, component, head, space)
+        with self._unread(any(isinstance(statement, syntax.Broken) for statement, _ in body)):
+            arguments = self._arguments(s, component, head, space)
+            inputs = self._connect(s, component, head, space)
         solve_units(self, s, space, head, arguments, inputs)
         symbol.spaces.append(space)
         with self.entering(space):
@@ -158,6 +164,23 @@ class Instances(Elements):
             self.each(body, self.declare)
             self.bodies.append((space, body))
             self.announce(body)
+
+    @contextmanager
+    def _unread(self, broken: bool) -> Iterator[None]:
+        """What connects a component that lost a statement is no mistake: its port may stand there."""
+        if not broken:
+            yield
+            return
+        before, silent = self.report, Report()
+        self.report = self.resolver.report = silent
+        try:
+            yield
+        except Failed:
+            self.files.scope.missed = True
+            raise
+        finally:
+            self.report = self.resolver.report = before
+            before.extend(d for d in silent if not d.code.startswith("E4"))
 
     def _arguments(
         self, s: syntax.Instance, component: ComponentSymbol, head: Head, space: Space

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (
@@ -103,6 +104,9 @@ class Frame:
                 for decl in declared(statement):
                     if decl.name not in self.scope.symbols:
                         self.scope.broken.add(decl.name)
+            except budget.SpentError as spent:
+                spent.place = spent.place or self.place(statement.span)
+                raise
 
     def in_parts(self, do: Callable[[], None], span: syntax.Span) -> None:
         """Carry out a statement; for each part of a loop that runs over several statements of one label."""

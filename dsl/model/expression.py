@@ -23,6 +23,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from sysdyn.dsl.model import budget
+
 _interned: dict[tuple[Any, ...], Node] = {}
 _numbers = itertools.count()  # never given twice: nodes of two `fresh` blocks may meet in one expression
 
@@ -64,6 +66,7 @@ def _make(op: str, data: Any, args: tuple[Node, ...], key: Any = None) -> Node:
     full = (op, data, args) if key is None else (op, key)
     node = _interned.get(full)
     if node is None:
+        budget.charge(budget.NODE, "its expressions")
         node = Node(op, data, args)
         _interned[full] = node
     return node

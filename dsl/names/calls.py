@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -60,6 +61,7 @@ class Calls(Context):
         if not (ex.is_const(first) and ex.is_const(last)):
             message = "the body takes elements of a list, so the bounds must be numbers"
             raise self.fail("E806", message, e.span, help="an array with a formula for its elements")
+        budget.charge(budget.NODE * max(last.data - first.data, 0.0), "a range that is written out")
         before, values = self._bound, []
         for k in range(int(first.data), int(last.data) + 1):
             self._bound = {**before, e.index.name: Typed(ex.const(k), NONE)}
@@ -109,7 +111,10 @@ class Calls(Context):
         values: list[Typed] = []
         for arg in e.args:
             value = self.resolve(arg.value)
-            values += list(value.items) if isinstance(value, Vector) and count == -1 else [self.scalar(arg.value)]
+            if isinstance(value, Vector) and count == -1:
+                values += value.items
+            else:
+                values.append(self.one_number(value, arg.value))
         if (count == -1 and not values) or (count >= 0 and len(values) != count):
             wants = "at least one argument" if count == -1 else f"{count} argument{'s' * (count != 1)}"
             raise self.fail("E206", f"{name} takes {wants}, {len(values)} given", e.span)
@@ -175,17 +180,31 @@ class Calls(Context):
         nodes = self._arguments(name, heads, e)
         if any(s.expression is definition.value for s in self._active):
             raise self.fail("E105", f"circular definition: {name} -> {name}", e.span)
+        key = definition, tuple(nodes)
+        if key not in self._applied:
+            budget.charge(budget.EXPANSION, f"what function '{name}' is expanded to")
+            self._applied[key] = None
+            self._applied[key] = self._body(symbol, heads, nodes, result.dimension)
+        node = self._applied[key]
+        if node is None:
+            raise Failed  # reported where it was first applied to these
+        return Typed(node, result.dimension)
+
+    def _body(
+        self, symbol: FunctionSymbol, heads: Sequence[tuple[str, Dimension]], nodes: Sequence[Node], result: Dimension
+    ) -> Node:
+        """The value of a function of the file at its arguments, of dimension `result`."""
+        definition, name = symbol.definition, symbol.name
         space = Space("", symbol.file_scope, symbol.file_scope, symbol.source)
         marker = Definition(name, "fn", definition.value, (), None, space, symbol.place, definition.name.span)
         arguments = {n: Typed(node, d) for (n, d), node in zip(heads, nodes, strict=True)}
         self._active.append(marker)
         try:
             with self.space(space), self.bound(arguments):
-                message = f"function '{name}' is declared {dim.show(result.dimension)} but its value is {{}}"
-                node = self.wanted(definition.value, result.dimension, "E207", message)
+                message = f"function '{name}' is declared {dim.show(result)} but its value is {{}}"
+                return self.wanted(definition.value, result, "E207", message)
         finally:
             self._active.pop()
-        return Typed(node, result.dimension)
 
 
 def walk(root: syntax.Expr) -> Iterator[object]:

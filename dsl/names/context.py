@@ -82,6 +82,7 @@ class Context:
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
         self.constraints: dict[str, list[Constraint]] = {}
         self._values: dict[tuple[Definition, bool], Value | None] = {}
+        self._applied: dict[tuple[syntax.Function, tuple[Node, ...]], Node | None] = {}  # functions to arguments
         self._active: list[Definition] = []
         self._loops: list[Loop] = []
         self._bound: dict[str, Typed] = {}  # loop variables, function arguments, an element's own variables
@@ -233,11 +234,13 @@ class Context:
 
     def scalar(self, expression: syntax.Expr) -> Typed:
         """A scalar value of any dimension."""
-        value = self.resolve(expression)
+        return self.one_number(self.resolve(expression), expression)
+
+    def one_number(self, value: Value, expression: syntax.Expr) -> Typed:
+        """A value found before, where one number is wanted; expression: where it was found."""
         if isinstance(value, Vector):
             raise self.fail("E203", "an array stands where one number is wanted", expression.span)
-        if value.truth:
-            raise self.fail("E203", "a condition stands where a number is wanted", expression.span)
+        self.is_number(value, expression)
         return value
 
     def wanted(self, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:

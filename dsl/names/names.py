@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -153,6 +154,7 @@ class Names(Context):
             help_ = f"{symbol.name}[i] in a sum or a 'for'"
             raise self.fail("E806", f"'{symbol.name}' is an array: name the element", span, help=help_)
         first, last = (int(b.data) for b in symbol.shape[0])
+        budget.charge(budget.NODE * max(last - first, 0), f"the elements of '{symbol.name}' one by one")
         return Vector(tuple(self.element(symbol, (ex.const(i),)) for i in range(first, last + 1)), first)
 
     def element(self, symbol: ParameterSymbol | UnknownSymbol, at: tuple[Node, ...]) -> Typed:
@@ -204,6 +206,9 @@ class Names(Context):
             del self._values[key]  # where it is read, the range is known
             if any(several.loop == n.node.data for n in placeholders.values()):
                 raise self.spread(several, symbol.span) from None
+            raise
+        except budget.SpentError as spent:
+            spent.place = spent.place or Place(symbol.space.source, symbol.span)
             raise
         finally:
             self._active.pop()

@@ -284,6 +284,8 @@ class Scope:
     symbols: dict[str, Symbol] = field(default_factory=dict)
     units: dict[str, Unit] = field(default_factory=dict)
     broken: set[str] = field(default_factory=set)
+    missed: bool = False
+    """Whether a name of a statement that could not be read was asked for."""
 
     def find(self, name: str) -> Symbol | None:
         """The symbol of that name, nearest level first."""
@@ -308,6 +310,7 @@ class Scope:
         scope: Scope | None = self
         while scope is not None:
             if name in scope.broken:
+                scope.missed = True
                 return True
             scope = scope.outer
         return False

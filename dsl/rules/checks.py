@@ -6,11 +6,13 @@ Each rule is one function that looks at resolved statements and reports; none ra
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Loop, NodeFamily, Shape, State, Unknown
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.letters import letter, samples, unknowns_of
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
@@ -188,6 +190,7 @@ def values(model: Elaborator, known: Values, report: Report) -> None:
     for node, place in _expressions(model):
         _divisions(node, place, known, report)
     _sizes(model, known, report)
+    _elements(model, known, report)
     _indices(model, known, report)
 
 
@@ -220,6 +223,38 @@ def _sizes(model: Elaborator, known: Values, report: Report) -> None:
         if value != math.floor(value) or abs(value) > 2**31 - 2:
             message = f"'{name}' is a size or an index, so it must be a whole number: {value:g}"
             report.error("E805", message, parameter.place)
+
+
+def _elements(model: Elaborator, known: Values, report: Report) -> None:
+    """E119: arrays and loops of more elements than there is memory for."""
+    parts = model.parts
+    unknowns: list[Coordinate | Unknown | State | NodeFamily] = [*parts.coordinates, *parts.unknowns]
+    unknowns += [*parts.states, *parts.nodes]
+    counted = [(p.name, _volume(p.shape, known), p.place, budget.NUMBER) for p in parts.parameters.values()]
+    counted += [(u.name, _volume(u.shape, known), u.place, budget.UNKNOWN) for u in unknowns]
+    rows: list[Branch | Constraint] = [*parts.branches, *parts.constraints]
+    counted += [(r.name, _count(r.loops, known), r.place, budget.UNKNOWN) for r in rows]
+    left = float(budget.granted())
+    for name, count, place, price in counted:
+        left -= count * price
+        if left < 0.0:
+            message = f"the {count:.10g} elements of '{name}' need {budget.shown(count * price)}"
+            granted = budget.shown(budget.granted())
+            report.error("E119", f"{message}; one model may take {granted} in all", place, help="fewer elements")
+            return
+
+
+def _volume(shape: Shape, known: Values) -> float:
+    """Number of elements of a box; 0 where that is not known."""
+    lengths = [known.number(last) - known.number(first) + 1.0 for first, last in shape]
+    return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0
+
+
+def _count(loops: Sequence[Loop], known: Values) -> float:
+    """Number of elements of the box around nested loops; 0 where that is not known."""
+    spans = [(known.bounds(ex.index(loop.index), loops[: k + 1])) for k, loop in enumerate(loops)]
+    lengths = [high - low + 1.0 for low, high in spans]
+    return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0
 
 
 def _indices(model: Elaborator, known: Values, report: Report) -> None:

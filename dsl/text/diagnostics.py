@@ -134,6 +134,27 @@ class Report:
             raise ModelError(self.diagnostics)
 
 
+MOST = 200
+"""Findings of one severity in one file that are shown."""
+
+
+def shortened(found: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Findings without those of a file and a severity beyond MOST, whose number the note N101 gives."""
+    kept: list[Diagnostic] = []
+    seen: dict[tuple[str, str], list[Diagnostic]] = {}
+    for item in found:
+        same = seen.setdefault(("" if item.place is None else item.place.file, item.severity), [])
+        same.append(item)
+        if len(same) <= MOST:
+            kept.append(item)
+    for (_, severity), same in seen.items():
+        if len(same) > MOST:
+            rest = len(same) - MOST
+            message = f"{rest} more {severity}{'s' * (rest > 1)} of this file are not shown"
+            kept.append(Diagnostic("N101", message, same[MOST].place, help=f"the first {MOST} come before this place"))
+    return kept
+
+
 def _order(item: Diagnostic, files: dict[str, int]) -> tuple[int, int, int, str, str]:
     """Sort key: file, span, code, message."""
     if item.place is None:

@@ -8,7 +8,7 @@ with halving of the step while the rows grow or are not finite.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,14 @@ EPS = 1e-13
 """Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
+GRANTED = 4e9
+"""Operations that a search may take: about three seconds; the hardest start of our models takes a third of it."""
+ITERATIONS = 40
+"""Iterations that a search may take however large they are."""
+EVALUATION = 1e6
+"""Operations that evaluating the rows takes whatever their number: calls, not arithmetic."""
+EACH = 40.0
+"""Operations that an entry of the matrix takes in an evaluation."""
 _ITERATIONS = 60
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
@@ -33,11 +41,45 @@ _BESIDE = 1e-8
 _PROXIMAL = 6
 
 
+@dataclass(slots=True)
+class Work:
+    """What a search has left to spend, in operations counted by size: the same on every machine.
+
+    A share of GRANTED, or as much as ITERATIONS iterations of the largest problem met take.
+    """
+
+    share: float = 1.0
+    spent: float = 0.0
+    largest: float = 0.0
+
+    def iteration(self, shape: tuple[int, int], entries: int) -> None:
+        """Count one linearisation with its solution, of so many rows and unknowns."""
+        rows, unknowns = shape
+        solution = 2e3 * (rows + unknowns + entries)
+        if max(shape) <= SINGULAR_VALUES:
+            solution = 15.0 * rows * unknowns * min(shape)
+        elif max(shape) <= DENSE:
+            solution = 4.0 * (rows + unknowns) ** 3
+        whole = solution + EVALUATION + EACH * entries
+        self.largest = max(self.largest, whole)
+        self.spent += whole
+
+    def evaluation(self, entries: int) -> None:
+        """Count one evaluation of all rows."""
+        self.spent += EVALUATION + EACH * entries
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left."""
+        return self.spent > self.share * max(GRANTED, ITERATIONS * self.largest)
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """Rows `use` of residual(x) [number] in the unknowns `free` of x.
 
-    jacobian(x): values at (rows, columns); guess, scale, weight [unknowns].
+    jacobian(x): values at (rows, columns); guess, scale, weight [unknowns]; work: what all problems of one search draw
+    on.
     """
 
     residual: Callable[[Floats], Floats]
@@ -50,6 +92,7 @@ class Problem:
     guess: Floats
     scale: Floats
     weight: Floats
+    work: Work = field(default_factory=Work)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,8 +190,10 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
     stale = 0
     for _ in range(most):
         linear = _Linear(problem, x)
+        problem.work.iteration(linear.shape, problem.rows.size)
 
         def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:
+            problem.work.evaluation(problem.rows.size)
             scaled = np.where(problem.use, problem.residual(z) * linear.row_scale, 0.0)
             largest = float(np.abs(scaled).max(initial=0.0))
             return (largest if np.isfinite(largest) else np.inf), scaled
@@ -159,6 +204,8 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             best = Solution(x.copy(), size, np.abs(scaled))
         stale += 1
         if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
+            break
+        if problem.work.done:
             break
         u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
         try:
@@ -212,6 +259,7 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
         scale, damping = linear.row_scale, 1e-3
 
         def measure(z: Floats) -> Floats:
+            problem.work.iteration(linear.shape, problem.rows.size)
             return (problem.residual(z) * scale)[problem.use]
 
         r = measure(x)
@@ -233,6 +281,6 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
                 return x
             gain = 1.0 - (now @ now) / (r @ r)
             x, r, damping = tried, now, damping / 4.0
-            if gain < 1e-12:
+            if gain < 1e-12 or problem.work.done:
                 break
     return x

@@ -17,7 +17,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
-from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, least_residual, solve, where_light
+from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, Work, least_residual, solve, where_light
 from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import STATE, WEIGHT, Mask, Starter, problem_of, row_scale
 
@@ -28,6 +28,8 @@ _FEW = 3
 EXACT = 1e-9
 OWN = 1e-6
 BACK = 1e-9
+EXPLAINED = 0.3
+"""Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +60,17 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     written = starter.guessed & ~starter.unsaid
     if not written.any():
         return guess
-    rows = written | starter.groups("phi", "psi")
     free = free & (np.arange(free.size) < starter.n)
+    # an expression gives its own unknown where the others are guessed by numbers: of several roots that one is meant
+    own = free & ~starter.written
+    given = False
+    if own.any():
+        found = solve(problem_of(starter, t, guess, guess, rows=written, free=own), guess)
+        given = found.residual < EXACT
+        guess = found.x if given else guess
+    rows = written | starter.groups("phi", "psi")
     found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-    return found.x if np.isfinite(found.residual) else guess
+    return found.x if found.residual < EXACT or (np.isfinite(found.residual) and not given) else guess
 
 
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
@@ -93,6 +102,8 @@ def _trials(gentle: Problem, problem: Problem, x: Floats) -> Iterator[Solution]:
     yield solve(gentle, x, _FEW)
     yield solve(problem, x)
     for z in _shaken(x, problem.free, problem.scale):
+        if problem.work.done:
+            return
         yield solve(problem, z)
 
 
@@ -111,7 +122,9 @@ def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) 
     """
     at, best = x, Solution(x, np.inf, np.zeros(0))
     empty = None
-    for _ in range(_RESCALINGS):
+    for k in range(_RESCALINGS):
+        if k and starter.work.done:
+            break
         scale = starter.scale(t, at)
         found = solve(problem_of(starter, t, at, guess, rows=starter.every, free=free), best.x)
         if empty is not None and found.residual >= EXACT and not found.residual < best.residual:
@@ -213,7 +226,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
         return best, True
     best, holds = _rescaled(starter, t, x, guess, free)
     for shaken in _shaken(x, free, starter.scale(t, x)):
-        if holds:
+        if holds or starter.work.done:
             break
         found, holds = _rescaled(starter, t, shaken, guess, free)
         if holds or found.residual < best.residual:
@@ -241,10 +254,35 @@ def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[
     places = np.flatnonzero(
         given.written & ~given.fixed & (change > 1e-9 * np.maximum(np.abs(given.guess), 1e-3 * scale[: starter.n]))
     )
-    return tuple(
+    found = [
         (starter.system.name(int(k)), float(given.guess[k]), float(x[k]), _asked(starter, t, x, int(k)))
         for k in places[:100]
-    )
+    ]
+    return (*found, *_missed(starter, t, x, scale))
+
+
+def _missed(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[tuple[str, float, float, str]]:
+    """Guesses by expressions that the start does not meet: name of what the expression guesses, its value, the start's.
+
+    Where a row guesses several unknowns at once its label stands for them, and 0 for what it would miss.
+    """
+    rows = starter.guessed & ~starter.unsaid
+    if not rows.any():
+        return
+    misses = starter.settled.residual(t, *starter.expand(x))
+    size = row_scale(starter, t, x, scale)
+    values = starter.jacobian(t, x)
+    for row in np.flatnonzero(rows & (np.abs(misses) * size > 1e-9))[:100]:
+        mine = (starter.rows == row) & (starter.columns < starter.n) & (values != 0.0)
+        own = mine & ~starter.written[starter.columns]
+        if own.sum() == 1:
+            (entry,) = np.flatnonzero(own)
+            k = int(starter.columns[entry])
+            guess = float(x[k] - misses[row] / values[entry])
+            yield starter.system.name(k), guess, float(x[k]), _asked(starter, t, x, k)
+        else:
+            label = starter.settled.row_label(int(row))
+            yield f"guess of line {label.line}", 0.0, float(misses[row]), "what its two sides differ by"
 
 
 def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
@@ -253,6 +291,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
+    starter.work = Work(EXPLAINED)
     x, scaled = best.x, best.scaled
     if x.size <= DENSE:
         problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
@@ -310,6 +349,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     best, holds = _attempt(starter, t0, guess, free)
     if not holds:
         raise _explain(starter, t0, guess, free, best)
+    starter.work = Work(EXPLAINED)
     best = _steadied(starter, t0, best, guess, free)
     y, yd = starter.expand(best.x)
     counted = Starter(system) if starter.missed.size else starter

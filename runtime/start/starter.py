@@ -18,7 +18,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.scales import alike, group_maximum, propagate
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.least_change import DENSE, Problem
+from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.settled import rates_of
 
@@ -98,6 +98,7 @@ class Starter:
 
     def __init__(self, system: System, *, measuring: bool = False) -> None:
         self.system = system
+        self.work = Work()  # of one search for a start
         self.settled = system.another("start")
         self.rates = rates_of(self.settled)
         self.given = _given(system)
@@ -393,6 +394,7 @@ def weighted(
         guess=guess,
         scale=scale,
         weight=weight,
+        work=starter.work,
     )
 
 

@@ -16,8 +16,7 @@ import resource
 import signal
 import sys
 import tempfile
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,28 +75,34 @@ def _judged(status: int, log: Path, memory: int, cpu: float) -> str | None:
     if memory > MEMORY:
         return f"{memory >> 20} MB"
     strange = next((line for line in said.splitlines() if line.strip() and not FINDING.match(line)), None)
-    if strange is not None and not any(sign in strange for sign in ("|", "^", "   ...")):
+    if strange is not None and not any(sign in strange for sign in ("|", "^", "  ...")):
         return f"on the streams: {strange[:200]}"
     control = next((c for c in said if ord(c) < 32 and c != "\n"), None)
     return None if control is None else f"a control character on the streams: {control!r}"
 
 
-def failures(cases: int, jobs: int, seed: str, most: float = float("inf")) -> Iterator[Failed]:
-    """Texts that failed, as they come; most: wall seconds after which no further text is begun."""
+def _text(own: str, sources: dict[str, str]) -> tuple[str, str, str]:
+    """A mutated text: its seed, its model, itself."""
+    chance = random.Random(own)
+    name = chance.choice(list(sources))
+    return own, name, mutations.mutated(chance, sources[name], list(sources.values()))
+
+
+def _kept(path: Path) -> tuple[str, str, str]:
+    """A text of a file, in the same form."""
+    return path.stem, path.stem, path.read_bytes().decode("utf-8", "surrogatepass")
+
+
+def failures(cases: int, jobs: int, seed: str, files: Sequence[Path] = ()) -> Iterator[Failed]:
+    """Texts that failed, as they come; files: instead of mutated models."""
     _warm()
     sources = mutations.texts()
-    names, others = list(sources), list(sources.values())
     running: dict[int, tuple[str, str, str, Path]] = {}
-    began, number = time.monotonic(), 0
+    number = 0
     with tempfile.TemporaryDirectory() as folder:
         while number < cases or running:
-            if number < cases and time.monotonic() - began > most:
-                cases = number
             while number < cases and len(running) < jobs:
-                own = f"{seed} {number}"
-                chance = random.Random(own)
-                name = chance.choice(names)
-                text = mutations.mutated(chance, sources[name], others)
+                own, name, text = _text(f"{seed} {number}", sources) if not files else _kept(files[number])
                 place = Path(folder) / str(number)
                 place.mkdir()
                 (place / "model.sd").write_bytes(text.encode("utf-8", "surrogatepass"))
@@ -140,9 +145,11 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--seed", default="check")
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--file", type=Path, action="append", default=[], help="this text instead of mutated ones")
     options = parser.parse_args()
     kinds: dict[str, int] = {}
-    for failed in failures(options.cases, options.jobs, options.seed):
+    cases = len(options.file) or options.cases
+    for failed in failures(cases, options.jobs, options.seed, options.file):
         print(f"{failed.seed}: {failed.model}: {failed.what}", flush=True)
         kind = re.sub(r"[\d.]+", "N", failed.what)[:80]
         kinds[kind] = kinds.get(kind, 0) + 1
@@ -151,7 +158,7 @@ def main() -> int:
             (options.keep / f"{failed.seed.replace(' ', '-')}.sd").write_text(failed.text, errors="surrogatepass")
     for kind, count in sorted(kinds.items(), key=lambda item: -item[1]):
         print(f"{count:6d}  {kind}")
-    print(f"{options.cases} texts, {sum(kinds.values())} failed")
+    print(f"{cases} texts, {sum(kinds.values())} failed")
     return 1 if kinds else 0
 
 

@@ -1,0 +1,36 @@
+"""The whole of `check`, its start included, on mutated models: no fault, no hang, nothing but findings on the streams.
+
+A slice; SYSDYN_LONG=1 takes 20000 texts.  What failed once is kept in `kept/`, and stays a finding with a place.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+RUN = Path(__file__).parent / "run.py"
+KEPT = Path(__file__).parent / "kept"
+LONG = bool(os.environ.get("SYSDYN_LONG"))
+
+
+def fuzz(*options, within):
+    """What the runner said, and its exit code."""
+    done = subprocess.run(
+        [sys.executable, str(RUN), *map(str, options)], capture_output=True, text=True, timeout=within, check=False
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_mutated_models():
+    cases = 20_000 if LONG else 60
+    code, said = fuzz("--cases", cases, "--jobs", 2, "--seed", "ci", within=200 if not LONG else 6 * 3600)
+    assert code == 0, said
+    assert said.endswith(f"{cases} texts, 0 failed\n")
+
+
+def test_what_failed_once():
+    files = sorted(KEPT.glob("*.sd"))
+    assert files
+    code, said = fuzz(*(option for path in files for option in ("--file", path)), "--jobs", 2, within=200)
+    assert code == 0, said
+    assert said.endswith(f"{len(files)} texts, 0 failed\n")
