@@ -26,6 +26,7 @@
 #define NULL_PIVOT 1e-10   /* part of its column below which a pivot determines no better than Newton's test asks */
 #define LEAST_PIVOT 1e-290 /* the same where every pivot but zero counts */
 #define LEAST_PART 1e-7    /* of a correction that is still tried */
+#define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
 #define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
 
 static const double c[SD_STAGES] = {0.15505102572168219018, 0.64494897427831780982, 1.0};
@@ -34,6 +35,8 @@ static const double inverse_a[SD_STAGES][SD_STAGES] = {
     {-3.5678400846904054949, 0.7752551286084109509, 1.0531972647421808262},
     {5.5319726474218082619, -7.5319726474218082619, 5.0},
 };
+/* the quadrature of the method: exact to degree 4 */
+static const double quadrature[SD_STAGES] = {0.37640306270046727505, 0.51248582618842161384, 1.0 / 9.0};
 static const double gamma0 = 3.6378342527444957322;
 static const double complex lambda = 2.6810828736277521339 + 3.0504301992474105694 * I;
 /* A^-1 = S diag(gamma, lambda, conj lambda) S^-1: columns of S, rows of S^-1 */
@@ -99,7 +102,8 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *comple
     radau->complex_linear = complex_linear;
     radau->n = system->unknowns;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
-                                  &radau->taken, step, dense, refine, start, 0, c, radau->stage, radau->stage_d};
+                                  &radau->taken, step, dense, refine, start, 0, c, quadrature, radau->stage,
+                                  radau->stage_d, 1};
     return radau;
 }
 
@@ -265,7 +269,8 @@ static int residuals(sd_radau *radau)
 static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
 {
     double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
-    int judged = all || radau->linear->rank < radau->n || sd_linear_z_rank(radau->complex_linear) < radau->n;
+    int left = radau->linear->rank < radau->n || sd_linear_z_rank(radau->complex_linear) < radau->n, judged = all || left;
+    limit = left ? fmax(limit, FAINT_ROW) : limit;
     for (int s = 0; s < SD_STAGES; s++) {
         for (int32_t i = 0; i < radau->n; i++) {
             radau->y[i] = radau->phi[i] + radau->z[s][i];

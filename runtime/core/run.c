@@ -87,7 +87,7 @@ static double share(const sd_stepper *stepper, int32_t k, double to)
     return 0.5 * to * sum;
 }
 
-/* the method's own quadrature: its powers at the start and at the nodes of the last step, up to the part `part` of it */
+/* the method's own quadrature over the part `part` of the last step */
 static void integrate_nodes(sd_run *run, double part)
 {
     const sd_stepper *stepper = run->stepper;
@@ -97,8 +97,11 @@ static void integrate_nodes(sd_run *run, double part)
         weigh(run, h * share(stepper, -1, part));
     }
     for (int32_t k = 0; k < stepper->nodes; k++) {
+        double weight = part < 1.0 ? share(stepper, k, part) : stepper->node_weight[k];
+        if (weight == 0.0)
+            continue;
         audit(run, from + stepper->node[k] * h, stepper->node_y[k], stepper->node_yd[k], run->sample);
-        weigh(run, h * share(stepper, k, part));
+        weigh(run, h * weight);
     }
 }
 
@@ -111,7 +114,7 @@ static void integrate(sd_run *run, double to)
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
     if (!run->audit || half == 0.0)
         return;
-    if (stepper->nodes) {
+    if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {
         integrate_nodes(run, to == *stepper->t ? 1.0 : (to - from) / (*stepper->t - from));
         return;
     }

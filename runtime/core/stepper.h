@@ -35,11 +35,12 @@ typedef struct sd_stepper {
     void (*refine)(void *self, sd_settle *settle);
     /* from (t, y, yd) with step h (0: chosen) */
     void (*start)(void *self, double t, const double *y, const double *yd, double h);
-    /* where the method's equations hold within the last step (nodes 0: values of `dense` serve): instants as parts of
-     * the step, at most three, and y, yd [n] there; a quadrature through them and the start is of the method's order */
+    /* a quadrature of the method's own order over the last step (nodes 0: values of `dense` serve): instants and
+     * weights as parts of the step, y, yd [n] there */
     int32_t nodes;
-    const double *node;
+    const double *node, *node_weight;
     double *const *node_y, *const *node_yd;
+    int32_t collocated;        /* 1: at most three nodes; a polynomial through them and the start serves within the step */
 } sd_stepper;
 
 #define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */

@@ -29,6 +29,8 @@ SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
 RATIO = 0.1
 """Of the tolerances of the first two runs."""
+WORTH = 0.3
+"""Of the last tolerance: a run with more than that says little beside it."""
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 
@@ -126,7 +128,11 @@ def control(run: Run, target: Floats, finest: float = FINEST, *, doubted: bool =
         except SolverFailure as failure:
             if failure.cause in ("max_steps", "max_wall") or number == 2:
                 raise
-            return _achieved(relative, False, number, last.tolerance)
+            # half the way to where it failed, while that is a smaller tolerance worth a run
+            tolerance = float(np.sqrt(tolerance * last.tolerance))
+            if tolerance > WORTH * last.tolerance:
+                return _achieved(relative, False, number, last.tolerance)
+            continue
         step = float(np.log10(last.tolerance / now.tolerance))
         apart, over = difference(last, now, target)
         if now.steps == last.steps and apart < ROUND_OFF:

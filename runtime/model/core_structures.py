@@ -109,7 +109,8 @@ class Stepper(c.Structure):
         ("n", _I),
         *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
         ("nodes", _I),
-        *[(name, _P) for name in ["node", "node_y", "node_yd"]],
+        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd"]],
+        ("collocated", _I),
     ]
 
 

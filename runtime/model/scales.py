@@ -31,10 +31,13 @@ _SAMPLES = 16
 _SWEEPS = 8
 
 
-def _grouped(system: System, known: Floats) -> Floats:
-    """What is not zero counts as it is, be it ever so small: it may grow.  Zeros count as GROUP of their like."""
+def _grouped(system: System, y: Floats, moves: Floats) -> Floats:
+    """What is not zero at the start counts as it is, be it ever so small: it may grow.  Zeros count as what they move
+    in the time scale of the start, and as GROUP of their like at least.
+    """
+    known = np.maximum(np.abs(y), moves)
     largest = group_maximum(system, known)
-    return np.where(known > NOTHING * largest, known, GROUP * largest)
+    return np.where(np.abs(y) > NOTHING * largest, known, np.maximum(known, GROUP * largest))
 
 
 def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
@@ -210,7 +213,7 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     form = system.form
     flows = np.maximum(known, GROUP * group_maximum(system, known))[form.k_f]
     moves[form.k_q[np.abs(y[form.k_f]) < QUIET * flows]] = 0.0  # rates that are round-off
-    known = _grouped(system, np.maximum(np.abs(y), moves))
+    known = _grouped(system, y, moves)
     found = np.where(system.nominal > 0.0, system.nominal, known)
     found = _flows(system, found, span)
     size = np.abs(jy) + np.abs(jyd) / tau

@@ -49,3 +49,13 @@ def test_circuits_are_right_or_refused(tmp_path):
 @pytest.mark.skipif(not LONG, reason="SYSDYN_LONG=1 runs all circuits in all formulations")
 def test_all_circuits_are_right_or_refused(tmp_path):
     check(tmp_path, range(NUMBER), FORMULATIONS)
+
+
+@pytest.mark.parametrize("number", [60, 116])
+def test_the_energy_of_steep_laws_balances_in_every_row(tmp_path, number):
+    """Powers are taken where the laws hold: between the stages an exponential makes what it likes of a voltage."""
+    text = circuit(number).text.replace("trace ", "trace audit.supplied as w, ", 1)
+    run = ran(tmp_path, text, formulation="co_lagrangian")
+    assert run.met
+    turned_over = np.abs(np.asarray(run.trace["w"])).max()
+    assert np.abs(np.asarray(run.trace["audit.energy"])).max() <= 1e-3 * turned_over

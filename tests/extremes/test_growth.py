@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from running import ran
 from scipy.integrate import solve_ivp
+from sysdyn.runtime.integrate import integrate
+from sysdyn.runtime.model import scales
 
 FILE = Path(__file__).with_name("growth.sd")
 BESIDE_PI = 1.2246467991473532e-16  # pi less its double
@@ -60,3 +62,39 @@ def test_an_epidemic_breaks_out_with_either_method(tmp_path, method):
     t = np.unique(np.asarray(run.trace.time))
     wanted = epidemic(t)
     assert np.abs(run.at("y", t) - wanted).max() <= 3e-3 * wanted.max()
+
+
+ROD = """model rod {
+  param m = 0.3 kg
+  param w = 5 rad/s
+  coord x: translation = 0.7 m
+  coord y: translation ~ 0 m
+  energy T* = 1/2*m*(x'^2 + y'^2)
+  phi rod: x*sin(w*t) - y*cos(w*t) = 0
+  init x' = 0 m/s
+}
+scene run of rod {
+  time 0 s to 0.4 s
+  trace x, y
+}
+"""
+
+
+def test_zeros_at_the_start_count_as_a_part_of_their_like(tmp_path, monkeypatch):
+    """Not as what they move in the shortest time about: beside that what moves at last is without bounds."""
+    found = []
+
+    def magnitudes(*arguments):
+        magnitude, time = scales.magnitudes(*arguments)
+        found.append(magnitude.copy())  # a run's own grow
+        return magnitude, time
+
+    monkeypatch.setattr(integrate, "magnitudes", magnitudes)
+    run = ran(tmp_path, ROD)
+    assert run.met
+    for magnitude in found:
+        assert magnitude[0] == pytest.approx(0.7, rel=1e-12)
+        assert 0.7e-3 <= magnitude[1] <= 0.7
+    # x'' = w^2 x along the rod
+    along = np.hypot(np.asarray(run.trace["x"]), np.asarray(run.trace["y"]))
+    assert np.abs(along - 0.7 * np.cosh(5.0 * np.asarray(run.trace.time))).max() <= 1e-4 * along.max()

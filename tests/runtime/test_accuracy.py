@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from sysdyn.runtime.integrate.accuracy import ROUND_OFF, Sampled, control
+from sysdyn.runtime.model.failures import SolverFailure
 
 
 def sampled(tolerance, values, steps=None):
@@ -62,3 +63,20 @@ def test_errors_are_taken_in_the_sizes_of_the_finer_run():
     achieved = control(run, np.array([1e-6]))
     assert achieved.met
     assert achieved.error_estimate >= 0.5 * achieved.tolerance
+
+
+@pytest.mark.parametrize(("wall", "met"), [(1e-7, True), (9e-6, False)])
+def test_a_finer_run_that_fails_is_tried_half_the_way(wall, met):
+    tried = []
+
+    def run(tolerance, longest):
+        tried.append(tolerance)
+        if tolerance < wall:
+            raise SolverFailure("newton", 0.0, 1e-18)
+        return sampled(tolerance, [1.0, 0.5 + 30.0 * tolerance])
+
+    achieved = control(run, np.array([1e-4]))
+    assert min(tried) < wall
+    assert achieved.met is met
+    assert achieved.tolerance >= wall
+    assert not met or 30.0 * achieved.tolerance <= achieved.error_estimate <= 1e-4
