@@ -100,11 +100,11 @@ _FOLDS = {"sum": "np.sum", "prod": "np.prod", "min": "np.min", "max": "np.max"}
 _START = {"sum": "0.0", "prod": "1.0", "min": "np.inf", "max": "-np.inf"}
 
 
-def emit_numpy(program: Program, form: DescriptorForm) -> str:
-    """The Python text of a program."""
-    texts = [_Writer(k, r).text(form) for k, r in enumerate(program.routines)]
-    blocks = [_block(name, part, program) for name in program.blocks() for part in ("rows", "dy", "dyd")]
-    return "\n\n".join([HEAD, *texts, *(b for b in blocks if b)])
+def emit_numpy(program: Program, form: DescriptorForm, head: str = HEAD, first: int = 0) -> str:
+    """The Python text of a program; first: number of its first function, behind those of a text before it."""
+    texts = [_Writer(k, r).text(form) for k, r in enumerate(program.routines, first)]
+    blocks = [_block(name, part, program, first) for name in program.blocks() for part in ("rows", "dy", "dyd")]
+    return "\n\n".join([head, *texts, *(b for b in blocks if b)])
 
 
 def _operand(value: Operand) -> str:
@@ -265,7 +265,7 @@ def _table(s: Assign, args: list[str]) -> str:
     return f"_table2({where}, {args[0]}, {args[1]}, {orders[0]}, {orders[1]})"
 
 
-def _block(name: str, part: str, program: Program) -> str:
+def _block(name: str, part: str, program: Program, first: int) -> str:
     """The exported function of a block's part: its routines in order."""
     numbers = [k for k, r in enumerate(program.routines) if r.block == name and r.part == part]
     if not numbers:
@@ -274,10 +274,10 @@ def _block(name: str, part: str, program: Program) -> str:
     lines = [f"def {name}_{part}(p, ix, at, to, t, y, yd, {out}):", "    t = np.float64(t)"]
     lines.append("    with np.errstate(all='ignore'):")
     if out == "r":
-        lines += [f"        _f{k}(p, ix, at, to, t, y, yd, r)" for k in numbers]
+        lines += [f"        _f{first + k}(p, ix, at, to, t, y, yd, r)" for k in numbers]
         return "\n".join([*lines, ""])
     lines.append("        o = 0")
     for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
         same = later >= 0 and program.routines[later].kernel == program.routines[k].kernel
-        lines.append(f"        {'' if same else 'o = '}_f{k}(p, ix, at, to, t, y, yd, v, o)")
+        lines.append(f"        {'' if same else 'o = '}_f{first + k}(p, ix, at, to, t, y, yd, v, o)")
     return "\n".join([*lines, ""])
