@@ -108,5 +108,5 @@ def _label(name: str, shape: tuple[tuple[int, int], ...]) -> dict[str, Any]:
 
 
 def outputs(tables: Tables) -> list[dict[str, Any]]:
-    """Traced quantities in the order of w."""
-    return [{"name": output.name, "unit": output.unit} for output in tables.outputs]
+    """Traced quantities in the order of w; row: of block observe."""
+    return [{"name": output.name, "unit": output.unit, "row": output.place} for output in tables.outputs]

@@ -109,6 +109,12 @@ def _model() -> _Model:
     return _MODELS[0]
 
 
+def pattern() -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The pair (sd_colptr, sd_rowind) of the matrices' pattern."""
+    said = _model().said
+    return np.asarray(said["sd_colptr"], dtype=np.int32), np.asarray(said["sd_rowind"], dtype=np.int32)
+
+
 def sd_residual(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
     """F(t, y, yd) [unknowns]; index form 0: yd - F(t, y)."""
     m = _model()
@@ -185,7 +191,7 @@ def sd_outputs(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
             inside[place] = value
     w = np.zeros(tables["observed"])
     _observe(m, tables["observe"], t, inside, rates, p, w)
-    return w[[output["place"] for output in tables["outputs"]]]
+    return w[[output["row"] for output in m.said["outputs"]]]
 
 
 def _observe(m: _Model, call: dict[str, Any], t: float, y: _Floats, yd: _Floats, p: _Floats, out: _Floats) -> None:

@@ -166,7 +166,7 @@ def _initial(form: DescriptorForm, binding: Binding) -> Iterator[_Piece]:
     pairs = zip(form.pins, binding.initial, strict=True)
     for pin, start in sorted(pairs, key=lambda pair: pair[0].fixed):
         every = np.arange(start.positions.size)
-        formula = Formula("initial", pin.nest, pin.value)
+        formula = Formula("initial_values", pin.nest, pin.value)
         yield _Piece(formula, "initial", every.size, every, start.positions, pin.family)
 
 

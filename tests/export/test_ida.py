@@ -20,7 +20,8 @@ CHANGED = {
     "pendulum": ("l", "th_0"), "slider_crank": ("m1", "th_0"), "knife_edge": ("M", "v_0"),
     "rolling_disk": ("r", "om_0"),
     "pendulum_spring": ("k", "th_0"), "two_link_arm": ("m2", "a_0"), "diode_circuit": ("C", "RL"),
-    "lcr_nonlinear": ("L1", "v_0"), "mass_spring": ("k", "v_0"), "pi_controller": ("Ki", "M"), "co_circuit": ("C1", "w"),
+    "lcr_nonlinear": ("L1", "v_0"), "mass_spring": ("k", "v_0"), "pi_controller": ("Ki", "M"),
+    "co_circuit": ("C1", "w"),
 }  # fmt: skip
 
 pytestmark = [
