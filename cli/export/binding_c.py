@@ -182,9 +182,10 @@ def _whole(tables: Tables) -> Iterable[str]:
     yield ints("ix", tables.ix)
     yield ints("following_ix", tables.following_ix)
     yield ints("structural", tables.structural)
-    yield doubles("full_y", tables.full_y)
-    yield doubles("full_yd", tables.full_yd)
     start = tables.start
+    if start is not None or tables.state is not None:
+        yield doubles("full_y", tables.full_y)
+        yield doubles("full_yd", tables.full_yd)
     constants = {
         "STRUCTURAL": tables.structural.size,
         "STATE": int(tables.state is not None),
