@@ -119,6 +119,34 @@ def _chosen(runs: Runs, options: Options) -> Achieved:
         return _achieved(runs, options, doubted=failure.cause != "max_steps")
 
 
+def counted(
+    written: System, start: ConsistentState, facts: Structure, options: Options
+) -> tuple[System, ConsistentState, Structure]:
+    """The model as written without the redundant constraints that the options leave out."""
+    if options.redundancy not in ("error", "drop", "minimum_norm"):
+        raise WrongOption(f"redundancy {options.redundancy}: error, drop or minimum_norm")
+    if facts.left_out and options.redundancy != "error":
+        written = written.without(facts.left_out)
+        start = replace(consistent_start(written, options.t_start, start), moved=start.moved)
+        facts = replace(facts, index=index_of(written, start)[0], undetermined=())
+    return written, start, facts
+
+
+def formed(
+    written: System, start: ConsistentState, facts: Structure, options: Options
+) -> tuple[System, int, tuple[str, ...]]:
+    """The system in the index form of the options, its index, warnings.  Raises NoSuchForm, ValueError."""
+    form, index, warnings = choose_index(options.index, facts, options.method)
+    system = written if form == "3" else written.another(form)
+    missing = obstacle(system, start) if form == "0" else ()
+    if missing:
+        raise NoSuchForm(
+            f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "
+            "constraints and the gammas (coordinates without inertia): index 2 or 3 with bdf or radau"
+        )
+    return system, index, warnings
+
+
 def simulate(
     manifest: Mapping[str, Any] | Description,
     binding: Mapping[str, Any] | None,
@@ -140,20 +168,9 @@ def simulate(
     written = System.of(description, carrier, "3")
     start = start or consistent_start(written, options.t_start)
     facts = facts or structure(written, start)
-    if options.redundancy not in ("error", "drop", "minimum_norm"):
-        raise WrongOption(f"redundancy {options.redundancy}: error, drop or minimum_norm")
-    if facts.left_out and options.redundancy != "error":
-        written = written.without(facts.left_out)
-        start = replace(consistent_start(written, options.t_start, start), moved=start.moved)
-        facts = replace(facts, index=index_of(written, start)[0], undetermined=())
-    form, index, warnings = choose_index(options.index, facts, options.method)
-    system = written if form == "3" else written.another(form)
-    missing = obstacle(system, start) if form == "0" else ()
-    if missing:
-        raise NoSuchForm(
-            f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "
-            "constraints and the gammas (coordinates without inertia): index 2 or 3 with bdf or radau"
-        )
+    written, start, facts = counted(written, start, facts, options)
+    system, index, warnings = formed(written, start, facts, options)
+    form = system.form.name
     name = {"3": str(facts.index), "2": "2"}.get(form, form)
     options = replace(options, attributes={**options.attributes, "index": name})
     with claimed(Path(options.output).resolve()):

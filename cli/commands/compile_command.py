@@ -1,12 +1,12 @@
-"""`sysdyn compile`: the residual module and its manifest, or a stage on the way there."""
+"""`sysdyn compile`: the files of a model that others call, or a stage on the way there."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.export import files, layout
 from sysdyn.cli.options import chosen
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.run import targets
@@ -19,6 +19,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.model.failures import NoSuchForm
 
 STAGES = ("network", "reflected", "coordinates", "energies", "descriptor", "program")
 
@@ -26,7 +27,7 @@ STAGES = ("network", "reflected", "coordinates", "energies", "descriptor", "prog
 @with_console("compile")
 @click.argument("file")
 @chosen
-@click.option("-o", "folder", metavar="DIR", help="Where residual.c (or .py) and manifest.json go. Default: here.")
+@click.option("-o", "folder", metavar="DIR", help="Where the files go. Default: here.")
 @click.option("--dump", type=click.Choice(STAGES), help="Print a stage.")
 @click.option("--explain", is_flag=True, help="List what was pruned, integrated and inverted, and why.")
 def command(
@@ -43,9 +44,12 @@ def command(
     dump: str | None,
     explain: bool,
 ) -> int:
-    """Compile the model of FILE: write DIR/residual.c (or .py) and DIR/manifest.json."""
+    """Compile the model of FILE, of a scene where one is named, to files that anyone can call.
+
+    DIR/residual.c and binding.c (or residual.py), sysdyn_model.h, binding.json, manifest.json.
+    """
     document = targets.read(file, console.report)
-    target = targets.one(document, file, model, scene, console.report)
+    target = targets.whole(document, file, model, scene, console.report)
     if target is None:
         return console.finish(1)
     with ex.fresh():
@@ -72,8 +76,8 @@ def command(
                 "program": lambda: program_text.show(prepared.compiled.program),
             }
             console.data(stages[dump]())
-        if (dump is None or folder is not None) and not _write(console, prepared, Path(folder or "."), index):
-            return console.finish(1)
+        if dump is None or folder is not None:
+            _write(console, prepared, index, Path(folder or "."))
     if explain:
         console.say(_account(prepared))
     console.explain = explain
@@ -90,24 +94,20 @@ def _account(prepared: Prepared) -> str:
     return aligned(rows) if rows else "coordinate style: nothing was merged or pruned"
 
 
-def _write(console: Console, prepared: Prepared, folder: Path, index: str | None) -> bool:
-    """Write module and manifest; False after E607 where another index form than the text's own is asked for."""
+def _write(console: Console, prepared: Prepared, index: str | None, folder: Path) -> None:
+    """The files of one index form; nothing where the model has no start or no such form."""
     scene = prepared.network.scene
     t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
     started = start(prepared, t0, console.report)
-    own = None if started is None else started.facts.index
-    if index not in (None, "auto") and own is not None and index != str(own):
-        place = prepared.network.place
-        message = f"compile --index {index}: the module holds the form as written, whose index is {own}"
-        help_ = f"--index {own}; simulate --index {index} assembles that form"
-        console.report.error("E607", message, place, help=help_)
-        return False
-    folder.mkdir(parents=True, exist_ok=True)
-    manifest = {**prepared.manifest, "index": started.facts.index if started else None}
-    text = folder / ("residual.c" if prepared.backend == "c" else "residual.py")
-    text.write_text(prepared.compiled.text, encoding="utf-8")
-    (folder / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
-    console.result = manifest
-    lines = prepared.compiled.text.count("\n")
-    console.say(f"{text}: {lines} lines; {folder / 'manifest.json'}")
-    return True
+    if started is None or console.report.failed:
+        return
+    try:
+        formed = layout.choose(prepared, started, index)
+        console.result = files.write(formed, folder)
+    except NoSuchForm as error:
+        console.report.error("E607", str(error), prepared.network.place)
+        return
+    for text in formed.warnings:
+        console.report.note("N608", text, prepared.network.place)
+    names = "residual.c, binding.c" if prepared.backend == "c" else "residual.py"
+    console.say(f"{folder}: {names}, binding.json, sysdyn_model.h, manifest.json; index {formed.index}")

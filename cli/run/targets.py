@@ -70,6 +70,18 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
         return one(document, path, model, scenes[0].name.name, report)
     if scenes:
         raise UsageError(f"{path} has several scenes: --scene {' | '.join(s.name.name for s in scenes)}")
+    return whole(document, path, model, None, report)
+
+
+def whole(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
+    """The scene that is named, else a model by itself: the one named, or the only one there is.
+
+    None where its text has errors; UsageError with the list where there are several models and none is named.
+    """
+    if scene is not None:
+        return one(document, path, model, scene, report)
+    if model is not None and model not in document.models:
+        raise _nothing(document, path, "model", model, list(document.models), report)
     names = [model] if model is not None else list(document.models)
     if len(names) == 1:
         return Target(document, document.models[names[0]], None)

@@ -89,7 +89,7 @@ def bind(
     starts = _starts(form, owners, parameters)
     offsets = _offsets(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)
-    ix = [_integer(slot, owners, parameters, where, network) for slot in program.slots]
+    ix = [integer(slot, owners, parameters, where, network) for slot in program.slots]
     rows = {(r.owner, r.block): k for k, r in enumerate(form.rows)}
     constants = tuple((rows[o.label, "phi"], where[o.name], offsets[o.name].size) for o in form.offsets)
     return Binding(
@@ -214,7 +214,16 @@ def _layout(
     return np.concatenate(parts), where
 
 
-def _integer(
+def places_of(
+    network: Network, form: DescriptorForm, program: Program, binding: Binding
+) -> tuple[dict[str, Extents], dict[str, int]]:
+    """Ranges of the indices by owner; where arrays, constants of integrated rows and tables begin in p."""
+    owners = _owners(form, binding.parameters)
+    offsets = _offsets(form, owners, binding.initial, binding.parameters)
+    return owners, _layout(program, network, binding.parameters, offsets)[1]
+
+
+def integer(
     slot: Slot, owners: dict[str, Extents], parameters: Parameters, where: dict[str, int], network: Network
 ) -> int:
     """The value of a slot (see `integers`)."""

@@ -29,11 +29,11 @@ def structure(form: DescriptorForm, program: Program) -> dict[str, Any]:
 
 def _family(family: Unknowns) -> dict[str, Any]:
     plain = {"name": family.name, "kind": family.kind, "owner": family.owner, "unit": family.unit}
-    return {**plain, "nominal": None, **_where(family.place)}
+    return {**plain, "nominal": None, **where(family.place)}
 
 
 def _row(row: Equations) -> dict[str, Any]:
-    found = {"block": row.block, "label": row.label, "owner": row.owner, "kind": row.kind, **_where(row.place)}
+    found = {"block": row.block, "label": row.label, "owner": row.owner, "kind": row.kind, **where(row.place)}
     found |= {"unit": row.unit, "rate": row.rate}
     if row.block == "observe":
         found |= {"name": row.label, "stored": row.stored}
@@ -42,7 +42,8 @@ def _row(row: Equations) -> dict[str, Any]:
     return found
 
 
-def _where(place: Place | None) -> dict[str, Any]:
+def where(place: Place | None) -> dict[str, Any]:
+    """File and line of a place, for an entry."""
     return {"file": place.file if place else None, "line": place.start[0] if place else None}
 
 
@@ -94,8 +95,8 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, float) else value.tolist()
 
 
-def _named(name: str, box: Extents) -> dict[str, Any]:
-    """name[first..last] with its shape; the name alone for a scalar."""
+def named(name: str, box: Extents) -> dict[str, Any]:
+    """The entry of a family: name[first..last] with its shape; the name alone for a scalar."""
     if not box:
         return {"name": name}
     inside = ", ".join(f"{first}..{last}" for first, last in box)
@@ -115,13 +116,15 @@ _REFLECTED = {"q": "p", "f": "e", "p": "q", "e": "f"}
 """Letters of the complementary family for those of the reflection that it is lowered from."""
 
 
-def _letter(kind: str, form: DescriptorForm) -> str:
-    return _REFLECTED.get(kind, kind) if form.formulation.startswith("co_") else kind
+def letter(formulation: str, kind: str) -> str:
+    """The kind of an unknown in the letters of its family: the q of co_lagrangian is a momentum p."""
+    return _REFLECTED.get(kind, kind) if formulation.startswith("co_") else kind
 
 
-def _word(name: str, kind: str, form: DescriptorForm) -> str:
-    """A name with its family's letter: x.p of the reflection is x.q."""
-    return f"{name[:-2]}.q" if kind == "p" and form.formulation.startswith("co_") and name.endswith(".p") else name
+def spelled(formulation: str, name: str, kind: str) -> str:
+    """A name with its family's letter: x.p of the reflection is x.q, law.e law.f."""
+    own = formulation.startswith("co_") and kind in ("p", "e") and name.endswith(f".{kind}")
+    return f"{name[:-2]}.{_REFLECTED[kind]}" if own else name
 
 
 def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[dict[str, Any]]:
@@ -135,8 +138,8 @@ def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[
     for k, family in enumerate(form.families):
         if family.kind != "audit":
             moves = family.kind == "q" or k in moving
-            plain = {"kind": _letter(family.kind, form), "unit": family.unit, "differential": moves}
-            found.append({**_named(_word(family.name, family.kind, form), binding.shapes[k]), **plain})
+            plain = {"kind": letter(form.formulation, family.kind), "unit": family.unit, "differential": moves}
+            found.append({**named(spelled(form.formulation, family.name, family.kind), binding.shapes[k]), **plain})
     return found
 
 
@@ -145,13 +148,13 @@ def _rows(form: DescriptorForm, binding: Binding) -> list[dict[str, Any]]:
     found = []
     for k, family in enumerate(form.families):
         if family.kind == "q":
-            found.append({**_label(family.name, binding.shapes[k]), "kind": "kinematic", **_where(family.place)})
+            found.append({**_label(family.name, binding.shapes[k]), "kind": "kinematic", **where(family.place)})
     for k, row in enumerate(form.rows):
         if row.block in ("dynamics", "momentum", "phi", "psi", "gamma", "lambda"):
-            found.append({**_label(row.label, binding.row_shapes[k]), "kind": row.kind, **_where(row.place)})
+            found.append({**_label(row.label, binding.row_shapes[k]), "kind": row.kind, **where(row.place)})
     return found
 
 
 def _label(name: str, box: Extents) -> dict[str, Any]:
-    named = _named(name, box)
-    return {"label": named.pop("name"), **named}
+    said = named(name, box)
+    return {"label": said.pop("name"), **said}

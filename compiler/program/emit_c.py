@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.integers import Reference
-from sysdyn.compiler.program.emit_c_support import HEAD, SUPPORT
+from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
 from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
 
@@ -27,13 +27,13 @@ _FUNCTIONS = {
 _BOOLEAN = ("cmp", "and", "or", "not")
 
 
-def emit_c(program: Program, form: DescriptorForm) -> str:
-    """The C text of a program."""
+def emit_c(program: Program, form: DescriptorForm, head: str = HEAD) -> str:
+    """The C text of a program; head: what declares the contract's frame."""
     bodies = [_routine(k, routine, form) for k, routine in enumerate(program.routines)]
     text = "\n".join(bodies)
     used = [code for name, code in SUPPORT if f"{name}(" in text]
     blocks = [_block(name, part, program) for name in program.blocks() for part in ("rows", "dy", "dyd")]
-    return "\n".join([HEAD, *used, text, *(b for b in blocks if b)])
+    return "\n".join([head, APART, *used, text, *(b for b in blocks if b)])
 
 
 def _loop(k: int) -> str:

@@ -15,8 +15,9 @@ typedef struct sd_frame {
 } sd_frame;
 
 const int sd_contract = 1;
+"""
 
-/* a function called once would be inlined, and all of a large model become one function */
+APART = """/* a function called once would be inlined, and all of a large model become one function */
 #if defined(__GNUC__)
 #define SD_APART __attribute__((noinline))
 #else

@@ -56,6 +56,13 @@ def _span(first, last):
     return np.arange(first[some].min(initial=2**31), last[some].max(initial=-1) + 1)
 
 
+def _add(r, where, value):
+    """r[where] += value where places recur; ten times as fast as np.add.at."""
+    first = where.min()
+    found = np.bincount(where - first, np.broadcast_to(value, where.shape))
+    r[first : first + len(found)] += found
+
+
 def _table(x, n, u, order):
     k = np.searchsorted(x[:n], u, side="right")
     c = x[n : 5*n + 4].reshape(n + 1, 4)[k]
@@ -100,11 +107,11 @@ _FOLDS = {"sum": "np.sum", "prod": "np.prod", "min": "np.min", "max": "np.max"}
 _START = {"sum": "0.0", "prod": "1.0", "min": "np.inf", "max": "-np.inf"}
 
 
-def emit_numpy(program: Program, form: DescriptorForm) -> str:
-    """The Python text of a program."""
-    texts = [_Writer(k, r).text(form) for k, r in enumerate(program.routines)]
-    blocks = [_block(name, part, program) for name in program.blocks() for part in ("rows", "dy", "dyd")]
-    return "\n\n".join([HEAD, *texts, *(b for b in blocks if b)])
+def emit_numpy(program: Program, form: DescriptorForm, head: str = HEAD, first: int = 0) -> str:
+    """The Python text of a program; first: number of its first function, behind those of a text before it."""
+    texts = [_Writer(k, r).text(form) for k, r in enumerate(program.routines, first)]
+    blocks = [_block(name, part, program, first) for name in program.blocks() for part in ("rows", "dy", "dyd")]
+    return "\n\n".join([head, *texts, *(b for b in blocks if b)])
 
 
 def _operand(value: Operand) -> str:
@@ -180,11 +187,18 @@ class _Writer:
         if not isinstance(s.place, Reference):
             return f"v[:, {s.place}] = {value}" if self.depth else f"v[o + {s.place}] = {value}"
         where, kind = self.where(s.place, f"to[{s.place.family}]")
+        if kind == "array" and self._apart(s.place):
+            return f"r[{where}] += {value}"
         if kind == "array":
-            return f"np.add.at(r, {where}, {value})"
+            return f"_add(r, {where}, {value})"
         if kind == "scalar" and self.depth:
             return f"r[{where}] += np.sum(np.broadcast_to({value}, (n,)))"
         return f"r[{where}] += {value}"
+
+    def _apart(self, place: Reference) -> bool:
+        """Whether no two iterations have one place: each loop moves an index of its own."""
+        moved = [index.loop for index in place.indices if index.loop >= 0]
+        return sorted(moved) == list(range(self.depth))
 
     def where(self, place: Reference | Element, head: str) -> tuple[str, str]:
         """The index text of a place and whether it is a scalar, a slice or an array."""
@@ -265,7 +279,7 @@ def _table(s: Assign, args: list[str]) -> str:
     return f"_table2({where}, {args[0]}, {args[1]}, {orders[0]}, {orders[1]})"
 
 
-def _block(name: str, part: str, program: Program) -> str:
+def _block(name: str, part: str, program: Program, first: int) -> str:
     """The exported function of a block's part: its routines in order."""
     numbers = [k for k, r in enumerate(program.routines) if r.block == name and r.part == part]
     if not numbers:
@@ -274,10 +288,10 @@ def _block(name: str, part: str, program: Program) -> str:
     lines = [f"def {name}_{part}(p, ix, at, to, t, y, yd, {out}):", "    t = np.float64(t)"]
     lines.append("    with np.errstate(all='ignore'):")
     if out == "r":
-        lines += [f"        _f{k}(p, ix, at, to, t, y, yd, r)" for k in numbers]
+        lines += [f"        _f{first + k}(p, ix, at, to, t, y, yd, r)" for k in numbers]
         return "\n".join([*lines, ""])
     lines.append("        o = 0")
     for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
         same = later >= 0 and program.routines[later].kernel == program.routines[k].kernel
-        lines.append(f"        {'' if same else 'o = '}_f{k}(p, ix, at, to, t, y, yd, v, o)")
+        lines.append(f"        {'' if same else 'o = '}_f{first + k}(p, ix, at, to, t, y, yd, v, o)")
     return "\n".join([*lines, ""])

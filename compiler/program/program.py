@@ -13,6 +13,7 @@ from typing import Any
 
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, Block, DescriptorForm, Kernel
 from sysdyn.compiler.model.integers import Index, Integers, Reference, Slot
+from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, derivative, is_const, linear, topological, variables
 
 Operand = int | float  # the number of an assignment, or a constant
@@ -113,11 +114,11 @@ class Programmer:
         self.tables: dict[str, None] = {}
         self.routines: list[Routine] = []
 
-    def bounds(self, kernel: Kernel) -> tuple[tuple[Index, Index], ...]:
+    def bounds(self, nest: Nest) -> tuple[tuple[Index, Index], ...]:
         """The loops of a kernel; a bound that no outer loop enters is one slot."""
         loops: dict[str, int] = {}
         found = []
-        for depth, loop in enumerate(kernel.nest):
+        for depth, loop in enumerate(nest):
             found.append((self.bound(loop.first, loops), self.bound(loop.last, loops)))
             loops[f"#{depth}"] = depth
         return tuple(found)
@@ -136,7 +137,7 @@ class Programmer:
     def kernel(self, block: str, number: int, kernel: Kernel) -> Pattern:
         """Routines and pattern of one kernel."""
         loops = {f"#{k}": k for k in range(len(kernel.nest))}
-        bounds = self.bounds(kernel)
+        bounds = self.bounds(kernel.nest)
         places = tuple(self.integers.reference(s.row, self.form.rows[s.row].owner, s.at, loops) for s in kernel.rows)
         rows = [s.row for s in kernel.rows]
         pieces = [(k, piece) for k, s in enumerate(kernel.rows) for piece in _pieces(s.expression)]
@@ -149,6 +150,10 @@ class Programmer:
             numbered: list[tuple[Reference | int, Node]] = [(k, e.value) for k, e in enumerate(entries)]
             self._cut((block, part, number), bounds, numbered, [rows[e.row] for e in entries], len(entries))
         return Pattern(bounds, places, found["dy"], found["dyd"])
+
+    def formula(self, block: str, number: int, nest: Nest, expression: Node) -> None:
+        """One value an iteration, in the order of the iterations (formulas.py)."""
+        self._cut((block, "dy", number), self.bounds(nest), [(0, expression)], [-1], 1)
 
     def _cut(
         self,
@@ -163,7 +168,8 @@ class Programmer:
         body, touched = _Body(self, len(bounds)), dict[int, None]()
         for k, ((place, root), row) in enumerate(zip(outputs, rows, strict=True), 1):
             body.store(place, root)
-            touched[row] = None
+            if row >= 0:
+                touched[row] = None
             full = not bounds and (k % size == 0 or len(body.statements) >= STATEMENTS_A_ROUTINE)
             if full or k == len(outputs):
                 self.routines.append(Routine(*what, bounds, tuple(body.statements), entries, tuple(touched)))

@@ -8,12 +8,13 @@ empty): where coordinates without inertia are determined by constraints, and imp
 from __future__ import annotations
 
 import ctypes as c
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.forms import Planned
 from sysdyn.runtime.model.patterns import Pattern
@@ -27,6 +28,27 @@ DENSE = 300
 """Unknowns up to which the matrix is judged by its singular values."""
 _DERIVED = {"phi": "phi_acceleration", "phi_rate": "phi_acceleration", "psi": "psi_rate", "momentum": "momentum_rate"}
 """Block of a constraint -> block of form 0 in whose rows its residual stands in a projection."""
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What of form 0 is solved for the slopes (core/underlying.h).
+
+    unknown, rate [solved]; column [unknowns]; pattern, source, from_rate [entries] of the matrix, order of its columns;
+    direct: it does not depend on what is solved for; silent: calls whose dF/dy does not stand in the matrix; applied:
+    calls that are no reactions.
+    """
+
+    unknown: Ints
+    rate: Ints
+    column: Ints
+    pattern: Pattern
+    source: Ints
+    from_rate: Ints
+    order: Ints
+    direct: bool
+    silent: tuple[int, ...]
+    applied: tuple[int, ...]
 
 
 class Underlying:
@@ -117,6 +139,23 @@ class Underlying:
             calls=len(found),
             call=c.addressof(calls),
             stop=system.core.stop,
+        )
+
+    @property
+    def selection(self) -> Selection:
+        """The tables of the core's structure."""
+        calls = range(len(self.system.form.calls))
+        return Selection(
+            self._unknown,
+            self._rate,
+            self._column,
+            self.pattern,
+            self._source,
+            self._from_rate,
+            np.zeros(0, dtype=np.int32) if self._order is None else self._order,
+            self._direct,
+            tuple(k for k in calls if self._calls[k].n_dy == 0),
+            tuple(k for k in calls if not self.system.form.calls[k].block.endswith("_reaction")),
         )
 
     @property

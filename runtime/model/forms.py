@@ -125,7 +125,18 @@ def unknown_name(description: Description, form: Form, place: int) -> str:
     for k, family in enumerate(description.families):
         if family.kind != "audit" and form.at[k] <= place < form.at[k] + family.size:
             return element(family.name, family.shape, place - int(form.at[k]))
-    return f"nu[{place - form.written}]"
+    place -= form.written
+    for k in description.families_of("kappa"):
+        family = description.families[k]
+        if place < family.size:
+            return element(nu_name(family.name), family.shape, place)
+        place -= family.size
+    raise ContractError(f"there is no unknown {place} behind the multipliers nu")
+
+
+def nu_name(kappa: str) -> str:
+    """The name of the multiplier nu beside a kappa: rod.nu beside rod.multiplier."""
+    return f"{kappa.removesuffix('.multiplier')}.nu"
 
 
 def _layout(description: Description) -> tuple[Ints, list[str], int]:

@@ -111,6 +111,7 @@ class System:
         cleared = np.flatnonzero(np.isin(self.pattern.row, held[0])).astype(np.int32)
         held_row, held_unknown = (item.astype(np.int32) for item in held)
         self._keep += [calls, slots, cleared, held_row, held_unknown]
+        self.held = held_row, held_unknown
         self.core = lib.System(
             unknowns=form.unknowns,
             rows=form.rows,
@@ -157,6 +158,11 @@ class System:
             slot_dy=lib.pointer(dy),
             slot_dyd=lib.pointer(dyd),
         )
+
+    @property
+    def slots(self) -> list[Ints]:
+        """Places in the pattern of entries: of q', of f in the rows q' - f; dy, dyd of each call; of held rows."""
+        return self._slots
 
     def slots_dy(self, call: int) -> Ints:
         """Places in the pattern of the entries that a call adds to dF/dy."""

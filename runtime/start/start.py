@@ -25,6 +25,13 @@ _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
 _FEW = 3
 """Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
+STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
+    (("phi",), ("q",)),
+    (("phi_rate", "psi"), ("f",)),
+    (("momentum",), ("p",)),
+    (("phi", "phi_rate", "psi", "momentum"), STATE),
+)
+"""Groups of rows, and the kinds of unknowns that are moved onto them, one after the other."""
 EXACT = 1e-9
 OWN = 1e-6
 BACK = 1e-9
@@ -78,12 +85,7 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
     What follows from the state moves alone where that is enough.
     """
-    for groups, moving in (
-        (("phi",), ("q",)),
-        (("phi_rate", "psi"), ("f",)),
-        (("momentum",), ("p",)),
-        (("phi", "phi_rate", "psi", "momentum"), STATE),
-    ):
+    for groups, moving in STAGES:
         rows, may = starter.groups(*groups), free & np.isin(starter.moving, moving)
         for use in (rows | starter.between(moving), rows):
             if not use.any() or not may.any():

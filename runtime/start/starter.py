@@ -171,6 +171,11 @@ class Starter:
         values[self._sums.entries] = 0.0
         return np.concatenate([values, summed.ravel()])
 
+    @property
+    def summed(self) -> bool:
+        """Whether rows hold sums of rows (balances of what floats)."""
+        return self._sums is not None
+
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups."""
         return _of_groups(self.settled, names)

@@ -57,7 +57,6 @@ def test_without_arguments_the_help_is_shown(capsys):
         (["simulate", "two.sd"], "--scene swing | again"),
         (["simulate", "two.sd", "--scene", "swin"], "nearest: 'swing'"),
         (["simulate", "two.sd", "--model", "pend"], "has no model 'pend'"),
-        (["compile", "two.sd"], "--scene swing | again"),
         (["simulate", "bare.sd"], "--until is needed"),
         (["simulate", "empty.sd"], "has no model"),
         (

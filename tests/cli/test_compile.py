@@ -11,7 +11,9 @@ from texts import ARRAY, BROKEN, PENDULUM, write
 @pytest.mark.parametrize(("backend", "name"), [("c", "residual.c"), ("numpy", "residual.py")])
 def test_files(tmp_path, backend, name):
     assert run(["compile", "-q", write(tmp_path, PENDULUM), "--backend", backend, "-o", "a/b"]) == 0
-    assert sorted(path.name for path in Path("a/b").iterdir()) == ["manifest.json", name]
+    more = ["binding.c"] if backend == "c" else []
+    names = ["binding.json", "manifest.json", "sysdyn_model.h", name, *more]
+    assert sorted(path.name for path in Path("a/b").iterdir()) == sorted(names)
     manifest = json.loads(Path("a/b/manifest.json").read_text())
     for key in ("version", "model", "scene", "formulation", "index", "unknowns", "rows", "parameters"):
         assert key in manifest

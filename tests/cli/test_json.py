@@ -64,7 +64,7 @@ def test_compile(tmp_path, capsys):
     assert code == 0
     envelope(found, "compile", MANIFEST)
     manifest = found["result"]
-    assert (manifest["model"], manifest["scene"], manifest["index"]) == ("pendulum", "swing", 3)
+    assert (manifest["model"], manifest["scene"], manifest["index"]) == ("pendulum", None, 2)
     for schema, key in ((UNKNOWN, "unknowns"), (ROW, "rows"), (PARAMETER, "parameters")):
         assert manifest[key]
         for item in manifest[key]:

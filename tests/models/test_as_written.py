@@ -371,7 +371,9 @@ def test_the_manifest_s_values_are_in_its_units(tmp_path):
     assert units["knife.multiplier"] == "W/(m/s)"
     with pytest.raises(SystemExit) as ended:
         main(["compile", str(tmp_path / "m.sd"), "--scene", "s", "-o", str(tmp_path), "--index", "3", "--quiet"])
-    assert ended.value.code == 1
+    assert ended.value.code == 0  # as written, whatever its index
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert (manifest["index"], manifest["index_form"]) == (2, "3")
 
 
 # -- singular starts ---------------------------------------------------------------------------------------

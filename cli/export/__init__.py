@@ -1,0 +1,1 @@
+"""What `compile` writes: files that anyone can call, without sysdyn on the path."""

@@ -1,0 +1,112 @@
+"""Unknowns, rows and outputs of an index form by name, in the letters of their family.
+
+Inside, the complementary forms are the primal ones on a reflected network, with the primal letters; outside an effort
+is e, a momentum p, a displacement q, whatever the form.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.export.layout import Formed
+from sysdyn.cli.export.tables import Tables
+from sysdyn.compiler.binding.manifest import letter, named, spelled, where
+from sysdyn.runtime.model.description import BASE
+from sysdyn.runtime.model.forms import nu_name
+
+_ROWS = {"momentum": "displacement"}
+
+
+def row_kind(formulation: str, group: str) -> str:
+    """The kind of a row: block, or the derivative of one (phi_rate)."""
+    base, mark, rest = group.partition("_")
+    return f"{_ROWS[base]}{mark}{rest}" if formulation.startswith("co_") and base in _ROWS else group
+
+
+def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
+    """Families of unknowns in the order of y; si: with the place of the first and its size."""
+    form, system = formed.prepared.compiled.form, formed.system
+    formulation, families = formed.prepared.formulation, formed.system.description.families
+    state = system.form.name == "0"
+    y, yd = formed.state.for_form(system)
+    moving = system.differential(system.jacobian(formed.state.t, y, yd)[1])
+    found: list[dict[str, Any]] = []
+    place = 0
+    for k, family in enumerate(families):
+        if family.kind == "audit" or (state and family.kind not in ("q", "f", "p", "s")):
+            continue
+        first = int(system.form.at[k])
+        differential = state or family.kind == "q" or bool(np.any(moving[first : first + family.size]))
+        kind = letter(formulation, family.kind)
+        name = spelled(formulation, family.name, family.kind)
+        plain = {"kind": kind, "unit": form.families[k].unit, "differential": differential}
+        found.append({**named(name, family.shape), **plain, **(_at(place, family.size) if si else {})})
+        place += family.size
+    for k in system.description.families_of("kappa") if system.unknowns > system.form.written else ():
+        family = families[k]
+        plain = {"kind": "nu", "unit": _nu_unit(formed, k), "differential": False}
+        found.append({**named(nu_name(family.name), family.shape), **plain, **(_at(place, family.size) if si else {})})
+        place += family.size
+    return found
+
+
+def _nu_unit(formed: Formed, kappa: int) -> str:
+    """The unit of the nu beside a kappa: q' = f - Phi_q^T nu; "" where displacements differ in unit and it has none."""
+    description = formed.system.description
+    units = {description.families[k].unit for k in description.families_of("q")}
+    owner = description.families[kappa].owner
+    of_phi = {row.unit for row in description.rows if row.block == "phi" and owner in (row.owner, row.label)}
+    return f"({units.pop()})^2/(s.({of_phi.pop()}))" if len(units) == len(of_phi) == 1 else ""
+
+
+def _at(place: int, size: int) -> dict[str, int]:
+    return {"place": place, "size": size}
+
+
+def elements(formed: Formed) -> tuple[str, ...]:
+    """The name of every unknown, in the order of y."""
+    formulation, system = formed.prepared.formulation, formed.system
+    names: list[str] = []
+    for place in range(system.unknowns):
+        family = int(system.family_of[place])
+        kind = str(system.kinds[place])
+        if system.form.name == "0" and kind not in ("q", "f", "p", "s"):
+            continue
+        name = system.name(place)
+        if family >= 0 and formulation.startswith("co_"):
+            head, bracket, index = name.partition("[")
+            name = spelled(formulation, head, kind) + bracket + index
+        names.append(name)
+    return tuple(names)
+
+
+def rows(formed: Formed) -> list[dict[str, Any]]:
+    """Families of rows in the order of r: q' = f first, then the groups of the form."""
+    form, system, formulation = formed.prepared.compiled.form, formed.system, formed.prepared.formulation
+    families = system.description.families
+    found: list[dict[str, Any]] = []
+    if system.form.name == "0":
+        for k, family in enumerate(families):
+            if family.kind in ("q", "f", "p", "s"):
+                found.append({**_label(family.name, family.shape), "kind": "slope", **where(form.families[k].place)})
+        return found
+    for k, family in enumerate(families):
+        if family.kind == "q" and system.form.k_row.size:
+            found.append({**_label(family.name, family.shape), "kind": "kinematic", **where(form.families[k].place)})
+    for group, k, _ in system.form.groups:
+        row = form.rows[k]
+        shape = system.description.rows[k].shape
+        kind = row_kind(formulation, group if group in BASE else row.kind)
+        found.append({**_label(row.label, shape), "kind": kind, **where(row.place)})
+    return found
+
+
+def _label(name: str, shape: tuple[tuple[int, int], ...]) -> dict[str, Any]:
+    said = named(name, shape)
+    return {"label": said.pop("name"), **said}
+
+
+def outputs(tables: Tables) -> list[dict[str, Any]]:
+    """Traced quantities in the order of w; row: of block observe."""
+    return [{"name": output.name, "unit": output.unit, "row": output.place} for output in tables.outputs]

@@ -1,0 +1,65 @@
+"""The tables by which an exported model finds a start at other parameters than those it was bound to.
+
+The problem is that of runtime/start: unknowns, rows, weights and stages are the starter's own at the known start; what
+is given anew are the initial values, by formulas.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.cli.export.tables import Stage, Start, assembled
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import STAGES, ConsistentState
+from sysdyn.runtime.start.starter import Mask, Starter, problem_of
+
+LARGEST = 1500
+"""Unknowns and rows up to which a start is sought outside: with full matrices."""
+
+
+def start_tables(system: System, state: ConsistentState) -> Start | None:
+    """The problem of a start; None where it is too large, or has rows that only the runtime forms."""
+    starter = Starter(system, measuring=True)
+    if starter.summed or max(starter.first + starter.missed.size, starter.settled.rows) > LARGEST:
+        return None
+    x = np.concatenate([state.y, state.yd[starter.rates], np.zeros(starter.missed.size)])
+    x[starter.first :] = starter.residual(state.t, x)[starter.missed]
+    free = np.append(~starter.given.fixed, np.ones(x.size - starter.n, dtype=bool))
+    problem = problem_of(starter, state.t, x, x, rows=starter.every, free=free)
+    return Start(
+        assembled(starter.settled),
+        starter.n,
+        starter.rates.astype(np.int32),
+        starter.missed.astype(np.int32),
+        np.flatnonzero(starter.given.written).astype(np.int32),
+        starter.system.form.k_q,
+        starter.system.form.k_f,
+        problem.scale,
+        problem.weight,
+        tuple(_stages(starter, state.t, x, free)),
+    )
+
+
+def _stages(starter: Starter, t: float, x: Floats, free: Mask) -> list[Stage]:
+    """The stages of `runtime/start/start.py`, in their order."""
+    follows = starter.following(t, x)
+    found = []
+    written = starter.guessed & ~starter.unsaid
+    if written.any():
+        rows = written | starter.groups("phi", "psi")
+        found.append(Stage(((_places(rows), _places(free & (np.arange(free.size) < starter.n))),), guess=True))
+    for groups, moving in STAGES:
+        rows, may = starter.groups(*groups), free & np.isin(starter.moving, moving)
+        trials = []
+        for use in (rows | starter.between(moving), rows):
+            if use.any() and may.any():
+                trials += [(_places(use), _places(may & follows)), (_places(use), _places(may))]
+        if trials:
+            found.append(Stage(tuple(trials)))
+    every = _places(starter.every)
+    found.append(Stage(((every, _places(free & follows)), (every, _places(free)))))
+    return found
+
+
+def _places(mask: Mask) -> Ints:
+    return np.flatnonzero(mask).astype(np.int32)

@@ -1,0 +1,180 @@
+"""The numbers of an exported model: everything that binding.json and binding.c print, as frozen values.
+
+A compiled module holds blocks; which of them stand where is an index form.  The tables of one form are taken from the
+runtime's own `System`, so that what is called outside is assembled as it is inside, entry by entry.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate.underlying import Selection
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.system import System
+
+NOTHING: Ints = np.zeros(0, dtype=np.int32)
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A block with its tables at, to, and the places in the pattern of its entries."""
+
+    block: str
+    at: Ints
+    to: Ints
+    dy: Ints
+    dyd: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Assembled:
+    """One index form (core/assembly.h): sizes, pattern by compressed columns, calls, rows q' - f, held rows."""
+
+    unknowns: int
+    rows: int
+    extended: int
+    column: Ints
+    row: Ints
+    calls: tuple[Call, ...]
+    k_row: Ints
+    k_q: Ints
+    k_f: Ints
+    k_slot_q: Ints
+    k_slot_f: Ints
+    held_row: Ints
+    held_unknown: Ints
+    held_slot: Ints
+    cleared: Ints
+
+    @property
+    def entries(self) -> int:
+        """Places of the pattern."""
+        return int(self.row.size)
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One step of a start: rows that hold, unknowns that may move; tried one after the other until one succeeds.
+
+    guess: the solution is the guess of what follows.
+    """
+
+    trials: tuple[tuple[Ints, Ints], ...]
+    guess: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """How a consistent start is sought at other parameters: x = (y, yd at `rates`, what the rows `missed` miss).
+
+    scale, weight [x]: how far x moves from its guess is measured by weight/scale; initial: places of y that the text
+    gives; k_q, k_f: q' = f.
+    """
+
+    system: Assembled
+    written: int
+    rates: Ints
+    missed: Ints
+    initial: Ints
+    k_q: Ints
+    k_f: Ints
+    scale: Floats
+    weight: Floats
+    stages: tuple[Stage, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Index form 0: the differential unknowns of the full layout, and what is solved for (core/underlying.h).
+
+    column, row: pattern of dF/dy + cj dF/dyd, from the components of the matrix.
+    """
+
+    places: Ints
+    selection: Selection
+    column: Ints
+    row: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """A traced quantity: its name, unit (SI), row of block observe."""
+
+    name: str
+    unit: str
+    place: int
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Values that follow from given parameters (compiler/binding/following.py); target: place in p or y."""
+
+    block: str
+    kind: str
+    entries: int
+    source: NDArray[np.int64]
+    target: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """All of one exported model.
+
+    y0, yd0, scale, differential [unknowns of the form]; full_y, full_yd [unknowns of the layout as assembled]; written:
+    unknowns as written, before the multipliers nu; at [families]: where they begin; audit_at [6]: places behind y.
+    """
+
+    form: str
+    t0: float
+    p: Floats
+    ix: Ints
+    following_ix: Ints
+    y0: Floats
+    yd0: Floats
+    full_y: Floats
+    full_yd: Floats
+    scale: Floats
+    differential: Ints
+    written: int
+    at: Ints
+    system: Assembled
+    state: State | None
+    start: Start | None
+    groups: tuple[Group, ...]
+    structural: Ints
+    outputs: tuple[Output, ...]
+    observe: Call | None
+    observed: int
+    audit: Call | None
+    audited: int
+    audit_at: Ints
+
+
+def assembled(system: System) -> Assembled:
+    """The tables of a system."""
+    form, slots = system.form, system.slots
+    calls = tuple(
+        Call(planned.block, planned.at, planned.to, slots[2 * k + 2], slots[2 * k + 3])
+        for k, planned in enumerate(form.calls)
+    )
+    held_row, held_unknown = system.held
+    cleared = np.flatnonzero(np.isin(system.pattern.row, held_row)).astype(np.int32)
+    return Assembled(
+        form.unknowns,
+        form.rows,
+        form.extended,
+        system.pattern.column,
+        system.pattern.row,
+        calls,
+        form.k_row,
+        form.k_q,
+        form.k_f,
+        slots[0],
+        slots[1],
+        held_row,
+        held_unknown,
+        slots[-1],
+        cleared,
+    )
