@@ -34,11 +34,12 @@ def watch(prepared: Prepared) -> Watch:
 
     def of_run(names: tuple[str, ...]) -> Callable[[Floats, Floats], NDArray[np.bool_]]:
         column = {name: j for j, name in enumerate(names)}
-        open_ = {k for k, e in claims if e.moment == "always"}
+        judged = [(k, e) for k, e in claims if f"expect {k} left" in column]
+        open_ = {k for k, e in judged if e.moment == "always"}
 
         def wanted(time: Floats, values: Floats) -> NDArray[np.bool_]:
             kept = np.zeros(time.size, dtype=bool)
-            for k, e in claims:
+            for k, e in judged:
                 if e.at is not None:
                     kept |= _near(time, prepared.binding.evaluate(e.at))
                 elif k in open_:

@@ -29,7 +29,10 @@ def opened(path: str | Path, **options: Any) -> Any:
 
 def regular(path: str | Path) -> None:
     """OSError where the path is a folder, a pipe or a device: reading one may wait for ever."""
-    if not stat.S_ISREG(os.stat(path).st_mode):  # noqa: PTH116 (a Path's stat says the same)
+    mode = os.stat(path).st_mode  # noqa: PTH116 (a Path's stat says the same)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "this is a directory", str(path))
+    if not stat.S_ISREG(mode):
         raise OSError(errno.EINVAL, "this is no regular file", str(path))
 
 

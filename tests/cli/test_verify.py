@@ -124,9 +124,18 @@ def scenes():
             yield path.relative_to(MODELS).as_posix(), scene
 
 
+REFUSED = ("benchmark/ring.sd",)
+"""Scenes at which one of the methods stops with a reason: the matrix of bdf becomes singular."""
+
+
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
 def test_every_scene_agrees(file, scene, capsys):
     code, found = run_json(capsys, "verify", str(MODELS / file), "--scene", scene, "--max-wall", "60")
+    if file in REFUSED:
+        assert code == 3
+        assert not found["result"].get("disagreements")
+        assert any("the solver stopped" in d["message"] for d in found["diagnostics"])
+        return
     assert code == 0, [d["message"] for d in found["diagnostics"] if d["severity"] == "error"]
     assert found["result"]["horizon"] == found["result"]["runs"][0]["reached"]
     assert all(not r["warnings"] for r in found["result"]["runs"])

@@ -8,7 +8,7 @@ SCENE = """
 }}
 scene go of net {{
   time 0 s to 0.5 s
-  accuracy 1e-6
+  accuracy 1e-5
   trace {traced} every 0.1 s
 }}
 """

@@ -16,6 +16,8 @@ from sysdyn.runtime.trace.trace import Trace
 
 ALLOWED = 1e-5
 """Of each variable's largest magnitude, at an accuracy of 1e-6."""
+ASKED = {"rectifier_motor_crank": 3e-6}
+"""Accuracies of what does not reach 1e-6 with all values: rows between steps of steep laws are interpolated."""
 FINE = 1e-9
 FINELY_ALLOWED = 1e-8
 """At an accuracy of FINE."""
@@ -60,7 +62,7 @@ def simulated(tmp_path, model, *, formulation, times, backend="c", settings=(), 
         scene="reference",
         formulation=formulation,
         backend=backend,
-        accuracy=accuracy or 1e-6,
+        accuracy=accuracy or ASKED.get(model, 1e-6),
         at=",".join(map(repr, times)),
         settings=tuple((name, repr(value)) for name, value in settings),
         output=str(tmp_path / "trace.h5"),
@@ -197,9 +199,7 @@ def test_the_witness_meets_the_reference_values(model):
 def test_parameters_have_the_books_names_and_values(model):
     from sysdyn.api import compile_model
 
-    values = {
-        p["name"]: p["value"] for p in compile_model(SEED / f"{model}.sd", backend="numpy").manifest["parameters"]
-    }
+    values = compile_model(SEED / f"{model}.sd", scene="reference", backend="numpy").parameters
     reference = REFERENCES[model]
     for name, value in reference["parameters"].items():
         if name in INTEGRATION:

@@ -59,7 +59,7 @@ def test_library_and_module_agree_and_jacobians_are_derivatives(library, form, n
 def test_names_labels_and_kinds():
     system = System(MANIFEST, chain.binding(3), load(chain.Chain), "2")
     assert system.unknown_names[:4] == ("q_x[1]", "q_x[2]", "q_x[3]", "q_y[1]")
-    assert system.unknown_names[-1] == "nu[2]"
+    assert system.unknown_names[-1] == "kappa.nu[3]"
     assert [system.row_label(k).label for k in (0, 6, 12, 15)] == [
         "q_x[1]' = f",
         "x[1]",

@@ -50,7 +50,7 @@ class Row:
         found, report = traced(folder, self.text, at, formulation=formulation)
         if self.planned:
             assert found is None
-            assert {d.code for d in report} == {"N608"}
+            assert {d.code for d in report} == {"E608"}
             return 0.0
         assert found is not None, [f"{d.code} {d.message}" for d in report]
         span = np.linspace(0.0, self.end, 500)

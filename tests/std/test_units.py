@@ -118,7 +118,7 @@ MODELS = {
 }
 SPAN = 3.0
 SECONDS = {"1 s": 1.0, "1 ms": 1e-3, "1 min": 60.0}
-FINE = 1e-10
+FINE = 2e-10
 """Asked for: step sizes may differ from one system to another, so that traces agree as well as they are accurate."""
 
 
