@@ -18,6 +18,7 @@ from sysdyn.compiler.binding.binding import Binding, Overrides
 from sysdyn.compiler.binding.checks import check_energies
 from sysdyn.compiler.binding.counts import check_counts
 from sysdyn.compiler.forms import descriptor
+from sysdyn.compiler.forms.conjugates import with_book_signs
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.forms.floating import anchored
 from sysdyn.compiler.forms.hamiltonian import hamiltonian
@@ -146,7 +147,8 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
     with _timed("descriptor", timings):
-        form = scaled(replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation))
+        lowered = replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation)
+        form = scaled(with_book_signs(lowered))
         descriptor.verify_descriptor(form)
     with _timed("program", timings):
         program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))

@@ -11,17 +11,10 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.export.layout import Formed
 from sysdyn.cli.export.tables import Tables
-from sysdyn.compiler.binding.manifest import letter, named, spelled, where
+from sysdyn.compiler.binding.manifest import named, where
+from sysdyn.compiler.model.mirror import letter, spelled, word
 from sysdyn.runtime.model.description import BASE
 from sysdyn.runtime.model.forms import nu_name
-
-_ROWS = {"momentum": "displacement"}
-
-
-def row_kind(formulation: str, group: str) -> str:
-    """The kind of a row: block, or the derivative of one (phi_rate)."""
-    base, mark, rest = group.partition("_")
-    return f"{_ROWS[base]}{mark}{rest}" if formulation.startswith("co_") and base in _ROWS else group
 
 
 def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
@@ -97,7 +90,7 @@ def rows(formed: Formed) -> list[dict[str, Any]]:
     for group, k, _ in system.form.groups:
         row = form.rows[k]
         shape = system.description.rows[k].shape
-        kind = row_kind(formulation, group if group in BASE else row.kind)
+        kind = word(formulation, group if group in BASE else row.kind)
         found.append({**_label(row.label, shape), "kind": kind, **where(row.place)})
     return found
 

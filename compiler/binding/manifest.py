@@ -11,6 +11,7 @@ from typing import Any
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.model.integers import Index, Reference
+from sysdyn.compiler.model.mirror import letter, spelled
 from sysdyn.compiler.model.parameters import Extents
 from sysdyn.compiler.program.program import Pattern, Program
 from sysdyn.dsl.model.network import Network
@@ -110,21 +111,6 @@ def _head(name: str) -> tuple[str, str, str]:
         return name[:-1], "'", ""
     head, _, tail = name.rpartition(".")
     return head, ".", tail
-
-
-_REFLECTED = {"q": "p", "f": "e", "p": "q", "e": "f"}
-"""Letters of the complementary family for those of the reflection that it is lowered from."""
-
-
-def letter(formulation: str, kind: str) -> str:
-    """The kind of an unknown in the letters of its family: the q of co_lagrangian is a momentum p."""
-    return _REFLECTED.get(kind, kind) if formulation.startswith("co_") else kind
-
-
-def spelled(formulation: str, name: str, kind: str) -> str:
-    """A name with its family's letter: x.p of the reflection is x.q, law.e law.f."""
-    own = formulation.startswith("co_") and kind in ("p", "e") and name.endswith(f".{kind}")
-    return f"{name[:-2]}.{_REFLECTED[kind]}" if own else name
 
 
 def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[dict[str, Any]]:

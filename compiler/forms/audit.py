@@ -1,6 +1,6 @@
 """The energy audit of a form: what is stored, dissipated and supplied, in all and ledger by ledger.
 
-    T = f.dT*/df - T* (or T where given)       V       dissipated = f.dD/df
+    T = f.dT*/df - T* (or T where given)       V       dissipated = f.dD/df - E f of dissipators' works
     supplied = sum E du/dq f + kappa.Phi_t + mu.b + V_t - T*_t + T_t        (b = Psi at f = 0; _t at fixed q, f)
 
 so that d(T + V)/dt + dissipated - supplied = 0 on every solution: from (3.34), multiplied by f.  A store whose law
@@ -113,16 +113,18 @@ def _entries(model: EnergyModel) -> Iterator[Entry]:
             yield _entry("supplied", term, explicit(term.expression), moving)
     for stored in STORED:
         for term in model.function(f"kept {stored}"):
-            works = [w for w in model.works if w.kept and w.place == term.place]
+            works = [w for w in model.works if w.account == "stored" and w.place == term.place]
             owners = tuple(n.data[0] for w in works for n in _driven(w, m.coordinate))
             yield Entry(stored, (*owners, *_filling(model, term)), term.loops, term.expression, term.place)
     for term in model.function(m.content):
         yield _entry("dissipated", term, _along(term.expression, m.rate), (m.rate,))
-    for work in (w for w in model.works if not w.kept):
+    for work in (w for w in model.works if w.account != "stored"):
         driven = _driven(work, m.coordinate)
         power = [mul(derivative(work.on, q), _rate(q)) for q in driven]
         owners = tuple(n.data[0] for n in driven)
-        yield Entry("supplied", owners, work.loops, mul(work.effort, add(*power)), work.place)
+        done = mul(work.effort, add(*power))
+        lost = work.account == "dissipated"
+        yield Entry(work.account, owners, work.loops, neg(done) if lost else done, work.place)
     for row in model.rows:
         for term in row.terms if row.kind in ("phi", "psi") else ():
             still = explicit(term.expression) if row.kind == "phi" else _at_rest(term.expression, m.rate)
@@ -144,7 +146,7 @@ def _filling(model: EnergyModel, term: Term) -> Iterator[str]:
     roots += [t.expression for row in model.of_kind("lambda") if row.name in states for t in row.terms]
     implicit = {n.data[0] for root in roots for n in local_variables(root, "e")}
     for work in model.works:
-        if work.kept and any(n.data[0] in implicit for n in local_variables(work.effort, "e")):
+        if work.account == "stored" and any(n.data[0] in implicit for n in local_variables(work.effort, "e")):
             roots.append(work.on)
     for root in roots:
         yield from (n.data[0] for n in local_variables(root, (m.coordinate, m.rate, m.conjugate)))

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sysdyn.compiler.model.energies import Offset, over
+from sysdyn.compiler.model.mirror import letter, lettered, spelled, word
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, topological, variables
 from sysdyn.dsl.model.network import Shape
@@ -159,20 +160,24 @@ def _verify_summand(block: str, summand: Summand, bound: set[str], known: set[tu
 
 
 def show(form: DescriptorForm) -> str:
-    """The form as text, for --dump descriptor."""
-    lines = [f"formulation {form.formulation}"]
-    lines += [f"unknown {k}: {f.name} ({f.kind}, {f.unit})" for k, f in enumerate(form.families)]
+    """The form as text, for --dump descriptor, in the letters of its family."""
+    f = form.formulation
+    lines = [f"formulation {f}"]
+    for k, u in enumerate(form.families):
+        lines.append(f"unknown {k}: {spelled(f, u.name, u.kind)} ({letter(f, u.kind)}, {u.unit})")
     for k, r in enumerate(form.rows):
         line = f" line {r.place.start[0]}" if r.place else ""
-        lines.append(f"row {k}: {r.kind} of {r.label}{line}")
+        lines.append(f"row {k}: {word(f, r.kind)} of {r.label}{line}")
     for block in form.blocks:
-        lines.append(f"block {block.name}")
+        lines.append(f"block {word(f, block.name)}")
         for kernel in block.kernels:
             for s in kernel.rows:
                 at = f"[{', '.join(map(repr, s.at))}]" if s.at else ""
-                lines.append(f"  {over(kernel.nest)}{form.rows[s.row].label}{at} += {s.expression!r}")
+                own = lettered(f, s.expression)
+                lines.append(f"  {over(kernel.nest)}{form.rows[s.row].label}{at} += {own!r}")
     for pin in form.pins:
         sign = "=" if pin.fixed else "~"
         at = f"[{', '.join(map(repr, pin.at))}]" if pin.at else ""
-        lines.append(f"init {over(pin.nest)}{form.families[pin.family].name}{at} {sign} {pin.value!r}")
+        of = form.families[pin.family]
+        lines.append(f"init {over(pin.nest)}{spelled(f, of.name, of.kind)}{at} {sign} {pin.value!r}")
     return "\n".join(lines) + "\n"

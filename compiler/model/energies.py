@@ -25,13 +25,13 @@ from sysdyn.dsl.text.diagnostics import Place
 
 @dataclass(frozen=True, slots=True)
 class Virtual:
-    """Virtual work: the product effort * delta(on), one term each.  kept: of a store that the audit counts."""
+    """Virtual work: the product effort * delta(on), one term each, and its account in the audit (network.Work)."""
 
     effort: Node
     on: Node
     loops: Nest
     place: Place
-    kept: bool = False
+    account: str = "supplied"
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +185,7 @@ def _works(network: Network) -> Iterator[Virtual]:
                 own = inner.loops[len(nest) :]
                 added, moved = _moved(own, len(nest), len(outer.loops))
                 moving, loops = substitute(inner.expression, moved), (*outer.loops, *added)
-                yield Virtual(outer.expression, moving, loops, work.place, work.kept)
+                yield Virtual(outer.expression, moving, loops, work.place, work.account)
 
 
 def _moved(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:

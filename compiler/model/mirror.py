@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sysdyn.dsl.model.expression import Node, substitute, var, variables
+
 
 @dataclass(frozen=True, slots=True)
 class Mirror:
@@ -24,3 +26,35 @@ class Mirror:
 
 PRIMAL = Mirror("q", "f", "p", "T*", "T", "V", "D")
 COMPLEMENTARY = Mirror("p", "e", "q", "V*", "V", "T", "G")
+
+_REFLECTED = {"q": "p", "f": "e", "p": "q", "e": "f"}
+"""Letters of the complementary family for those of the reflection that it is lowered from."""
+
+
+def letter(formulation: str, kind: str) -> str:
+    """The kind of an unknown in the letters of its family: the q of co_lagrangian is a momentum p."""
+    return _REFLECTED.get(kind, kind) if formulation.startswith("co_") else kind
+
+
+def spelled(formulation: str, name: str, kind: str) -> str:
+    """A name with its family's letter: x.p of the reflection is x.q, law.e law.f."""
+    own = formulation.startswith("co_") and kind in ("p", "e") and name.endswith(f".{kind}")
+    return f"{name[:-2]}.{_REFLECTED[kind]}" if own else name
+
+
+def lettered(formulation: str, root: Node) -> Node:
+    """An expression for a reader: conjugates and implicit unknowns by their family's letter."""
+    if not formulation.startswith("co_"):
+        return root
+    change = {}
+    for node in variables(root):
+        if node.op == "var" and node.data[1] in ("p", "e"):
+            owner, kind, order = node.data
+            shown = var(owner, "bq", *node.args, order=order) if kind == "p" else None
+            change[node] = shown or var(spelled(formulation, owner, kind), kind, *node.args, order=order)
+    return substitute(root, change) if change else root
+
+
+def word(formulation: str, name: str) -> str:
+    """The name of a block or of a kind of rows in the words of its family: momentum is displacement there."""
+    return name.replace("momentum", "displacement") if formulation.startswith("co_") else name

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.integers import Reference
+from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
 from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
@@ -72,9 +73,9 @@ def _comment(routine: Routine, form: DescriptorForm) -> str:
     for row in routine.rows[:8]:
         equations = form.rows[row]
         line = f" (line {equations.place.start[0]})" if equations.place else ""
-        rows.append(f"row {row}: {equations.kind}{line}")
+        rows.append(f"row {row}: {word(form.formulation, equations.kind)}{line}")
     more = f", and {len(routine.rows) - 8} more" if len(routine.rows) > 8 else ""
-    return f"{routine.block}, {routine.part}: {', '.join(rows)}{more}"
+    return f"{word(form.formulation, routine.block)}, {routine.part}: {', '.join(rows)}{more}"
 
 
 class _Writer:

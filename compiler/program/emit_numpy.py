@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.integers import Element, Reference
+from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
 from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
 
@@ -135,9 +136,10 @@ class _Writer:
         """The whole function."""
         routine, rows = self.routine, self.routine.part == "rows"
         lines = [f"def _f{self.number}(p, ix, at, to, t, y, yd, {'r' if rows else 'v, o'}):"]
-        kinds = dict.fromkeys(form.rows[row].kind for row in routine.rows)
+        kinds = dict.fromkeys(word(form.formulation, form.rows[row].kind) for row in routine.rows)
+        block = word(form.formulation, routine.block)
         lines.append(
-            f"    # {routine.block}, {routine.part}: rows {', '.join(map(str, routine.rows[:8]))} ({', '.join(kinds)})"
+            f"    # {block}, {routine.part}: rows {', '.join(map(str, routine.rows[:8]))} ({', '.join(kinds)})"
         )
         lines += self.head()
         if not rows and self.depth:

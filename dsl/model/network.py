@@ -205,13 +205,16 @@ class Energy:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Virtual work: effort * delta(on).  kept: it is that of a store, whose energy the audit counts."""
+    """Virtual work: effort * delta(on), and the account that the audit enters it in: supplied, dissipated or stored.
+
+    stored: it is that of a store whose energy the audit counts.
+    """
 
     effort: Node
     on: Node
     loops: tuple[Loop, ...]
     place: Place
-    kept: bool = False
+    account: str = "supplied"
 
 
 @dataclass(frozen=True, slots=True)

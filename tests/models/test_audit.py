@@ -82,3 +82,30 @@ def test_round_off_beside_what_is_stored_is_no_turnover(tmp_path):
     }
     """
     assert 1e-12 < trace_of(tmp_path, text)["audit.energy"].nominal < 1e-6
+
+
+BRANCHES = """
+model branches {
+  node a, b: electrical
+  Vs: effort(e = 0.4 V) a
+  R: dissipator(e = 150 ohm*f) a -> b
+  D: dissipator(f = 2 mA/V*e + 3 mA/V^3*e^3) b
+  M: dissipator(e = (1 ohm + 30 ohm/A^2*f^2)*f) a
+  C: kinetic(p = 0.2 H*f) a -> b
+  K: potential(q = 3 uF*e + 1 uF/V^2*e^3) b
+}
+scene go of branches {
+  time 0 s to 10 ms
+  accuracy 1e-7
+  trace audit.dissipated, audit.supplied, R.energy, D.energy, M.energy, Vs.energy every 2 ms
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_what_dissipators_absorb_is_dissipated_whatever_form_their_laws_take(tmp_path, formulation):
+    trace = trace_of(tmp_path, BRANCHES, formulation=formulation)
+    lost = sum(trace[f"{name}.energy"].values for name in "RDM")
+    assert lost[-1] > 1e-4
+    assert trace["audit.dissipated"].values == pytest.approx(lost, abs=1e-6 * lost[-1])
+    assert trace["audit.supplied"].values == pytest.approx(-trace["Vs.energy"].values, abs=1e-6 * lost[-1])

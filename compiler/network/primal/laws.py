@@ -188,8 +188,9 @@ class _Statement:
 
     def _work(self, effort: Node) -> None:
         b = self.branch
-        kept = self.law.kept is not None or b.stated
-        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, self.place, kept))
+        stored = self.law.kept is not None or b.stated
+        account = "stored" if stored else "dissipated" if b.kind == "dissipator" else "supplied"
+        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, self.place, account))
 
     def _row(self, kind: str, equation: Node | None, unit: Unit) -> None:
         b = self.branch
