@@ -1,5 +1,6 @@
 """What the audit lists: the energies of all stores, whatever form their laws take."""
 
+import numpy as np
 import pytest
 from model_runs import FOUR, attempt, trace_of
 
@@ -41,6 +42,16 @@ def test_stores_that_stay_implicit(tmp_path, formulation):
     assert trace["audit.kinetic"].values == pytest.approx(p**2 + 0.75 * p**4, abs=1e-8)
     assert trace["audit.potential"].values == pytest.approx(0.35 * e**2 + 0.15 * e**4, abs=1e-8)
     assert abs(trace["audit.energy"].values).max() < 1e-6
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_stores_whose_integral_is_a_logarithm_of_cosh_or_of_a_sum_of_squares(tmp_path, formulation):
+    law, store = "f = 3 A/Wb*p + 0.2 A*atan(p/(0.01 Wb))", "e = 2 V/C*q + 0.3 V*tanh(q/(0.05 C))"
+    trace = trace_of(tmp_path, COIL.format(law=law, store=store, read="0.1 V"), formulation=formulation)
+    p, q = trace["L.p"].values, trace["C.q"].values
+    bent = 0.2 * 0.01 * (p / 0.01 * np.arctan(p / 0.01) - 0.5 * np.log1p((p / 0.01) ** 2))
+    assert trace["audit.kinetic"].values == pytest.approx(1.5 * p**2 + bent, abs=1e-9)
+    assert trace["audit.potential"].values == pytest.approx(q**2 + 0.015 * np.log(np.cosh(q / 0.05)), abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -107,25 +107,30 @@ class Choice:
         stated = sub(conjugate(branch), law)
         if kinetic and (pseudo or self.effort_read or variables(law) - {v}):
             return Law("state", stated, notes, tables, self._stored(law, v))
-        energy = None if pseudo or variables(law) - {v} else self._energy(law, v)
+        alone = not pseudo and not variables(law) - {v}
+        energy = self._energy(law, v) if alone else None
         if energy is not None:
             return Law("energy", energy, notes, tables)
         if kinetic:
             text = f"the {self._kept} of {branch.name} is kept as a state: its law has no closed integral"
             kept = self._stored(law, v) if law is branch.law else None
             return Law("state", stated, (*notes, ("N604", text)), tables, kept)
-        if branch.kind == "potential" and not pseudo and not branch.stated:
+        kept = self._energy(law, v, valued=True) if alone and branch.kind == "potential" else None
+        if branch.kind == "potential" and kept is None and not pseudo and not branch.stated:
             notes = (*notes, ("N604", f"the energy of {branch.name} is counted as the integral of its power"))
-        return Law("work", law, notes, tables)
+        return Law("work", law, notes, tables, kept)
 
-    def _energy(self, law: Node, v: Node) -> Node | None:
-        """The integral of a law; of dissipators that of polynomials only: works say theirs as well."""
+    def _energy(self, law: Node, v: Node, *, valued: bool = False) -> Node | None:
+        """The integral of a law; of dissipators that of polynomials only: works say theirs as well.
+
+        valued: only its value is wanted (`antiderivative`).
+        """
         if self.branch.energy is not None and law is self.branch.law:
             return self.branch.energy
         if self.branch.kind == "dissipator" and polynomial(law, v) is None:
             return None
         rests: Rests = []
-        energy = antiderivative(law, v, rests)
+        energy = antiderivative(law, v, rests, valued=valued)
         if energy is None or not self._rest_on(rests):
             return None
         return self._from_rest(energy, v) if law is self.branch.law else self._from_origin(energy, v)

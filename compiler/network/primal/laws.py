@@ -189,6 +189,8 @@ class _Statement:
     def _work(self, effort: Node) -> None:
         b = self.branch
         stored = self.law.kept is not None or b.stated
+        if self.law.kept is not None:
+            self.found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, self.place))
         account = "stored" if stored else "dissipated" if b.kind == "dissipator" else "supplied"
         self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, self.place, account))
 
@@ -200,8 +202,6 @@ class _Statement:
     def _implicit(self) -> None:
         """An implicit effort closed by a gamma; with a momentum as state, p' = e."""
         b, number, found = self.branch, self.element.number, self.found
-        if self.law.kept is not None:
-            found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, self.place))
         part = self.names[number, "e"]
         found.unknowns.setdefault(part.name, Unknown(part.name, shape_of(part.box), b.domain.effort, b.place))
         effort = var(part.name, "e", *b.at)
