@@ -21,6 +21,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import stopped, verdict
 from sysdyn.compiler.binding.instants import instants
 from sysdyn.dsl import load
+from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network, Scene
@@ -33,8 +34,8 @@ from sysdyn.runtime.trace.opening import replaceable
 from sysdyn.runtime.trace.trace import Parameter
 
 ACCURACY = 1e-4
-FINEST_RTOL, FINEST_ACCURACY = 1e-14, 1e-13
-"""What double precision resolves; of an accuracy the estimate must be seen too."""
+FINEST_RTOL = 1e-14
+"""What double precision resolves."""
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
 LISTED = 1000

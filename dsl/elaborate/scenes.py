@@ -23,6 +23,8 @@ RESERVED = ("time", "audit", "parameters", "events", "derivatives")
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "auto")
 SOLVERS = ("auto", "bdf", "radau", "dopri", "euler")
 REDUNDANCY = ("error", "drop", "minimum_norm")
+FINEST_ACCURACY = 1e-13
+"""Relative; what doubles resolve, and the estimate must be seen too."""
 _SOLVER_OPTIONS = ("order", "index", "step", "keep_implicit")
 
 
@@ -267,8 +269,9 @@ class SceneReader:
     def _accuracy(self, s: syntax.Accuracy) -> None:
         value = self._constant(s.value, NONE, "the accuracy")
         self._once("accuracy", value, s.span)
-        if value.op == "const" and not 0.0 < value.data < 1.0:
-            raise self.resolver.fail("E906", "accuracy must be positive and less than 1", s.value.span)
+        if value.op == "const" and not FINEST_ACCURACY <= value.data < 1.0:
+            text = f"accuracy {value.data:g}: from {FINEST_ACCURACY:g} to less than 1, what doubles can tell"
+            raise self.resolver.fail("E906", text, s.value.span)
         names = []
         for target in s.on:
             try:

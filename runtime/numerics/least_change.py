@@ -135,7 +135,13 @@ class _Linear:
 def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
     """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value)."""
     i, j, v = entries
+    if not (np.isfinite(v).all() and np.isfinite(aim).all()):
+        raise NotFiniteError
     # rows of equal size: a row of small coefficients must not pass for a redundant one
+    largest = np.zeros(shape[0])
+    np.maximum.at(largest, i, np.abs(v))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    v, aim = v / largest[i], aim / largest
     size = np.zeros(shape[0])
     np.add.at(size, i, v * v)
     size = np.where(size > 0.0, np.sqrt(size), 1.0)

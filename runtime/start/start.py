@@ -35,6 +35,8 @@ STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
 EXACT = 1e-9
 OWN = 1e-6
 BACK = 1e-9
+YIELDS = 1e-5
+"""Scaled change of a written guess for the sake of unwritten ones, whose weight is small but not zero."""
 EXPLAINED = 0.3
 """Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
 
@@ -209,7 +211,8 @@ def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: M
     problem = replace(problem, weight=np.where(state & ~starter.written, by_content, problem.weight))
     aim = where_light(problem, x, follows)
     moved = np.abs(aim - guess) * problem.weight / problem.scale
-    aim = np.where(moved > BACK * WEIGHT["unwritten"], aim, guess)
+    stays = np.where(starter.written, YIELDS, BACK * WEIGHT["unwritten"])
+    aim = np.where(moved > stays, aim, guess)
     for held in (state, state & (aim == guess)):
         z = np.where(held, aim, x)
         found = solve(replace(problem, free=free & ~held), z)
