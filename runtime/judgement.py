@@ -10,7 +10,7 @@ Euler's method is not judged.  Received: options, the accuracy control's result,
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,9 @@ TIMES = 10.0
 """Of the loosest accuracy asked: what the balance may be."""
 MOST = 0.1
 """Largest part of it that is allowed where the solver's own tolerances are given."""
+EPS = float(np.finfo(np.float64).eps)
+ROUND_OFF = 10.0 * EPS
+"""Of the terms of a difference: no run knows them better."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,30 @@ class Estimate:
     error: float | None
     asked: float
     time: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Cancelled:
+    """A traced difference of terms much larger than itself.  known, terms: in the quantity's unit, SI."""
+
+    quantity: str
+    known: float
+    terms: float
+
+
+def cancelled(
+    nominal: Mapping[str, float], seen: Mapping[str, float], asked: float | None, estimate: float | None
+) -> Iterator[Cancelled]:
+    """Quantities whose terms (nominal) cancel so far that the error, relative to the terms, is more than the accuracy
+    asked of the difference (seen) itself; what is nothing but round-off of its terms is zero by symmetry.
+
+    asked, estimate: relative; None where the solver's own tolerances are given.
+    """
+    error = max(estimate or 0.0, ROUND_OFF)
+    for name, terms in nominal.items():
+        own = seen.get(name, 0.0)
+        if terms * 4.0 * EPS < own < terms and terms * error > (asked or MOST) * own:
+            yield Cancelled(name, terms * error, terms)
 
 
 def own_tolerances(options: Options) -> bool:

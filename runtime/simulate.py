@@ -15,7 +15,7 @@ from sysdyn.runtime.integrate.accuracy import FINEST, Achieved, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
 from sysdyn.runtime.integrate.runs import LONG, Runs, Samples
 from sysdyn.runtime.integrate.underlying import obstacle
-from sysdyn.runtime.judgement import UNJUDGED, Estimate, Judgement, judge, own_tolerances
+from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
@@ -33,7 +33,8 @@ FINEST_RADAU = 1e-17
 class Outcome:
     """What a simulation did.  statistics and timings as the trace holds them; reached [s]; error_estimate relative
     (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0);
-    judgement: of a run that ended; below_round_off: the estimate is less than double precision resolves.
+    judgement: of a run that ended; below_round_off: the estimate is less than double precision resolves;
+    cancelled: traced differences of terms much larger than they are.
     """
 
     trace: Path
@@ -51,6 +52,7 @@ class Outcome:
     failure: SolverFailure | None = None
     judgement: Judgement | None = None
     below_round_off: bool = False
+    cancelled: tuple[Cancelled, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -218,8 +220,12 @@ def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tu
     missed = _missed(runs, options, achieved)
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed)
     _close(runs, achieved, judgement)
+    finished, _, writer = runs.done
+    nominal = runs.nominal(finished.largest, finished.magnitude)
+    ended = outcome(True, options.t_end, achieved, None)
+    lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, ended.error_estimate))
     below = achieved is not None and achieved.below_round_off
-    return replace(outcome(True, options.t_end, achieved, None), judgement=judgement, below_round_off=below)
+    return replace(ended, judgement=judgement, below_round_off=below, cancelled=lost)
 
 
 def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

@@ -121,6 +121,7 @@ def place_at(network: Network, file: str, line: int) -> Place:
     """The statement of the network that begins on a line; the model's name where there is none."""
     groups = (
         network.constraints,
+        network.branches,
         network.works,
         network.energies,
         network.dynamics,

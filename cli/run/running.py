@@ -18,7 +18,7 @@ from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
-from sysdyn.cli.run.verdict import stopped, verdict
+from sysdyn.cli.run.verdict import differences, stopped, verdict
 from sysdyn.compiler.binding.instants import instants
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
@@ -312,4 +312,5 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         claims, code = tuple(replace(claim, ok=None) for claim in claims), 3
     if outcome.judgement is not None:
         verdict(target, prepared, outcome.judgement, report)
+        differences(prepared, outcome.cancelled, report)
     return Ran(target, prepared, started, outcome, claims, code, failure)

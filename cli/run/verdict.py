@@ -1,4 +1,7 @@
-"""What a run says of itself, as findings: where it stopped (E930 to E934), what it did not meet (E920, E921, W920)."""
+"""What a run says of itself, as findings.
+
+Where it stopped (E930 to E934), what it did not meet (E920, E921, W920), what cancels in what it traced (N922).
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from sysdyn.cli.run.starting import Started
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
-from sysdyn.runtime.judgement import Judgement, NotMet
+from sysdyn.runtime.judgement import Cancelled, Judgement, NotMet
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.simulate import Outcome
 
@@ -59,6 +62,16 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     help_ = "; ".join(filter(None, (_REMEDIES[code], _last_good(started, error))))
     report.error(code, text, where, help=help_)
     return text
+
+
+def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Report) -> None:
+    """N922 for each traced difference that is less well known than its accuracy seems to say."""
+    observed = {o.name: o for o in prepared.network.observations}
+    for lost in cancelled:
+        said = observed.get(lost.quantity)
+        unit, place = (f" {said.unit.text}", said.place) if said else ("", prepared.network.place)
+        text = f"{lost.quantity} is known to {lost.known:.1g}{unit}: a difference of {lost.terms:.1g}{unit}"
+        report.note("N922", text, place, help="a coordinate for the difference itself, or an origin nearby")
 
 
 def verdict(target: Target, prepared: Prepared, judgement: Judgement, report: Report) -> None:

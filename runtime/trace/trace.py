@@ -20,7 +20,7 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.opening import opened
-from sysdyn.runtime.trace.trace_store import Column, Layout, Parameter, Store, columns_of, input_output
+from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Parameter, Store, columns_of, input_output
 
 __all__ = ["Column", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
 
@@ -54,6 +54,8 @@ class TraceWriter:
         self._late: list[Floats] = []  # rows that the hidden store lacks
         self._energies: Floats | None = None
         self._turned_over = 0.0
+        self._seen = np.zeros(len(self._layout.columns))
+        self._places = np.array([BEFORE + column.place for column in self._layout.columns], dtype=np.intp)
         self._numbers, self._flushed = 0, time.monotonic()
         self._visible: Store | None = None
         self._hidden: Store | None = None
@@ -83,6 +85,7 @@ class TraceWriter:
             self._waiting.append(rows)
             self._numbers += rows.size
             self._energy(rows[:, 2:6])
+            self._seen = np.fmax(self._seen, np.abs(rows[:, self._places]).max(axis=0))
         if self._numbers > MANY or time.monotonic() - self._flushed > FLUSH_SECONDS:
             self.flush()
 
@@ -96,6 +99,10 @@ class TraceWriter:
         most = max(np.abs(rows - self._energies).max(), UNCHANGED * np.abs(rows[:, :2]).max())
         if np.isfinite(most):
             self._turned_over = max(self._turned_over, float(most))
+
+    def seen(self) -> dict[str, float]:
+        """Largest magnitude of each stored quantity."""
+        return {column.name: float(s) for column, s in zip(self._layout.columns, self._seen, strict=True)}
 
     def flush(self) -> None:
         """All rows so far stand in the trace."""

@@ -24,6 +24,8 @@ from sysdyn.runtime.model.description import Description, Floats, element
 from sysdyn.runtime.model.failures import TraceError
 
 BLOCK = 1024
+BEFORE = 8
+"""Numbers of a row before its quantities (core/run.h)."""
 HEAD = 1 << 16
 """Bytes for what is not numbers."""
 
@@ -157,7 +159,7 @@ class Store:
         for column in layout.columns:
             data = self._data(column.name, column.unit, column.long_name, time)
             data.attrs["nominal"] = 0.0
-            self._sets.append((data, 8 + column.place))
+            self._sets.append((data, BEFORE + column.place))
             group, _, member = column.name.partition(".")
             if group == "audit" and member not in ("energy", "constraints"):
                 self._file[f"/audit/{member}"] = data
@@ -166,7 +168,7 @@ class Store:
                 unit = f"({column.unit})/s" if column.unit != "1" else "1/s"
                 rate = self._data(path, unit, f"time derivative of {column.long_name}", time)
                 data.attrs["derivative"] = _text(path)
-                self._sets.append((rate, 8 + layout.observed + column.place))
+                self._sets.append((rate, BEFORE + layout.observed + column.place))
         for path, unit, name, place in (
             ("/audit/energy", "J", "balance of stored, dissipated and supplied energy since the start", 6),
             ("/audit/constraints", "1", "norm of the scaled constraint equations", 7),

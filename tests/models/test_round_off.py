@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 from model_runs import trace_of
+from sysdyn.cli import main
 from sysdyn.cli.run.running import Request, run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.start import start
@@ -56,3 +58,30 @@ def test_a_tolerance_without_absolute_part_at_rest(tmp_path, method, index):
     trace = trace_of(tmp_path, text, method=method, index=index, rtol=1e-7, atol=0.0)
     t, y = trace.time, trace["y"].values
     np.testing.assert_allclose(y, 0.5 * (np.sin(t) - t * np.cos(t)), rtol=0.0, atol=1e-6)
+
+
+APART = """
+model apart {{
+  coord x: translation = {far} m
+  coord y: translation = {far} m + 2 m
+  energy T* = 1/2*3 kg*x'^2 + 1/2*2 kg*y'^2
+  energy V = 1/2*50 N/m*(y - x - 1 m)^2
+  init x' = 0 m/s
+  init y' = 0 m/s
+}}
+scene go of apart {{ time 0 s to 3 s; accuracy 1e-6; trace y - x as apart, x every 0.5 s }}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_difference_of_large_numbers_says_how_well_it_is_known(tmp_path, capsys, formulation):
+    path = tmp_path / "apart.sd"
+    for far, said in (("7e12", True), ("7", False)):
+        path.write_text(APART.format(far=far), encoding="utf-8")
+        main.run(["simulate", str(path), "--formulation", formulation, "-o", str(tmp_path / "t.h5")])
+        note = "note N922: apart is known to" in capsys.readouterr().err
+        assert note == said
+        with h5py.File(tmp_path / "t.h5") as trace:
+            exact = 1.0 + np.cos(trace["time"][()] * np.sqrt(50.0 * (1 / 3 + 1 / 2)))
+            error = abs(trace["apart"][()] - exact).max()
+        assert (error > 1e-4) == said
