@@ -25,6 +25,8 @@ TIMES = 10.0
 """Of the loosest accuracy asked: what the balance may be."""
 MOST = 0.1
 """Largest part of it that is allowed where the solver's own tolerances are given."""
+CANCELS = 1e-3
+"""Of its terms: a difference that is less has lost more than three digits."""
 EPS = float(np.finfo(np.float64).eps)
 ROUND_OFF = 10.0 * EPS
 """Of the terms of a difference: no run knows them better."""
@@ -105,7 +107,7 @@ def cancelled(
     error = max(estimate or 0.0, ROUND_OFF)
     for name, terms in nominal.items():
         own = seen.get(name, 0.0)
-        if terms * 4.0 * EPS < own < terms and terms * error > (asked or MOST) * own:
+        if terms * 4.0 * EPS < own < CANCELS * terms and terms * error > (asked or MOST) * own:
             yield Cancelled(name, terms * error, terms)
 
 
