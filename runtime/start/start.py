@@ -79,7 +79,12 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
         guess = found.x if given else guess
     rows = written | starter.groups("phi", "psi")
     found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-    return found.x if found.residual < EXACT or (np.isfinite(found.residual) and not given) else guess
+    if found.residual < EXACT or (np.isfinite(found.residual) and not given):
+        guess = found.x
+    # of a flow that an expression guesses, the momentum is guessed with it
+    momenta = free & (starter.moving == "p") & ~starter.written
+    found = solve(problem_of(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta), guess)
+    return found.x if found.residual < EXACT else guess
 
 
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:

@@ -61,3 +61,79 @@ def test_a_guess_by_an_expression_that_moved_is_noted(tmp_path, capsys):
     assert float(after) == pytest.approx(x, rel=1e-5)
     assert float(before) == pytest.approx(x - 0.02, rel=1e-4)
     assert "phi rod" in line
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_written_guess_stays_where_unwritten_ones_can_move(tmp_path, capsys, formulation):
+    path = tmp_path / "pair.sd"
+    path.write_text("""
+model pair {
+  param l = 0.37 m
+  coord a: rotation ~ 0.2 rad
+  coord b: rotation
+  coord x: translation
+  energy T* = 1/2*1.3 kg.m^2*a'^2 + 1/2*0.9 kg.m^2*b'^2 + 1/2*2 kg*x'^2
+  phi along: l*cos(a) + l*cos(b) = x
+  phi across: l*sin(a) + l*sin(b) = 0 m
+  init a' ~ 1.7 rad/s
+}
+scene go of pair { time 0 s to 10 ms; trace a, b, a', b' every 5 ms }
+""")
+    assert run(["check", str(path)]) == 0
+    assert "a':" not in capsys.readouterr().out
+    assert run(["simulate", str(path), "-q", "--formulation", formulation, "-o", str(tmp_path / "t.h5")]) == 0
+    from sysdyn.runtime.trace.trace import Trace
+
+    trace = Trace.open(tmp_path / "t.h5")
+    assert float(trace["a'"][0]) == 1.7
+    assert float(trace["b'"][0]) == pytest.approx(-1.7, rel=1e-12)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+def test_so_does_a_guessed_speed_along_an_edge(tmp_path, formulation):
+    path = tmp_path / "edge.sd"
+    path.write_text("""
+model edge {
+  coord x: translation
+  coord y: translation
+  coord th: rotation = 0.3 rad
+  energy T* = 1/2*2.2 kg*(x'^2 + y'^2) + 1/2*0.4 kg.m^2*th'^2
+  psi blade: sin(th)*x' = cos(th)*y'
+  init x' ~ 1.1 m/s
+  init th' = 0.5 rad/s
+}
+scene go of edge { time 0 s to 10 ms; trace x', y' every 5 ms }
+""")
+    assert run(["simulate", str(path), "-q", "--formulation", formulation, "-o", str(tmp_path / "t.h5")]) == 0
+    from sysdyn.runtime.trace.trace import Trace
+
+    trace = Trace.open(tmp_path / "t.h5")
+    assert float(trace["x'"][0]) == 1.1
+    assert float(trace["y'"][0]) == pytest.approx(1.1 * math.tan(0.3), rel=1e-12)
+
+
+CHARGED = """
+model charged {
+  node a, b: electrical
+  C1: potential(q = 3 uF*e + 1 uF/V^2*e^3) a -> b
+  C2: potential(q = 5 uF*e) b
+  R: dissipator(e = 2 kohm*f) a
+  L: kinetic(p = 0.4 H*f) b
+  init C1.e ~ 1.25 V
+  init C2.e ~ -0.5 V
+  init L.f ~ 3 mA
+}
+scene go of charged { time 0 s to 1 ms; trace C1.e, C2.e, L.f every 0.5 ms }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_consistent_guesses_of_stores_come_back_in_both_families(tmp_path, capsys, formulation):
+    path, out = tmp_path / "charged.sd", tmp_path / "t.h5"
+    path.write_text(CHARGED)
+    assert run(["simulate", str(path), "-q", "--formulation", formulation, "-o", str(out)]) == 0
+    from sysdyn.runtime.trace.trace import Trace
+
+    trace = Trace.open(out)
+    first = [float(trace[name][0]) for name in ("C1.e", "C2.e", "L.f")]
+    assert first == pytest.approx([1.25, -0.5, 3e-3], rel=1e-12)

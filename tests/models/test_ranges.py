@@ -1,0 +1,47 @@
+"""A table with `stop`: the run ends where its argument leaves the data, and says so, in every formulation."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+from model_runs import FOUR
+from sysdyn.cli.main import run
+
+RAMP = """table Rv(x: A) -> V pchip stop [ (-3, -40), (0, 0), (0.05, 5), (3, 30) ]
+table Ov(x: 1) -> 1 linear stop [ (0, 1), (40, 3) ]
+model ramp {
+  node a, b: electrical
+  Vs: effort(e = 10 V*Ov(t/(1 s))*t/(1 s)) a
+  R: dissipator(e = Rv(f)) a -> b
+  R2: dissipator(e = 5 ohm*f) b
+  C: potential(q = 2 uF*e) b
+}
+scene up of ramp { time 0 s to 5 s; trace R.f, R.e, C.e every 0.1 s }
+"""
+
+
+def left():
+    """The instant at which the source passes the 45 V that 3 A need (5 V of the capacitor's slope are 20 uA)."""
+    t = np.roots([10.0 * 2.0 / 40.0, 10.0, -45.0])
+    return float(t[t > 0][0])
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_the_run_ends_where_the_argument_leaves_the_data(tmp_path, capsys, formulation):
+    path, out = tmp_path / "ramp.sd", tmp_path / "t.h5"
+    path.write_text(RAMP, encoding="utf-8")
+    assert run(["simulate", str(path), "--formulation", formulation, "-o", str(out)]) == 3
+    said = capsys.readouterr().err
+    assert "error E932" in said
+    assert "table Rv left its range" in said
+    assert "ramp.sd:6" in said  # the element that reads the table
+    assert float(re.search(r"stopped at t = (\S+) s", said)[1]) == pytest.approx(left(), abs=2e-3)
+    with h5py.File(out) as trace:
+        assert trace.attrs["final"] == 0
+        assert trace["time"].size == int(left() / 0.1) + 1
+        t = trace["time"][()]
+        source = 10.0 * t * (1.0 + t / 20.0)
+        assert trace["R.e"][()] + trace["C.e"][()] == pytest.approx(source, abs=1e-3)
+    assert run(["diff", "-q", str(out), str(out)]) == 1
+    assert "did not end as asked" in capsys.readouterr().err
