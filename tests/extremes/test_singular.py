@@ -1,4 +1,4 @@
-"""Through a singular position of a linkage: on along the smooth branch, or refused; never on the other one in silence."""
+"""Through a singular position of a linkage: on along the smooth branch, or refused; never on another in silence."""
 
 from pathlib import Path
 
