@@ -35,3 +35,11 @@ def test_a_flat_parallelogram_stays_one_or_is_refused(tmp_path, start, push, b, 
     assert one.max() > 0.0  # it was flat on the way
     speed = np.gradient(one, time)[5:-5]
     assert np.abs(speed**2 - energy(start, push, one[5:-5])).max() <= 0.02 * (speed**2).max()
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+def test_what_is_zero_by_symmetry_is_met(tmp_path, method, formulation):
+    run = ran(tmp_path, MODEL, scene="hanging", method=method, formulation=formulation, settings=(("start", "-1.9"),))
+    assert np.abs(np.asarray(run.trace["level"])).max() < 1e-13
+    assert run.met
