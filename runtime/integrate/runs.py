@@ -197,7 +197,7 @@ class Runs:
         less than round-off of the largest of the same unit, unknowns (magnitude [unknowns]) among them.
         """
         own = np.array([float(largest[column.place]) for column in self.columns])
-        return np.maximum(own, ROUND_OFF * self.beside(largest, magnitude))
+        return np.asarray(np.maximum(own, ROUND_OFF * self.beside(largest, magnitude)))
 
     def beside(self, largest: Floats, magnitude: Floats) -> Floats:
         """The largest of the unit of each stored quantity [columns], unknowns among them."""
