@@ -97,7 +97,7 @@ def _inconsistent(prepared: Prepared, error: InconsistentStart, report: Report) 
         case "fixed":
             report.error("E510", f"the constraints contradict each other at the start: {unit} in {names}", where)
         case _:
-            message = f"no consistent start was found: {unit} in {names}"
+            message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
             report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
 
 

@@ -38,13 +38,14 @@ ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 @dataclass(frozen=True, slots=True)
 class Sampled:
     """What a run hands to the comparison.  values [instants, quantities]; largest [quantities] against
-    which errors are relative; steps: accepted.
+    which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it is zero to round-off.
     """
 
     tolerance: float
     values: Floats
     largest: Floats
     steps: int
+    noise: Floats | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,10 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
         return 0.0, 0.0
     if coarse.values.shape != fine.values.shape:
         return np.inf, np.inf
+    # zero by symmetry, in both runs: what is left of it is nobody's error
+    use &= ~(np.maximum(np.abs(coarse.values), np.abs(fine.values)).max(axis=0) <= fine.noise)
+    if not use.any():
+        return 0.0, 0.0
     relative = np.abs(fine.values[:, use] - coarse.values[:, use]).max(axis=0) / size[use]
     relative = np.where(np.isfinite(relative), relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())

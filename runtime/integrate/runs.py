@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import Sampled
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
@@ -195,15 +196,19 @@ class Runs:
         """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
         less than round-off of the largest of the same unit, unknowns (magnitude [unknowns]) among them.
         """
+        own = np.array([float(largest[column.place]) for column in self.columns])
+        return np.asarray(np.maximum(own, ROUND_OFF * self.beside(largest, magnitude)))
+
+    def beside(self, largest: Floats, magnitude: Floats) -> Floats:
+        """The largest of the unit of each stored quantity [columns], unknowns among them."""
         of_unit: dict[str, float] = {}
         for family, first in zip(self.system.description.families, self.system.form.at, strict=False):
             if family.size and first + family.size <= magnitude.size:
                 size = float(magnitude[first : first + family.size].max())
                 of_unit[family.unit] = max(of_unit.get(family.unit, 0.0), size)
-        sizes = [float(largest[column.place]) for column in self.columns]
-        for column, size in zip(self.columns, sizes, strict=True):
-            of_unit[column.unit] = max(of_unit.get(column.unit, 0.0), size)
-        return np.maximum(sizes, [ROUND_OFF * of_unit[column.unit] for column in self.columns])
+        for column in self.columns:
+            of_unit[column.unit] = max(of_unit.get(column.unit, 0.0), float(largest[column.place]))
+        return np.array([of_unit[column.unit] for column in self.columns])
 
     def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""
@@ -238,7 +243,9 @@ class Runs:
         places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
         rows = np.concatenate(self.rows) if self.rows else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
         sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
-        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps)
+        noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
+        noise = np.append(noise, np.zeros(len(self.meters)))
+        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise)
         self.samplings = (*self.samplings[-1:], (rows[:, 0], found))
         return found
 

@@ -34,6 +34,8 @@ EVALUATION = 1e6
 EACH = 40.0
 """Operations that an entry of the matrix takes in an evaluation."""
 _ITERATIONS = 60
+_FOLDS = 709
+"""Iterations that an exponential, falling by e in each, takes from the largest number."""
 _HALVINGS = 12
 _ROUND_OFF = 2e-15
 _BESIDE = 1e-8
@@ -193,8 +195,11 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
 def _solve(problem: Problem, x: Floats, most: int) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
-    stale = 0
-    for _ in range(most):
+    stale, taken = 0, 0
+    for _ in range(most + _FOLDS):
+        if taken == most:
+            break
+        taken += 1
         linear = _Linear(problem, x)
         problem.work.iteration(linear.shape, problem.rows.size)
 
@@ -230,7 +235,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
                 break
             step *= 0.5
         if best.residual >= 1e-12 and now <= 0.5 * norm:
-            stale = 0  # rows that shrink as fast as their terms do (a junction far above its voltage)
+            stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
         if not np.isfinite(problem.residual(tried)[problem.use]).all():
             break
         x = tried

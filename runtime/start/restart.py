@@ -12,7 +12,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import Problem, solve
 from sysdyn.runtime.start.impulses import Impulses, group_rows
-from sysdyn.runtime.start.settled import Settler
+from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 
 EXACT = 1e-9
@@ -32,10 +32,12 @@ class Restart:
         magnitude = lib.reader(self.settler.core.contents.scale, y.size).copy()
         if self.impulses.broken(t, y, yd, magnitude):
             y = self.impulses.after(t, y, yd, magnitude)
-        self.settler.core.contents.ready = 0
-        found, rate, done = self.settler.settle(t, y, yd)
-        if done:
-            return found, rate
+        # what follows may jump by far more than its magnitude: at equal weights that would move the state
+        for hold in (HELD, 1.0):
+            self.settler.core.contents.ready = 0
+            found, rate, done = self.settler.settle(t, y, yd, hold=hold)
+            if done:
+                return found, rate
         return self._search(t, y, yd, magnitude)
 
     def _search(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:

@@ -19,6 +19,8 @@ LIGHT = 1e-3
 """Weight (of squares) of displacements without inertia: they follow those that have some."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
+HELD = 1e8
+"""Weight (of squares) of a state that moves only where the rows leave nothing else."""
 
 
 def rates_of(settled: System) -> Ints:
@@ -133,10 +135,18 @@ class Settler:
         """Of the core's structure."""
         return c.addressof(self.core.contents)
 
-    def settle(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
-        """y, yd [unknowns as written] moved onto the rows; False where that failed (then they are as given)."""
+    def settle(self, t: float, y: Floats, yd: Floats, *, hold: float = 1.0) -> tuple[Floats, Floats, bool]:
+        """y, yd [unknowns as written] moved onto the rows; False where that failed (then they are as given).
+
+        hold: times the weight of the state; HELD moves it only where the rows leave nothing else.
+        """
+        self.core.contents.hold = hold
+        if hold != 1.0:
+            self.core.contents.ready = 0
         a, b = self.system._buffer(y), self.system._buffer(yd)
         failed = lib.core.sd_settle_point(self.core, t, lib.pointer(a), lib.pointer(b))
+        if hold != 1.0:
+            self.core.contents.hold, self.core.contents.ready = 1.0, 0
         self.system.failure.check()
         return a[: self._n], b[: self._n], not failed
 

@@ -32,6 +32,8 @@ STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
     (("phi", "phi_rate", "psi", "momentum"), STATE),
 )
 """Groups of rows, and the kinds of unknowns that are moved onto them, one after the other."""
+HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi_rate", "gamma_rate")
+"""Groups of rows that are derivatives of others."""
 EXACT = 1e-9
 OWN = 1e-6
 BACK = 1e-9
@@ -187,6 +189,17 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     return found.x if found.residual < EXACT else x
 
 
+def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
+    """X on the rows as written: far from a solution the derivative of an exponential hides what itself is after."""
+    rows = starter.every & ~starter.groups(*HIDDEN)
+    for _ in range(_RESCALINGS):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
+        if not np.isfinite(found.residual) or (found.x == x).all():
+            break
+        x = found.x
+    return x
+
+
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
     """Rows that are not linear."""
     here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * starter.scale(t, x)))
@@ -235,6 +248,9 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     if holds:
         return best, True
     best, holds = _rescaled(starter, t, x, guess, free)
+    if not holds:
+        found, holds = _rescaled(starter, t, _as_written(starter, t, x, guess, free), guess, free)
+        best = found if holds or found.residual < best.residual else best
     for shaken in _shaken(x, free, starter.scale(t, x)):
         if holds or starter.work.done:
             break
@@ -313,7 +329,9 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     rows = tuple(dict.fromkeys(starter.settled.row_label(row) for row in worst))
     freed, holds = _attempt(starter, t, guess, np.ones_like(free))
     candidates: tuple[RowLabel, ...] = ()
-    if holds:
+    # rows that hold to round-off at some point contradict nothing: it was the search that failed
+    contradict = bool(scaled[order[0]] > OWN)
+    if holds and contradict:
         scale = starter.scale(t, freed.x)
         change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
@@ -321,9 +339,9 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     kind = "fixed"
     if not candidates:
         kind = "gamma" if rows and rows[0].kind.startswith("gamma") else "stuck"
-        if rows and rows[0].kind.startswith(("phi", "psi", "initial")):
+        if contradict and rows and rows[0].kind.startswith(("phi", "psi", "initial")):
             kind = "fixed"
-    return InconsistentStart(kind, float(raw[order[0]]), rows, candidates)
+    return InconsistentStart(kind, float((scaled if kind == "stuck" else raw)[order[0]]), rows, candidates)
 
 
 def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tuple[str, ...]]:

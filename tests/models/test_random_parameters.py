@@ -12,16 +12,10 @@ import random_parameters
 LONG = os.environ.get("SYSDYN_LONG")
 SLICE = ("seed/pendulum", "seed/dc_motor", "seed/two_tank", "gallery/controller")
 CASES = [(name, k) for name in random_parameters.names() for k in range(random_parameters.SETS)]
+TRIED = CASES if LONG else [(name, k) for k, name in enumerate(SLICE)]
 
 
-KNOWN = "at a step of a signal hamiltonian restarts with a current of its own: 0.087 A where it is 0 A"
-TRIED = CASES if LONG else [(name, k) for k, name in enumerate(SLICE[:3])]
-
-
-@pytest.mark.parametrize(
-    ("name", "number"),
-    [*TRIED, pytest.param("gallery/controller", 3, marks=pytest.mark.xfail(strict=True, reason=KNOWN))],
-)
+@pytest.mark.parametrize(("name", "number"), TRIED)
 def test_formulations_agree_whatever_the_parameters(name, number):
     tried = random_parameters.tried(name, number)
     assert tried.settings

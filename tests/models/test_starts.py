@@ -1,5 +1,6 @@
 """Starts of the gallery's models from other guesses and positions than their own."""
 
+import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
 from reduced import ROOT
@@ -22,3 +23,17 @@ def test_parallel_cranks_that_start_elsewhere(tmp_path, scene, start):
     """Near points may not be taken on the other side of a dead centre, nor the start moved by the row left out."""
     trace = trace_of(tmp_path, GALLERY / "sixbar_redundant.sd", scene=scene, settings=(("start", f"{start} rad"),))
     assert trace["th"].values[0] == pytest.approx(start * 57.29578, abs=1e-4)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_junction_guessed_far_above_its_voltage_is_walked_down(tmp_path, formulation):
+    """The guess puts 2 V across the collector's junction: exp(124) there, one e-fold an iteration."""
+    text = (ROOT / "models" / "gallery" / "ebers_moll_amp.sd").read_text()
+    text = "\n".join(line for line in text.splitlines() if "expect" not in line)
+    settings = (("Q.vT", "0.01614"), ("Q.aF", "0.774"), ("Q.aR", "0.618"), ("Rb1.R", "127e3"), ("Rb2.R", "5.27e3"))
+    trace = trace_of(tmp_path, text, scene="bias", formulation=formulation, settings=settings, until="1 us")
+    ve, vb, vc = (float(trace[name].values[0]) for name in ("e.e", "b.e", "c.e"))
+    be, bc = 1e-14 * np.expm1((vb - ve) / 0.01614), 2e-14 * np.expm1((vb - vc) / 0.01614)
+    assert 470.0 * (be - 0.618 * bc) == pytest.approx(ve, rel=1e-6)
+    assert 2.2e3 * (0.774 * be - bc) == pytest.approx(12.0 - vc, rel=1e-6)
+    assert (12.0 - vb) / 127e3 == pytest.approx(vb / 5.27e3 + (1 - 0.774) * be + (1 - 0.618) * bc, rel=1e-6)

@@ -37,6 +37,17 @@ model m {
 }
 scene s of m { time 0 s to 5 s; trace x as u, audit.energy as e }
 """
+COIL = """
+from std.electrical import resistor, inductor, voltage
+model m {
+  node a, b: electrical
+  Vs: voltage(v = 5 V*step(t - 1 s)) a -> ground
+  R: resistor(R = 1 ohm) a -> b
+  L: inductor(L = 1 uH) b -> ground
+  init L.f = 0 A
+}
+scene s of m { time 0 s to 4 s; trace L.f as u, audit.energy as e every 0.1 s }
+"""
 PULSES = """
 model m {
   state u: 1 = 0
@@ -156,6 +167,16 @@ def test_a_velocity_that_steps_keeps_positions_and_the_energy_books(tmp_path):
         assert columns["v"][at - 1 : at + 1].tolist() == pytest.approx([0.0, 1.0], abs=1e-9)
     with pytest.raises(SolverFailure):
         run(VELOCITY, tmp_path, stops=False, rtol=1e-8)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_a_state_is_kept_where_its_rate_jumps_beyond_every_magnitude(formulation, tmp_path):
+    # R/L is 4e6 times what the span resolves: i' = 5e6 A/s after 0 A
+    t, columns, _ = run(COIL, tmp_path, rtol=1e-8, formulation=formulation)
+    at = int(np.argmin(np.abs(t - 1)))
+    assert t[at] == 1.0
+    assert np.abs(columns["u"][at - 1 : at + 1]).max() < 1e-9  # of 5 A that follow
+    assert columns["u"][-1] == pytest.approx(5.0, rel=1e-6)
 
 
 def test_both_sides_of_a_jump_are_accepted_steps(tmp_path):
