@@ -101,7 +101,7 @@ class CompiledModel:
 
     def structure(self) -> dict[str, Any]:
         """The manifest's `structure` alone."""
-        return manifest.structure(self.form, self.program)
+        return manifest.structure(self.form, self.program, self.network)
 
     def library(self) -> Path:
         """The compiled library of the C text; `build.NoCompilerError` where there is no compiler."""
@@ -140,7 +140,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         model = anchored(energies.energies(network))
         energies.verify_energies(model)
         model, notes = integrate(model) if integrating else (model, ())
-        if traced and not network.observations:
+        if traced and not any(o.stored for o in network.observations):
             model, cut = with_coordinates_observed(model, network)
             notes = (*notes, *cut)
         found = check_energies(model, network)

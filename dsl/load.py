@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.parts import Parts
@@ -136,6 +137,8 @@ def _network(
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     known = Values(elaborator.parts.parameters, reader.elements)
+    if not report.failed and not _incomplete(report):
+        events.expanded(elaborator, known)
     checks.values(elaborator, known, report)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, _read(elaborator.parts), report)
@@ -178,7 +181,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         constraints=tuple(parts.constraints),
         dynamics=tuple(parts.dynamics),
         initials=tuple(parts.initials),
-        observations=tuple(reader.observations),
+        observations=(*reader.observations, *parts.watched),
         expectations=tuple(e for e in parts.expectations if e.moment != "static"),
         statics=tuple(e for e in parts.expectations if e.moment == "static"),
         goldens=tuple(parts.goldens),
@@ -187,6 +190,9 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         nodes=tuple(parts.nodes),
         branches=tuple(parts.branches),
         couplings=tuple(parts.couplings),
+        discretes=frozenset(parts.discretes),
+        events=tuple(parts.events),
+        switches=tuple(parts.switches),
         read=_read(parts),
     )
 

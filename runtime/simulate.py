@@ -172,6 +172,9 @@ def simulate(
     facts = facts or structure(written, start)
     written, start, facts = counted(written, start, facts, options)
     system, index, warnings = formed(written, start, facts, options)
+    if system.form.name == "0" and options.events and options.events.contacts:
+        name = options.events.contacts[0].name
+        raise NoSuchForm(f"'{name}' holds at times: there is no one underlying equation; index 2 with bdf or radau")
     form = system.form.name
     name = {"3": str(facts.index), "2": "2"}.get(form, form)
     options = replace(options, attributes={**options.attributes, "index": name})
@@ -236,4 +239,5 @@ def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -
     estimate = achieved.error_estimate if achieved is not None else None
     verdict = UNJUDGED if judgement is None else judgement.attributes()
     attributes = {**runs.last_attributes(estimate), **verdict}
-    writer.finish(runs.nominal(finished.largest, finished.magnitude), attributes, judgement is not None)
+    nominal = runs.nominal(finished.largest, finished.magnitude)
+    writer.finish(nominal, attributes, judgement is not None, finished.events)

@@ -30,6 +30,16 @@ class ModuleFault(Exception):  # noqa: N818 (a fault in sysdyn, exit 4)
 
 def check_module(prepared: Prepared, started: Started, until: float) -> None:
     """Compare every block at the start and nearby, up to `until` [s].  Raises ModuleFault."""
+    p = started.system.description.p
+    standing = p.copy()  # senses of the start; the oracle has what was bound
+    p[:] = prepared.binding.p
+    try:
+        _compare(prepared, started, until)
+    finally:
+        p[:] = standing
+
+
+def _compare(prepared: Prepared, started: Started, until: float) -> None:
     system = started.system
     oracle = SampledRows(prepared.compiled.form, prepared.binding)
     points = _points(system, started, oracle, until)

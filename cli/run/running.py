@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.expectations import Claim, judge, watch
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
@@ -131,8 +132,15 @@ def integrate(target: Target, prepared: Prepared, options: Options, report: Repo
     if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
         return None
     check_module(prepared, started, options.t_end)
-    options = replace(options, stops=_stops(prepared, options, report))
+    events = plan(prepared, started.system, rest=_rest(options))
+    options = replace(options, stops=_stops(prepared, options, report), events=events)
     return _ran(target, prepared, started, options, report)
+
+
+def _rest(options: Options) -> float:
+    """The part of the fastest impact of a contact below which it is the last."""
+    asked = [options.accuracy, options.rtol, *(a for _, a in options.accuracy_on)]
+    return 0.1 * min((a for a in asked if a is not None), default=ACCURACY)
 
 
 def _same(one: str, other: str) -> bool:
@@ -274,6 +282,8 @@ def _parameters(prepared: Prepared) -> Iterator[Parameter]:
     """Parameters in SI units, arrays element by element (`m[2]`); arrays of more than LISTED elements are left out."""
     evaluate, values = prepared.binding.evaluate, prepared.binding.values
     for p in prepared.network.parameters:
+        if p.name in prepared.network.discretes:
+            continue
         unit = si_text(p.unit.dimension)
         if not p.shape:
             yield Parameter(p.name, float(values[p.name]), unit)
@@ -291,7 +301,7 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
     failure = None
     try:
         outcome = simulate(
-            prepared.manifest, prepared.arrays, prepared.carrier, options, start=started.state, facts=started.facts
+            started.system.description, None, prepared.carrier, options, start=started.state, facts=started.facts
         )
     except NoSuchForm as error:
         report.error("E607", str(error), prepared.network.place)

@@ -6,14 +6,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, place_at, prepare
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Expectation
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
+from sysdyn.runtime.events.start import eventful_start
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
-from sysdyn.runtime.start.start import ConsistentState, consistent_start
+from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.implicit import undetermined
 from sysdyn.runtime.structure.inertia import negative_inertia
 from sysdyn.runtime.structure.order import order_and_manifold
@@ -39,7 +41,7 @@ def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None 
     system = System(prepared.manifest, prepared.arrays, prepared.carrier)
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
-            state = consistent_start(system, t0)
+            state = eventful_start(system, t0, plan(prepared, system))
             facts = structure(system, state)
             implicit = undetermined(system, state)
     except InconsistentStart as error:
@@ -188,7 +190,7 @@ def _primal(prepared: Prepared, t0: float) -> Structure | None:
         return None
     system = System(primal.manifest, primal.arrays, primal.carrier)
     try:
-        return structure(system, consistent_start(system, t0))
+        return structure(system, eventful_start(system, t0, plan(primal, system)))
     except InconsistentStart:
         return None
 

@@ -19,9 +19,12 @@ from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
 
 
-def structure(form: DescriptorForm, program: Program) -> dict[str, Any]:
-    """What the runtime needs beside the code: families, rows, blocks; no numbers of a binding."""
+def structure(form: DescriptorForm, program: Program, network: Network) -> dict[str, Any]:
+    """What the runtime needs beside the code: families, rows, blocks, constraints that hold at times; no numbers of a
+    binding.
+    """
     return {
+        "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches],
         "families": [_family(f) for f in form.families],
         "rows": [_row(r) for r in form.rows],
         "blocks": {name: {"kernels": [_kernel(k) for k in patterns]} for name, patterns in program.patterns},
@@ -83,7 +86,7 @@ def manifest(
             {"name": p.name, "unit": p.unit.text, "value": _plain(_in_unit(binding.values[p.name], p.unit))}
             for p in network.parameters
         ],
-        "structure": structure(form, program),
+        "structure": structure(form, program, network),
     }
 
 

@@ -34,6 +34,8 @@ def integrate(model: EnergyModel) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
     tangible = frozenset(c.name for c in model.coordinates if c.tangible)
     labels: dict[str, list[Row]] = {}
     for row in model.of_kind("psi"):
+        if row.name in model.switched:
+            continue  # a displacement goes on from where its flow was let go
         labels.setdefault(row.name, []).append(row)
     chosen = {n for n, rows in labels.items() if _touches(rows, tangible, model.mirror) and _all_exact(rows, model)}
     if not chosen:

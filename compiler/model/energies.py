@@ -111,6 +111,7 @@ class EnergyModel:
     labels: Mapping[str, str] = field(default_factory=dict)  # unit of each constraint label
     mirror: Mirror = PRIMAL
     quasis: tuple[str, ...] = ()
+    switched: frozenset[str] = frozenset()  # labels of constraints that hold at times
 
     def function(self, name: str) -> tuple[Term, ...]:
         """The terms of a state function."""
@@ -148,6 +149,7 @@ def energies(network: Network) -> EnergyModel:
         quantities=tuple(_quantities(network)),
         labels={c.name: c.unit.text for c in network.constraints},
         quasis=network.quasis,
+        switched=frozenset(s.label for s in network.switches),
     )
     touched = tangible(model)
     coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)
@@ -223,7 +225,7 @@ def _quantities(network: Network) -> Iterator[Quantity]:
     first = {o.name: o for o in reversed(network.observations)}
     for o in (o for o in network.observations if first[o.name] is o):
         _, (expression,) = canonical((), flows(o.expression))
-        yield Quantity(o.name, expression, True, o.unit.text, o.place)
+        yield Quantity(o.name, expression, o.stored, o.unit.text, o.place)
     for k, e in enumerate(network.expectations):
         for side, node in (("left", e.left), ("right", e.right), ("within", e.within)):
             if node is not None:

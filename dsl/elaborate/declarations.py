@@ -5,8 +5,8 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import replace
 
+from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.parameters import Parameters
-from sysdyn.dsl.elaborate.parts import declared
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Coordinate, Initial, NodeFamily, Parameter, State, Unknown
@@ -24,17 +24,10 @@ from sysdyn.dsl.names.symbols import (
     ParameterSymbol,
     PortSymbol,
     UnknownSymbol,
-    Unsupported,
     nearest,
 )
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.tree import syntax
-
-_LATER = {
-    syntax.Discrete: "discrete variable",
-    syntax.When: "when",
-    syntax.Every: "every",
-}
 
 
 class Declarations(Parameters):
@@ -63,19 +56,8 @@ class Declarations(Parameters):
                 decl = statement.decl
                 family = self.current.family(decl.name)
                 self.enter(ConstraintSymbol(decl.name, statement.kind, family, self.place(decl.span)))
-            case _:
-                self._later(statement)
-
-    def _later(self, statement: syntax.Statement) -> None:
-        what = _LATER.get(type(statement))
-        if what is None:
-            return
-        decls = declared(statement)
-        names = ", ".join(f"'{d.name}'" for d in decls)
-        message = " ".join(filter(None, (what, names, "is not supported yet (planned: events and discrete time)")))
-        self.report.note("N608", message, self.place(statement.span))
-        for decl in decls:
-            self.enter(Unsupported(decl.name, what, self.place(decl.span)))
+            case syntax.Discrete():
+                events.discrete(self, statement)
 
     def _unknown(
         self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, domain: DomainSymbol | None, co: bool

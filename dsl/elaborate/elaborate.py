@@ -1,7 +1,7 @@
 """From a model as written to its parts: declarations first, then elements, then every statement resolved.
 
 A statement inside `for` is resolved once with its loops; a component is elaborated once a statement that instantiates
-it.  What a later issue builds (events, inequalities) is reported as N608 with its place, and the rest is still checked.
+it.  What a later issue builds is reported as N608 with its place, and the rest is still checked.
 """
 
 from __future__ import annotations

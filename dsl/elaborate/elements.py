@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.connections import Connections, Ends
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -116,6 +117,9 @@ class Elements(Connections):
             self._hidden(value, own, symbol.name)
             with self.resolver.inside(loops, bound), self.resolver.bound(own):
                 law = law_of(self.resolver, symbol, whole, side, value, kind, span)
+            if law.kind == "dissipator" and side == "e":
+                node = events.sticking(self, law.law, symbol.family.name, whole, loops, self.place(s.span))
+                law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             self.parts.branches.append(
                 self._branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))

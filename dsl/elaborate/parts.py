@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
@@ -16,14 +17,17 @@ from sysdyn.dsl.model.network import (
     Coupling,
     Dynamic,
     Energy,
+    Event,
     Expectation,
     Golden,
     Initial,
     Loop,
     NodeFamily,
+    Observation,
     Parameter,
     Shape,
     State,
+    Switch,
     Unknown,
     Work,
 )
@@ -64,6 +68,11 @@ class Parts:
     expectations: list[Expectation] = field(default_factory=list)
     goldens: list[Golden] = field(default_factory=list)
     quasis: list[str] = field(default_factory=list)
+    discretes: set[str] = field(default_factory=set)
+    events: list[Event] = field(default_factory=list)
+    switches: list[Switch] = field(default_factory=list)
+    drafts: list[Any] = field(default_factory=list)  # of switches (elaborate/events.py)
+    watched: list[Observation] = field(default_factory=list)  # what events and switches read
     requirements: list[Requirement] = field(default_factory=list)
     nodes: list[NodeFamily] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)

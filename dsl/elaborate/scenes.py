@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import dimensions as dim
@@ -309,8 +310,8 @@ class SceneReader:
         text = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
         self.model.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
 
-    def _later(self, s: syntax.When) -> None:
-        self.report.note("N608", "when is not supported yet (planned: events)", self.resolver.place(s.span))
+    def _when(self, s: syntax.When) -> None:
+        events.when(self.model, s)
 
 
 def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
@@ -328,5 +329,5 @@ _STATEMENTS: dict[type, Callable[..., None]] = {
     syntax.Init: SceneReader._init,
     syntax.Expect: SceneReader._expect,
     syntax.Golden: SceneReader._golden,
-    syntax.When: SceneReader._later,
+    syntax.When: SceneReader._when,
 }

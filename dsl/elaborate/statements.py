@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 
+from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.declarations import Declarations
 from sysdyn.dsl.elaborate.parts import Requirement
 from sysdyn.dsl.format.format import format_expression
@@ -24,20 +25,6 @@ class Statements(Declarations):
     def constraint(self, s: syntax.Constraint) -> None:
         """phi, psi, gamma."""
         place = self.place(s.span)
-        if s.relation != "=":
-            what = "inequality" if s.kind != "gamma" else "inequality of a gamma"
-            raise self.resolver.fail(
-                "N608",
-                f"{s.kind} {s.decl.name}: an {what} is not supported yet (planned: events and inequalities)",
-                s.span,
-            )
-        for guard in s.guards:
-            if guard.kind == "restitution":
-                message = f"{s.kind} {s.decl.name}: restitution on an equality"
-                raise self.resolver.fail("E514", message, guard.span, help=f"{s.kind} ... >=")
-            raise self.resolver.fail(
-                "N608", f"{s.kind} {s.decl.name}: 'while' is not supported yet (planned: events)", guard.span
-            )
         with self.resolver.virtually() if s.kind == "psi" else nullcontext():
             left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
         dimension = self._sides(f"{s.kind} {s.decl.name}", left, right, s.right)
@@ -53,6 +40,7 @@ class Statements(Declarations):
             raise self.resolver.fail("E106", message, s.decl.span, help=f"{s.decl.name}[i]")
         node = ex.sub(left.node, right.node)
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
+        constraint = events.guarded(self, s, constraint)
         self.parts.constraints.append(constraint)
         self.resolver.constraints.setdefault(family.name, []).append(constraint)
 
@@ -79,6 +67,8 @@ class Statements(Declarations):
 
     def _content(self, s: syntax.Content) -> None:
         node = self._wants(f"content {s.function}", s.value, dim.POWER)
+        if s.function == "D":
+            node = events.set_valued(self, node, self.resolver.loops, self.place(s.span))
         self.parts.energies.append(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
 
     def _work(self, s: syntax.Work) -> None:
@@ -234,4 +224,6 @@ STATEMENTS: dict[type, Callable[..., None]] = {
     syntax.Require: Statements._require,
     syntax.Expect: Statements.expect,
     syntax.Golden: Statements.golden,
+    syntax.When: events.when,
+    syntax.Every: events.every,
 }

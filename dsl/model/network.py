@@ -268,6 +268,62 @@ class Observation:
     unit: Unit
     text: str  # as the author wrote it, formatted
     place: Place
+    stored: bool = True  # not so: what an event reads
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """`target := value`: target is the param of a discrete variable, a state (kind s) or a flow (kind f).
+
+    value: name of the observation that holds it.
+    """
+
+    target: Node
+    value: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """`when condition { .. }` or `every period { .. }`.
+
+    condition: made of and, or, not, comparisons of params, and comparisons `observation > 0` (or >=, <, <=, ==), each
+    over a var that names an observation, of kind `moves` where it does between events, else `rests`; None of `every`.
+    """
+
+    name: str
+    condition: Node | None
+    period: Node | None
+    actions: tuple[Action, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """A constraint that holds at times: an inequality, one under a guard, or dry friction's sticking.
+
+    kind: phi or psi (with a multiplier >= 0 where it holds, and value >= 0 elsewhere), guarded (while), friction (the
+    multiplier bounded by `bound` on both sides where it holds; elsewhere the param `sense` is the sign of the value).
+    at: indices in the family of the label.  value, rate, acceleration, multiplier, bound, bound - multiplier
+    (upper), bound + multiplier (lower), guard: names of observations.
+    """
+
+    name: str
+    label: str
+    at: tuple[int, ...]
+    kind: str
+    place: Place
+    value: str
+    rate: str
+    multiplier: str
+    element: str = ""  # the branch whose effort holds the multiplier while it sticks
+    acceleration: str | None = None
+    bound: str | None = None
+    upper: str | None = None
+    lower: str | None = None
+    sense: Node | None = None
+    guard: str | None = None
+    restitution: Node | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,4 +396,7 @@ class Network:
     couplings: tuple[Coupling, ...] = ()
     slopes: tuple[Slope, ...] = ()  # of laws that the compiler has inverted
     quasis: tuple[str, ...] = ()  # families of quasi-velocities
+    discretes: frozenset[str] = frozenset()  # parameters that events assign
+    events: tuple[Event, ...] = ()
+    switches: tuple[Switch, ...] = ()
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)

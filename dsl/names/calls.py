@@ -128,8 +128,6 @@ class Calls(Context):
             elif value.dimension is not None and value.dimension != common:
                 message = f"the arguments of {name} differ: {dim.show(common)} and {dim.show(value.dimension)}"
                 raise self.fail("E206", message, where.span)
-        if name == "setsign":
-            raise self.fail("N608", "setsign is not supported yet (planned: events and inequalities)", e.span)
         if name == "celsius":
             return Typed(ex.add(values[0].node, ex.const(273.15)), dim.result(name, NONE))
         return Typed(ex.call(name, *(v.node for v in values)), dim.result(name, common))

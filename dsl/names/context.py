@@ -236,6 +236,13 @@ class Context:
         """A scalar value of any dimension."""
         return self.one_number(self.resolve(expression), expression)
 
+    def scalar_or_truth(self, expression: syntax.Expr) -> Typed:
+        """A scalar value or a condition."""
+        value = self.resolve(expression)
+        if isinstance(value, Vector):
+            raise self.fail("E203", "an array stands where one number is wanted", expression.span)
+        return value
+
     def one_number(self, value: Value, expression: syntax.Expr) -> Typed:
         """A value found before, where one number is wanted; expression: where it was found."""
         if isinstance(value, Vector):

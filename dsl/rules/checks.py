@@ -134,6 +134,7 @@ def smoothness(model: Elaborator, report: Report) -> None:
     for constraint in model.parts.constraints:
         if constraint.kind == "gamma":
             _corner(constraint.expression, constraint.place, report)
+    _set_valued(model, report)
     for energy in model.parts.energies:
         if energy.function != "D":
             continue
@@ -143,6 +144,25 @@ def smoothness(model: Elaborator, report: Report) -> None:
                 message = f"content D with a corner at {flow} = 0 is set-valued friction: not supported yet"
                 report.note("N608", f"{message} (planned: events and inequalities)", energy.place)
                 break
+
+
+def _set_valued(model: Elaborator, report: Report) -> None:
+    """E705: setsign where no multiplier can stand for it; N608 of a gamma."""
+    parts = model.parts
+    said = [(c.expression, c.place, c.kind) for c in parts.constraints]
+    said += [(b.law, b.place, "law") for b in parts.branches if b.law is not None]
+    said += [(w.effort, w.place, "work") for w in parts.works] + [(d.expression, d.place, "") for d in parts.dynamics]
+    said += [(e.expression, e.place, e.function) for e in parts.energies]
+    said += [(o.expression, o.place, "") for o in parts.watched]
+    for node, place, kind in said:
+        if any(n.op == "call" and n.data == "setsign" for n in ex.topological([node])):
+            if kind in ("gamma", "D", "law"):
+                what = {"law": "a law that gives a flow"}.get(kind, f"a {kind}")
+                help_ = "dissipator(e = c*setsign(f))"
+                report.note("N608", f"setsign in {what} is not supported yet", place, help=help_)
+            else:
+                message = "setsign outside a law, gamma or content"
+                report.error("E705", message, place, help="sign for an ordinary function")
 
 
 def _corner(node: Node, place: Place, report: Report) -> None:

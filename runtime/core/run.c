@@ -7,7 +7,8 @@
 #include <string.h>
 #include <time.h>
 
-#define POLL 4 /* steps between two looks at the clock */
+#define POLL 4  /* steps between two looks at the clock */
+#define PARTS 4 /* of a step, at whose ends what is watched is looked at */
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited)
@@ -190,9 +191,9 @@ static double kind_here(const sd_run *run, int asked)
 }
 
 /* rows of the last step that are still to be written; 1: no room left */
-static int drain(sd_run *run)
+int sd_run_drain(sd_run *run)
 {
-    double t = *run->stepper->t;
+    double t = run->t_to;
     if (run->pending && run->settle && run->stepper->refine && run->next < run->instants &&
         run->instant[run->next] < t)
         run->stepper->refine(run->stepper->self, run->settle);
@@ -207,6 +208,8 @@ static int drain(sd_run *run)
             continue;
         }
         double kind = kind_here(run, asked);
+        if (t == *run->stepper->t_end || t < *run->stepper->t)
+            kind = (double)((int32_t)kind | run->end_kind);
         run->next += asked;
         if (kind > 0.0)
             emit(run, t, t, kind, 1);
@@ -226,7 +229,7 @@ static void rows_of_start(sd_run *run, double label)
         emit(run, t, run->instant[run->next++], kind, 1);
     }
     int asked = run->next < run->instants && run->instant[run->next] <= t;
-    double kind = kind_here(run, asked);
+    double kind = (double)((int32_t)kind_here(run, asked) | run->start_kind);
     emit(run, t, label, kind, 1);
     run->next += asked;
     while (run->next < run->instants && run->instant[run->next] <= t)
@@ -238,7 +241,7 @@ static void rows_of_start(sd_run *run, double label)
     audit(run, t, run->point, run->point_d, run->after);
     if (run->ledgers)
         sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after);
-    run->t_from = t;
+    run->t_from = run->t_to = t;
     run->fresh = 0;
 }
 
@@ -260,7 +263,7 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
     size_t written = (size_t)run->written * sizeof(double);
     memcpy(run->aux, before, written);
     memcpy(run->aux_d, before_d, written);
-    audit(run, *run->stepper->t, run->aux, run->aux_d, old);
+    audit(run, run->t_to, run->aux, run->aux_d, old);
     memcpy(run->aux, y, written);
     memcpy(run->aux_d, yd, written);
     audit(run, t, run->aux, run->aux_d, new);
@@ -272,11 +275,27 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
     rows_of_start(run, label);
 }
 
-/* quadratures over the step just accepted, powers and balances at its end */
-static void measure(sd_run *run, double from)
+/* whether something watched changes within the last step */
+static int changes(sd_run *run, double from)
 {
-    double t = *run->stepper->t;
+    const sd_stepper *stepper = run->stepper;
+    for (int part = 1; part <= PARTS && run->watches; part++) {
+        double t = part == PARTS ? *stepper->t : from + (*stepper->t - from) * part / PARTS;
+        stepper->dense(stepper->self, t, run->aux, run->aux_d);
+        memset(run->values, 0, (size_t)run->observed * sizeof(double));
+        run->observe->rows(&run->observe->frame, t, run->aux, run->aux_d, run->values);
+        for (int32_t i = 0; i < run->watches; i++)
+            if (run->watch[i].side * run->values[run->watch[i].row] < -run->watch[i].tolerance)
+                return 1;
+    }
+    return 0;
+}
+
+/* quadratures over the step just accepted, powers and balances at its end */
+static void measure(sd_run *run, double from, double t)
+{
     run->t_from = from;
+    run->t_to = t;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
     integrate(run, t);
@@ -301,13 +320,24 @@ static double now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+int sd_run_accept(sd_run *run, double to, int32_t kind)
+{
+    int32_t before = run->end_kind;
+    memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
+    measure(run, run->t_from, to);
+    run->end_kind |= kind;
+    int full = sd_run_drain(run);
+    run->end_kind = full ? run->end_kind : before;
+    return full;
+}
+
 int sd_run_advance(sd_run *run, int64_t steps, double seconds)
 {
     double until = now() + seconds;
     if (!run->started && begin(run))
         return SD_FULL;
     for (int64_t k = 0; k < steps; k++) {
-        if (run->pending && drain(run))
+        if (run->pending && sd_run_drain(run))
             return SD_FULL;
         if (*run->stepper->system->stop)
             return SD_FAILED;
@@ -317,10 +347,13 @@ int sd_run_advance(sd_run *run, int64_t steps, double seconds)
         memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
         if (run->stepper->step(run->stepper->self))
             return SD_FAILED;
-        measure(run, from);
+        run->t_from = from;
+        if (changes(run, from))
+            return SD_EVENT;
+        measure(run, from, *run->stepper->t);
         if (run->ledgers && run->ledgers->lost >= 0)
             return SD_FAILED;
-        if (drain(run))
+        if (sd_run_drain(run))
             return SD_FULL;
         if (k % POLL == POLL - 1 && now() > until)
             return SD_RUNNING;

@@ -19,7 +19,13 @@
 
 #define SD_ROW_HEAD 8
 
-enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3 };
+enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };
+
+/* What ends a smooth piece: side * observed[row] falls below -tolerance. */
+typedef struct sd_watch {
+    int32_t row, side;
+    double tolerance;
+} sd_watch;
 
 typedef struct sd_run {
     sd_stepper *stepper;
@@ -48,6 +54,11 @@ typedef struct sd_run {
     double *point, *point_d, *aux, *aux_d, *values, *largest, *memory;   /* largest [observed]: of observe_scale */
     int64_t rows_written;
     double first_energy;
+    /* events */
+    const sd_watch *watch;            /* [watches] */
+    int32_t watches, end_kind;        /* end_kind: kind of the row where a step meets t_end, beside those asked for */
+    int32_t start_kind;               /* the same of the row of a restart */
+    double t_to;                      /* end of what counts of the last step */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
@@ -57,7 +68,12 @@ void sd_run_free(sd_run *run);
  * last step */
 void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
                     const double *before_d);
-/* steps until `steps` more are taken, `seconds` are over, the rows are full, the end or a failure */
+/* the last step counts up to `to`, where a row of kind `kind` is written beside those asked for; after SD_EVENT.  1: the
+ * rows are full, `sd_run_drain` goes on */
+int sd_run_accept(sd_run *run, double to, int32_t kind);
+int sd_run_drain(sd_run *run);
+/* steps until `steps` more are taken, `seconds` are over, the rows are full, the end, a failure, or a step within which
+ * something watched changes (SD_EVENT: the step is not counted yet, see sd_run_accept) */
 int sd_run_advance(sd_run *run, int64_t steps, double seconds);
 
 #endif

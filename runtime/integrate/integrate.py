@@ -13,10 +13,12 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.least_norm import LeastNorm
 from sysdyn.runtime.integrate.ledgers import Ledgers
 from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.metric import kinematic_scale, light
+from sysdyn.runtime.integrate.pieces import Pieces
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
@@ -74,6 +76,7 @@ class Integration:
         self.segments = segments(start.t, request.t_end, stops)
         self._stepper()
         self._driver()
+        self.pieces = Pieces(self, request.events) if request.events else None
 
     def _weighted(self, jy: Floats, jyd: Floats) -> tuple[Floats, Floats]:
         """The Jacobian with the factors of the rows q' - f; the magnitudes of nu follow them."""
@@ -181,7 +184,8 @@ class Integration:
         run.sample_steps = int(request.sample_steps)
         run.row, run.room = lib.pointer(self._rows), self._rows.shape[0]
 
-    def _drain(self, sink: Sink) -> None:
+    def drain(self, sink: Sink) -> None:
+        """Rows so far go to the sink."""
         run = self.run_.contents
         if run.rows:
             sink(self._rows[: run.rows].copy())
@@ -233,6 +237,10 @@ class Integration:
             change[self.roles.test < 0] = 0.0
         return self.system.name(int(np.argmax(change)))
 
+    def happened(self) -> tuple[Happened, ...]:
+        """The events so far."""
+        return tuple(self.pieces.handler.happened) if self.pieces is not None else ()
+
     def largest(self) -> Floats:
         """Largest magnitude so far of each observed quantity and of the terms of its expression [observed]."""
         return lib.reader(self.run_.contents.largest, max(self.observed, 1))[: self.observed].copy()
@@ -250,25 +258,42 @@ class Integration:
             method.newton_failures,
         )
 
+    @property
+    def restart(self) -> Restart:
+        """Finds consistent points behind jumps."""
+        if self._restart is None:
+            self._restart = Restart(self.settler, self.roles.state[: self.system.form.written])
+        return self._restart
+
     def _cross(self, segment: Segment) -> None:
         """Restarts behind the instant at which a segment ended."""
         n, method = self.system.form.written, self.method.contents
         y, yd = self.method.point()
         y, yd, _ = self.settler.settle(method.t, y[:n], yd[:n])
-        if self._restart is None:
-            self._restart = Restart(self.settler, self.roles.state[:n])
-        found = self._restart.across(segment.begin, y, yd)
+        if self.pieces is not None:
+            found: tuple[Floats, Floats] | None = self.pieces.jump(segment.begin, y, yd)
+        else:
+            found = self.restart.across(segment.begin, y, yd)
         if found is None:
             raise self._failure("newton")
-        self.y[:], self._start_rate[:] = 0.0, 0.0
-        self.y[:n], self._start_rate[:n] = found
-        self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
         method.t_end = segment.end
-        pointers = (lib.pointer(item) for item in (self.y, self.yd, y, yd))
-        lib.core.sd_run_restart(self.run_, segment.begin, segment.label, *pointers)
+        self.go_on(segment.begin, segment.label, found, (y, yd))
 
-    def _advance(self, sink: Sink, progress: Progress | None, began: float) -> None:
+    def go_on(
+        self, t: float, label: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats]
+    ) -> None:
+        """Restarts at t (s) from a point [unknowns as written], with the row of the instant `label`."""
+        n = self.system.form.written
+        self.y[:], self._start_rate[:] = 0.0, 0.0
+        self.y[:n], self._start_rate[:n] = point
+        self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
+        pointers = (lib.pointer(item) for item in (self.y, self.yd, *before))
+        lib.core.sd_run_restart(self.run_, t, label, *pointers)
+
+    def _advance(self, sink: Sink, progress: Progress | None, began: float, segment_end: float) -> None:
         """To the end of a segment."""
+        if self.pieces is not None:
+            self.pieces.aim(segment_end)
         request, method = self.request, self.method.contents
         marked, at = method.steps, method.t
         while True:
@@ -276,7 +301,7 @@ class Integration:
             before = time.process_time()
             state = lib.core.sd_run_advance(self.run_, min(CHUNK_STEPS, max(left, 1)), CHUNK_SECONDS)
             self.cpu += time.process_time() - before
-            self._drain(sink)
+            self.drain(sink)
             self.system.failure.check()
             self.settler.system.failure.check()
             if progress is not None:
@@ -288,6 +313,12 @@ class Integration:
             late = request.max_wall is not None and time.monotonic() - began > request.max_wall
             if late and method.t < request.t_end:
                 raise self._failure("max_wall")
+            if state == 4:
+                assert self.pieces is not None
+                self.cpu += self.pieces.event(sink)
+                continue
+            if state == 1 and self.pieces is not None and self.pieces.sample(segment_end, sink):
+                continue
             if state == 1:
                 break
             if method.steps - marked >= CRAWL:
@@ -305,7 +336,7 @@ class Integration:
                 before = time.process_time()
                 self._cross(segment)
                 self.cpu += time.process_time() - before
-            self._advance(sink, progress, began)
+            self._advance(sink, progress, began, segment.end)
         magnitude = confirmed(self.system, self.request.t_end - self.start.t, self._met, self.magnitude)
         return Finished(
             method.t,
@@ -315,6 +346,7 @@ class Integration:
             self.cpu,
             self.settler.core.contents.failures,
             self.ledgers.balances(),
+            self.happened(),
         )
 
     def __del__(self) -> None:

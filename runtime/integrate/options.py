@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.integrate.request import COMPARED, STEP, TRACE
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
@@ -53,6 +54,7 @@ class Options:
     euler_step: float | None = None
     stops: Floats | None = None
     redundancy: str = "error"
+    events: Plan | None = None
     max_steps: int | None = None
     max_wall: float | None = None
     sample_steps: bool = False

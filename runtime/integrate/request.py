@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
@@ -44,6 +47,8 @@ class Request:
     h_max: float | None = None
     stops: Floats | None = None
     least_norm: bool = False
+    events: Plan | None = None
+    begin: tuple[Floats, NDArray[np.bool_]] | None = None
     stiff_steps: float = 1e5
 
 
@@ -77,3 +82,4 @@ class Finished:
     cpu: float
     unsettled: int
     balances: tuple[Balance, ...] = ()
+    events: tuple[Happened, ...] = ()

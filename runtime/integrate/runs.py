@@ -61,6 +61,8 @@ class Runs:
     def __init__(self, system: System, start: ConsistentState, options: Options, index: int, method: str) -> None:
         self.system, self.start, self.options, self.index, self.method = system, start, options, index, method
         self.columns: tuple[Column, ...] = columns_of(system.description)
+        # events write there: every run begins with these
+        self.begin = system.description.p.copy(), system.description.switches.active.copy()
         self.names = _observed_names(system.description)
         self.instants, self.kinds = instants(options)
         self.path = Path(options.output)
@@ -98,6 +100,8 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stiff_steps=LONG if options.method == "auto" else STIFF,
+            events=options.events or None,
+            begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
             max_order=1 if self.method == "euler" else lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
@@ -177,7 +181,7 @@ class Runs:
         if first:
             nominal = self.nominal(integration.largest(), integration.magnitude)
             attributes: dict[str, str | float | int] = {**self.last_attributes(None), "met": 0, "judged": ""}
-            self.writer.finish(nominal, attributes, final=False)
+            self.writer.finish(nominal, attributes, final=False, events=integration.happened())
             return
         self.writer.discard()
         with contextlib.suppress(OSError):

@@ -28,6 +28,7 @@ from sysdyn.runtime.model.core_structures import (
     Stepper,
     System,
     Underlying,
+    Watch,
 )
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "Stepper",
     "System",
     "Underlying",
+    "Watch",
     "core",
     "pointer",
     "reader",
@@ -109,6 +111,8 @@ def _load() -> Any:
         "sd_run_free": (None, [_P]),
         "sd_run_restart": (None, [_P, _D, _D, _P, _P, _P, _P]),
         "sd_run_advance": (c.c_int, [_P, _L, _D]),
+        "sd_run_accept": (c.c_int, [_P, _D, _I]),
+        "sd_run_drain": (c.c_int, [_P]),
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(core, name)

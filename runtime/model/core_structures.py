@@ -322,6 +322,12 @@ class Ledgers(c.Structure):
     ]
 
 
+class Watch(c.Structure):
+    """sd_watch."""
+
+    _fields_ = [("row", _I), ("side", _I), ("tolerance", _D)]
+
+
 class Run(c.Structure):
     """sd_run."""
 
@@ -362,4 +368,9 @@ class Run(c.Structure):
         *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "memory"]],
         ("rows_written", _L),
         ("first_energy", _D),
+        ("watch", _P),
+        ("watches", _I),
+        ("end_kind", _I),
+        ("start_kind", _I),
+        ("t_to", _D),
     ]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.failures import ContractError, RowLabel
+from sysdyn.runtime.model.switches import Switches
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -140,6 +141,7 @@ class Description:
     p: Floats
     ix: Ints
     initial: tuple[Initial, ...]
+    switches: Switches
 
     def families_of(self, kind: str) -> tuple[int, ...]:
         """Numbers of the families of one kind."""
@@ -254,7 +256,17 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
             str(name): tuple(_kernel(kernel) for kernel in block["kernels"])
             for name, block in structure["blocks"].items()
         },
-        p=np.ascontiguousarray(binding["p"], dtype=np.float64),
+        p=np.array(binding["p"], dtype=np.float64),  # its own: events write there
         ix=np.ascontiguousarray(binding["ix"], dtype=np.int32),
         initial=tuple(_initial(item, names) for item in binding.get("initial", ())),
+        switches=Switches(tuple(_switched(item, families, shapes) for item in structure.get("switches", ()))),
     )
+
+
+def _switched(item: Mapping[str, Any], families: Sequence[Mapping[str, Any]], shapes: list[Shape]) -> tuple[int, int]:
+    """Family and position of the multiplier of a constraint that holds at times."""
+    family = next(k for k, f in enumerate(families) if f["kind"] in ("kappa", "mu") and f["owner"] == item["owner"])
+    position = 0
+    for value, (first, last) in zip(item["at"], shapes[family], strict=True):
+        position = position * (last - first + 1) + (int(value) - first)
+    return family, position

@@ -1,4 +1,6 @@
-"""Rows of left-out constraints: in each index form, which rows read "multiplier = 0" in the place of their equation."""
+"""Rows of constraints that are left out, or do not hold now: in each index form, which rows read "multiplier = 0" in
+the place of their equation.
+"""
 
 from __future__ import annotations
 
@@ -32,11 +34,9 @@ def held_rows(description: Description, form: Form, left_out: LeftOut) -> tuple[
     unknowns: list[int] = []
     for family, position in left_out:
         item = description.families[family]
-        block = "phi" if item.kind == "kappa" else "psi"
-        rows_of = ((k, description.rows[k]) for k in description.rows_of(block))
-        row = next(k for k, found in rows_of if item.owner in (found.owner, found.label))
+        row = multiplier_row(description, family)
         groups = _ROWS[form.name]
-        for kind, at in ((item.kind, int(form.at[family])), ("nu", _nu(description, form, family))):
+        for kind, at in ((item.kind, int(form.at[family])), ("nu", nu_place(description, form, family))):
             group = groups.get(kind) if kind != "nu" or item.kind == "kappa" else None
             if group is not None and at >= 0 and (group, row) in first:
                 rows.append(first[group, row] + position)
@@ -44,9 +44,46 @@ def held_rows(description: Description, form: Form, left_out: LeftOut) -> tuple[
     return np.asarray(rows, dtype=np.int64), np.asarray(unknowns, dtype=np.int64)
 
 
-def _nu(description: Description, form: Form, family: int) -> int:
+def multiplier_row(description: Description, family: int) -> int:
+    """The row family of the constraint of a family of multipliers."""
+    item = description.families[family]
+    block = "phi" if item.kind == "kappa" else "psi"
+    rows_of = ((k, description.rows[k]) for k in description.rows_of(block))
+    return next(k for k, found in rows_of if item.owner in (found.owner, found.label))
+
+
+def nu_place(description: Description, form: Form, family: int) -> int:
     """Where the nu of a constraint stand (behind the unknowns as written, in the order of the kappa); -1: nowhere."""
     if form.unknowns == form.written:
         return -1
     before = sum(description.families[k].size for k in description.families_of("kappa") if k < family)
     return form.written + before
+
+
+_HELD = {
+    "3": (("phi", "kappa"), ("psi", "mu")),
+    "2": (("phi_rate", "kappa"), ("phi", "nu"), ("psi", "mu")),
+    "2v": (("phi_rate", "kappa"), ("psi", "mu")),
+    "1": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
+    "0": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
+    "constraints": (("phi", "kappa"), ("phi_rate", "kappa"), ("psi", "mu")),
+}
+_HELD["settled"] = _HELD["start"] = (
+    *_HELD["constraints"], ("phi_acceleration", "kappa"), ("psi_rate", "mu"),
+)  # fmt: skip
+"""Form -> groups of rows of a constraint, and the unknown that each reads where the constraint does not hold."""
+
+
+def switch_rows(description: Description, form: Form) -> tuple[Longs, Longs, Longs]:
+    """Rows, the unknowns that vanish there, and the numbers of their switches."""
+    first = {(group, family): row for group, family, row in form.groups}
+    found: list[tuple[int, int, int]] = []
+    for k, (family, position) in enumerate(description.switches.places):
+        item = description.families[family]
+        row = multiplier_row(description, family)
+        for group, kind in _HELD[form.name]:
+            place = nu_place(description, form, family) if kind == "nu" else int(form.at[family])
+            if item.kind == ("kappa" if kind == "nu" else kind) and place >= 0 and (group, row) in first:
+                found.append((first[group, row] + position, place + position, k))
+    table = np.asarray(found, dtype=np.int64).reshape(-1, 3)
+    return table[:, 0], table[:, 1], table[:, 2]

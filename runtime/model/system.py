@@ -18,7 +18,7 @@ from sysdyn.runtime.model.carrier import Carrier, Extent, Failure, Tables
 from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, describe
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
-from sysdyn.runtime.model.held_rows import LeftOut, held_rows
+from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
 from sysdyn.runtime.model.patterns import Pattern, Places, compress, places
 
 Mask = NDArray[np.bool_]
@@ -92,7 +92,8 @@ class System:
         for pair in found:
             parts += pair
         held = held_rows(self.description, form, self.left_out)
-        parts.append(Places(*held))
+        times = switch_rows(self.description, form)
+        parts.append(Places(np.concatenate([held[0], times[0]]), np.concatenate([held[1], times[1]])))
         self.pattern: Pattern
         self.pattern, slots = compress(form.rows, form.unknowns, parts)
         entries = max([part.row.size for part in parts] + [1])
@@ -108,10 +109,10 @@ class System:
         self._scales = scales
         self.kinematic_scale = np.ones(form.k_row.size)
         self._scratch = np.zeros(entries)
-        cleared = np.flatnonzero(np.isin(self.pattern.row, held[0])).astype(np.int32)
-        held_row, held_unknown = (item.astype(np.int32) for item in held)
-        self._keep += [calls, slots, cleared, held_row, held_unknown]
-        self.held = held_row, held_unknown
+        self._keep += [calls, slots]
+        number = np.concatenate([np.full(held[0].size, -1), times[2]])
+        at_times = parts[-1].row.astype(np.int32), parts[-1].column.astype(np.int32)
+        self._may_hold: tuple[Ints, Ints, Ints, NDArray[np.int64]] = (*at_times, slots[-1], number)
         self.core = lib.System(
             unknowns=form.unknowns,
             rows=form.rows,
@@ -127,17 +128,30 @@ class System:
             k_slot_q=lib.pointer(slots[0]),
             k_slot_f=lib.pointer(slots[1]),
             k_scale=lib.pointer(self.kinematic_scale),
-            held=held_row.size,
-            clear=cleared.size,
-            held_row=lib.pointer(held_row),
-            held_unknown=lib.pointer(held_unknown),
-            held_slot=lib.pointer(slots[-1]),
-            cleared=lib.pointer(cleared),
             scales=len(form.scales),
             scale=c.addressof(scales),
             v=lib.pointer(self._scratch),
             stop=lib.pointer(self.failure.flag),
         )
+        self.switch()
+        self.description.switches.join(self)
+
+    def switch(self) -> None:
+        """Rows of constraints that do not hold read "multiplier = 0"."""
+        rows, unknowns, slots, number = self._may_hold
+        now = (number < 0) | ~np.append(self.description.switches.active, True)[number]
+        self.held = row, unknown = rows[now], unknowns[now]
+        cleared = np.flatnonzero(np.isin(self.pattern.row, row)).astype(np.int32)
+        self._held = row, unknown, slots[now].copy(), cleared
+        core = self.core
+        core.held, core.clear = row.size, cleared.size
+        core.held_row, core.held_unknown, core.held_slot, core.cleared = map(lib.pointer, self._held)
+
+    def idle_multipliers(self) -> Ints:
+        """Places of the multipliers of constraints that do not hold now."""
+        switches = self.description.switches
+        idle = (place for place, active in zip(switches.places, switches.active, strict=True) if not active)
+        return np.array([self.form.at[family] + position for family, position in idle], dtype=np.int32)
 
     def call(
         self, block: str, at: Ints, to: Ints, rows: int, *, dy: Ints | None = None, dyd: Ints | None = None

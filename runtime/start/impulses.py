@@ -47,38 +47,53 @@ class Impulses:
 
     def broken(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
         """Whether a constraint on flows does not hold at the point."""
-        if not self._flow_rows.any():
+        if not self._flows().any():
             return False
         jy, _ = self.system.jacobian(t, y, yd)
         size = np.zeros(self.system.rows)
         np.add.at(size, self._rows, np.abs(jy) * np.maximum(magnitude, np.abs(y))[self._columns])
         r = np.abs(self.system.residual(t, y, yd))
         with np.errstate(all="ignore"):
-            return bool((r[self._flow_rows] > BROKEN * size[self._flow_rows]).any())
+            return bool((r > BROKEN * size)[self._flows()].any())
 
-    def after(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
-        """Y with flows, momenta and implicit efforts after the impulses at t."""
+    def _flows(self) -> Mask:
+        """Rows of constraints on flows that hold now."""
+        found = self._flow_rows.copy()
+        found[self.system.held[0]] = False
+        return found
+
+    def after(
+        self, t: float, y: Floats, yd: Floats, magnitude: Floats, aims: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Y with flows, momenta and implicit efforts after the impulses at t; the impulses [unknowns].
+
+        aims [rows]: what the constraints on flows shall be; None: zero.
+        """
         y, start = y.copy(), y.copy()
         impulse = np.zeros(y.size)
-        use = self._flow_rows | self._state_rows | self._balance
+        use = self._flows() | self._state_rows | self._balance
+        acts = self._impulse.copy()
+        acts[self.system.held[1]] = False
         number = np.cumsum(use) - 1
         for _ in range(_ITERATIONS):
             jy, jyd = self.system.jacobian(t, y, yd)
             balance = self._balance[self._rows]
             value = np.where(
                 balance,
-                np.where(self._impulse[self._columns], jy, np.where(self._moving[self._columns], jyd, 0.0)),
+                np.where(acts[self._columns], jy, np.where(self._moving[self._columns], jyd, 0.0)),
                 np.where(self._moving[self._columns], jy, 0.0),
             )
             value = np.where(use[self._rows] & np.isfinite(value), value, 0.0)
             r = self.system.residual(t, y, yd)
+            if aims is not None:
+                r -= aims
             moved = np.where(self._impulse, impulse, y - start)
             r[self._balance] = 0.0
             np.add.at(r, self._rows[balance], (value * moved[self._columns])[balance])
             step = self._solve(value, -r[use], number, magnitude)
             y[self._moving] += step[self._moving]
             impulse[self._impulse] += step[self._impulse]
-        return y
+        return y, impulse
 
     def _solve(self, value: Floats, aim: Floats, number: NDArray[np.int64], magnitude: Floats) -> Floats:
         """Least change of the columns that take part."""

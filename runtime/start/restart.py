@@ -29,16 +29,27 @@ class Restart:
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
-        magnitude = lib.reader(self.settler.core.contents.scale, y.size).copy()
+        found = self.struck(t, y, yd)
+        return None if found is None else found[:2]
+
+    def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        """The same with the impulses [unknowns as written] that took the flows there."""
+        magnitude = self.magnitude(y.size)
+        impulse = np.zeros(y.size)
         if self.impulses.broken(t, y, yd, magnitude):
-            y = self.impulses.after(t, y, yd, magnitude)
+            y, impulse = self.impulses.after(t, y, yd, magnitude)
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
         for hold in (HELD, 1.0):
             self.settler.core.contents.ready = 0
             found, rate, done = self.settler.settle(t, y, yd, hold=hold)
             if done:
-                return found, rate
-        return self._search(t, y, yd, magnitude)
+                return found, rate, impulse
+        searched = self._search(t, y, yd, magnitude)
+        return None if searched is None else (*searched, impulse)
+
+    def magnitude(self, number: int) -> Floats:
+        """Magnitudes [number] of the first unknowns."""
+        return lib.reader(self.settler.core.contents.scale, number).copy()
 
     def _search(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
         """The same by Gauss-Newton with shortened steps: first with the state held, then with everything free."""

@@ -53,7 +53,7 @@ def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu
     """J from the reactions of the multipliers of those kinds (virtual displacements)."""
     pattern = system.pattern
     columns = pattern.columns_of()
-    multipliers = np.flatnonzero(np.isin(system.kinds, kinds))
+    multipliers = np.setdiff1d(np.flatnonzero(np.isin(system.kinds, kinds)), system.idle_multipliers())
     dynamics = np.zeros(system.rows, dtype=bool)
     for group, family, first in system.form.groups:
         if group == "dynamics":

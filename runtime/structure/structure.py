@@ -157,12 +157,31 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
     return pencil_index(system.dense(jyd), system.dense(jy)), ()
 
 
+def _highest_index(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
+    """The index that the model may come to, with every constraint that may hold, as far as they are independent."""
+    switches = system.description.switches
+    index, undetermined = index_of(system, state)
+    if not switches.places or index is None:
+        return index, undetermined
+    before = switches.active.copy()
+    try:
+        switches.set(np.ones_like(before))
+        y, yd = state.for_form(system)
+        found = reactions(system, system.jacobian(state.t, y, yd)[0])
+        left = {_place(system, int(found.multipliers[k])) for k in dependent(found)}
+        switches.set(np.array([before[k] or place not in left for k, place in enumerate(switches.places)]))
+        most, _ = index_of(system, state)
+    finally:
+        switches.set(before)
+    return (index if most is None else max(index, most)), ()
+
+
 def structure(system: System, state: ConsistentState) -> Structure:
     """Facts of a model at a consistent state; system: any form."""
     system = system if system.form.name == "3" else system.another("3")
     y, yd = state.for_form(system)
     jy, _ = system.jacobian(state.t, y, yd)
-    index, undetermined = index_of(system, state)
+    index, undetermined = _highest_index(system, state)
     found = reactions(system, jy)
     left = dependent(found)
     zero = vanished(system, state)
@@ -178,7 +197,8 @@ def structure(system: System, state: ConsistentState) -> Structure:
     left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
     lost = lowest - int(left.size)
     n = int((system.kinds == "f").sum())
-    m1, m2 = (int((system.kinds == kind).sum()) for kind in ("kappa", "mu"))
+    now = np.delete(system.kinds, system.idle_multipliers())
+    m1, m2 = (int((now == kind).sum()) for kind in ("kappa", "mu"))
     rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())
     weights = combination(found, left)
     group = tuple(

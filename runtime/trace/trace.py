@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.opening import opened
@@ -110,7 +111,7 @@ class TraceWriter:
         if self._waiting:
             self._turn(None)
 
-    def _turn(self, last: Mapping[str, Mapping[str, Any]] | None) -> None:
+    def _turn(self, last: Mapping[str, Mapping[str, Any]] | None, events: Sequence[Happened] = ()) -> None:
         """The hidden store takes all rows (and last attributes, after which it is closed) and becomes visible."""
         new, self._waiting, self._numbers = self._waiting, [], 0
         try:
@@ -123,7 +124,7 @@ class TraceWriter:
                 if rows:
                     self._hidden.append(np.concatenate(rows))
                 if last is not None:
-                    self._hidden.close_with(last)
+                    self._hidden.close_with(last, events)
                 self._publish(self._hidden)
         except TraceError as error:
             self._drop_hidden()
@@ -168,15 +169,16 @@ class TraceWriter:
         nominal: Mapping[str, float],
         attributes: Mapping[str, str | float | int],
         final: bool,
+        events: Sequence[Happened] = (),
     ) -> None:
-        """Nominal values, last attributes, `final`; closes the file.  A trace that was given up stays as it is."""
+        """Nominal values, last attributes, `final`, events; closes the file.  One that was given up stays as it is."""
         if self.closed:
             return
         sizes = {
             column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns
         }
         sizes["/audit/energy"] = {"nominal": self._turned_over}
-        self._turn({**sizes, "/": {**attributes, "final": np.int64(final)}})
+        self._turn({**sizes, "/": {**attributes, "final": np.int64(final)}}, events)
         self.discard()
 
     def discard(self) -> None:
@@ -228,6 +230,11 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
+def _events(group: Any) -> tuple[Happened, ...]:
+    texts = ([_plain(v) for v in group[name][()]] for name in ("name", "element", "before", "after"))
+    return tuple(Happened(float(t), *said) for t, *said in zip(group["time"][()], *texts, strict=True))
+
+
 @dataclass(frozen=True, slots=True)
 class Trace:
     """A trace read from a file: trace["q1"], trace.time [s], trace.names, trace.attributes."""
@@ -237,6 +244,7 @@ class Trace:
     attributes: dict[str, Any]
     parameters: dict[str, tuple[float, str]]
     _data: dict[str, Quantity]
+    events: tuple[Happened, ...] = ()
 
     @classmethod
     def open(cls, file: str | Path) -> Trace:
@@ -276,7 +284,8 @@ class Trace:
                 for name, item in source.get("parameters", {}).items()
             }
             attributes = {name: _plain(value) for name, value in source.attrs.items()}
-            return cls(str(path), np.asarray(data["time"][:length]), attributes, parameters, quantities)
+            events = _events(source["events"]) if "events" in source else ()
+            return cls(str(path), np.asarray(data["time"][:length]), attributes, parameters, quantities, events)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -14,12 +14,13 @@ import os
 import re
 import resource
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Description, Floats, element
 from sysdyn.runtime.model.failures import TraceError
 
@@ -216,13 +217,27 @@ class Store:
         if disk.f_bavail * disk.f_frsize < need:
             raise OSError(28, "no space left on the disk for the trace")
 
-    def close_with(self, attributes: Mapping[str, Mapping[str, Any]]) -> None:
-        """Attributes by data set ("/": the root), then closes the file."""
+    def close_with(self, attributes: Mapping[str, Mapping[str, Any]], events: Sequence[Happened] = ()) -> None:
+        """Events, attributes by data set ("/": the root), then closes the file."""
+        if events:
+            self._events(events)
         for name, values in attributes.items():
             _set(self._file[name].attrs, values)
         self._file.flush()
         self._file.close()
         self._closed = True
+
+    def _events(self, events: Sequence[Happened]) -> None:
+        """/events: time, and fixed-length strings."""
+        import h5py
+
+        group = self._file.create_group("events")
+        data = group.create_dataset("time", data=[e.time for e in events], track_times=False)
+        data.attrs["units"] = _text("s")
+        for name in ("name", "element", "before", "after"):
+            texts = [getattr(e, name).encode("utf-8") for e in events]
+            kind = h5py.string_dtype("utf-8", max(1, *map(len, texts)))
+            group.create_dataset(name, data=np.array(texts, dtype=kind), track_times=False)
 
     def close(self) -> None:
         """Closes a file to which nothing was added since it was flushed."""

@@ -41,6 +41,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     potentials = Potentials(nodes.efforts)
     pieces = _pieces(incidence.elements, classes)
     book = Book(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
+    book.sticking = _sticking(network)
     reader = Reader(sizes, book)
     initials = tuple(at_stores(network, incidence, reader))
     contents = Contents(reader, classes.members, initials, network.branches)
@@ -61,6 +62,15 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     )
     found = replace(found, dynamics=(*found.dynamics, *contents.dynamics))
     return found, tuple(said.notes), account(network, classes, nodes)
+
+
+def _sticking(network: Network) -> dict[str, tuple[str, ...]]:
+    """Labels of the constraints that hold the branches of a family while they stick."""
+    found: dict[str, tuple[str, ...]] = {}
+    for s in network.switches:
+        if s.element and s.label not in found.get(s.element, ()):
+            found[s.element] = (*found.get(s.element, ()), s.label)
+    return found
 
 
 def _pieces(elements: tuple[Element, ...], classes: Series) -> dict[str, list[Piece]]:

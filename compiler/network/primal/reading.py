@@ -87,6 +87,7 @@ class Book:
     nodes: Callable[[Reader, Node, Ranges, tuple[Node, ...]], Node]
     contents: dict[int, tuple[str, bool]] = field(default_factory=dict)
     functions: dict[int, dict[str, Node]] = field(default_factory=dict)
+    sticking: dict[str, tuple[str, ...]] = field(default_factory=dict)  # labels of what holds the branches of a family
 
 
 def touches_network(root: Node) -> bool:
@@ -212,7 +213,9 @@ class Reader:
             return self.resolve(self.at_piece(function, piece, node.args), ranges, inside)
         known = self.book.efforts if kind == "be" else self.book.momenta
         if piece.element.number in known:
-            return self.resolve(self.at_piece(known[piece.element.number], piece, node.args), ranges, inside)
+            found = self.resolve(self.at_piece(known[piece.element.number], piece, node.args), ranges, inside)
+            held = self.book.sticking.get(name, ()) if kind == "be" else ()
+            return add(found, *(var(label, "mu", *node.args) for label in held)) if held else found
         plain_ends = piece.element.ends
         if kind == "be" and len(plain_ends) == 2 and piece.element.branch.domain.common == "effort":
             plus, minus = (self._end(c, "ne", piece, node.args) for c in plain_ends)

@@ -1,0 +1,109 @@
+"""The events of a network as the runtime's plan: names become rows of block observe and places of p and y."""
+
+from __future__ import annotations
+
+import math
+
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.compiler.binding.binding import places_of
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Action, Event, Switch
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Plan, Relation, Sampled, When
+from sysdyn.runtime.model.description import RowFamily, element
+from sysdyn.runtime.model.system import System
+
+
+def plan(prepared: Prepared, system: System, rest: float = 1e-6) -> Plan:
+    """The plan of a bound model; ModelError where the values make none.  rest: see plan.Plan."""
+    network = prepared.network
+    if not network.events and not network.switches:
+        return Plan()
+    return _Planner(prepared, system).plan(rest)
+
+
+class _Planner:
+    """Finds rows and places."""
+
+    def __init__(self, prepared: Prepared, system: System) -> None:
+        self.prepared, self.system = prepared, system
+        description = system.description
+        names = [element(r.name, r.shape, k) for r in _rows(system) for k in range(r.size)]
+        self.row = {name: k for k, name in enumerate(names)}
+        self.unknown = {
+            (f.owner, f.kind): int(system.form.at[k]) for k, f in enumerate(description.families) if f.kind in "sf"
+        }
+        self.relations: list[Relation] = []
+
+    def plan(self, rest: float) -> Plan:
+        """Everything that may happen."""
+        network = self.prepared.network
+        whens = tuple(self._when(e) for e in network.events if e.condition is not None)
+        sampled = tuple(self._sampled(e) for e in network.events if e.period is not None)
+        contacts = tuple(self._contact(k, s) for k, s in enumerate(network.switches))
+        limits = dict(network.scene.limits) if network.scene else {}
+        limit = round(self.prepared.binding.evaluate(limits["events"])) if "events" in limits else None
+        return Plan(tuple(self.relations), whens, sampled, contacts, limit, rest)
+
+    def _when(self, event: Event) -> When:
+        assert event.condition is not None
+        return When(event.name, self._condition(event.condition), self._assignments(event.actions))
+
+    def _sampled(self, event: Event) -> Sampled:
+        assert event.period is not None
+        period = self.prepared.binding.evaluate(event.period)
+        if not 0.0 < period < math.inf:
+            text = f"the period of 'every' must be a positive constant, it is {period:g} s"
+            raise ModelError([Diagnostic("E703", text, event.place)])
+        return Sampled(event.name, period, self._assignments(event.actions))
+
+    def _condition(self, node: Node) -> Condition:
+        if node.op in ("and", "or", "not"):
+            return (node.op, *(self._condition(a) for a in node.args))
+        watched = node.args[0]
+        self.relations.append(Relation(self.row[watched.data[0]], watched.data[1] == "moves"))
+        return ("relation", len(self.relations) - 1, node.data)
+
+    def _assignments(self, actions: tuple[Action, ...]) -> tuple[Assignment, ...]:
+        return tuple(self._assignment(a) for a in actions)
+
+    def _assignment(self, action: Action) -> Assignment:
+        row, target = self.row[action.value], action.target
+        if target.op == "param":
+            return Assignment(target.data, "discrete", self.parameter(target), row)
+        name, kind, _ = target.data
+        if (name, kind) not in self.unknown:
+            text = f"an event assigns the flow of {name}, which is no unknown of this formulation"
+            raise ModelError([Diagnostic("E702", text, action.place)])
+        shown = f"{name}'" if kind == "f" else name
+        return Assignment(shown, "state" if kind == "s" else "flow", self.unknown[name, kind], row)
+
+    def parameter(self, node: Node) -> int:
+        """The place in p of a parameter, or of an element of one."""
+        compiled, binding = self.prepared.compiled, self.prepared.binding
+        if not node.args:
+            return compiled.program.scalars.index(node.data)
+        boxes = binding.parameters.boxes[node.data]
+        where = places_of(compiled.network, compiled.form, compiled.program, binding)[1][node.data]
+        position = 0
+        for at, (first, last) in zip(node.args, boxes, strict=True):
+            position = position * (last - first + 1) + int(at.data) - first
+        return where + position
+
+    def _contact(self, number: int, s: Switch) -> Contact:
+        def row(name: str | None) -> int:
+            return -1 if name is None else self.row[name]
+
+        restitution = 0.0 if s.restitution is None else self.prepared.binding.evaluate(s.restitution)
+        if not 0.0 <= restitution <= 1.0:
+            text = f"phi {s.name}: restitution {restitution:g} is not between 0 and 1"
+            raise ModelError([Diagnostic("E514", text, s.place)])
+        sense = -1 if s.sense is None else self.parameter(s.sense)
+        return Contact(
+            s.name, s.kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
+            row(s.upper), row(s.lower), sense, row(s.guard), restitution,
+        )  # fmt: skip
+
+
+def _rows(system: System) -> list[RowFamily]:
+    return [system.description.rows[k] for k in system.description.rows_of("observe")]

@@ -1,0 +1,334 @@
+"""Events and inequalities: discrete variables, `when`, `every`, constraints that hold at times, set-valued friction.
+
+What an event reads is observed beside the traced quantities, so every arrow of the compiler carries it as it carries
+those: a relation a > b is the observation a - b, the value of an action another.  A constraint that holds at times is
+an equality among the rows, and a `Switch` that says when; `c*setsign(u)` and `c*abs(u)` in a content become the
+effort c*sense with a sense that events set, and psi: u = 0, which holds while the bodies stick.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from sysdyn.dsl.elaborate.parts import Frame
+from sysdyn.dsl.model import budget
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter, Switch
+from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.names.symbols import ParameterSymbol, Typed
+from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.dsl.tree import syntax
+
+MOST = 1000
+"""Switches of one array of statements: each is text of its own in the compiled model."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A switch of an array of statements: its expressions under loops (see network.Switch)."""
+
+    label: str
+    at: tuple[Node, ...]
+    loops: tuple[Loop, ...]
+    kind: str
+    place: Place
+    unit: Unit
+    value: Node
+    multiplier: Node
+    element: str = ""
+    bound: Node | None = None
+    sense: Node | None = None
+    guard: Node | None = None
+    restitution: Node | None = None
+
+
+# -- discrete variables ------------------------------------------------------------------------------------
+
+
+def discrete(frame: Frame, s: syntax.Discrete) -> None:
+    """`discrete g = 1`: a parameter that events assign."""
+    decl, resolver = s.decl, frame.resolver
+    if decl.indices or resolver.loops:
+        raise resolver.fail("N608", f"an array of discrete variables ('{decl.name}') is not supported yet", decl.span)
+    value = resolver.scalar_or_truth(s.value)
+    unit = frame.unit(s.unit) if s.unit else si(value.dimension or NONE)
+    if value.dimension is not None and value.dimension != unit.dimension:
+        message = f"'{decl.name}' is declared {dim.show(unit.dimension)} but starts at {dim.show(value.dimension)}"
+        raise resolver.fail("E207", message, s.value.span)
+    for inner in ex.variables(value.node):
+        raise resolver.fail(
+            "E807",
+            f"the initial value of '{decl.name}' depends on '{inner}'",
+            s.value.span,
+            help="parameters and constants only",
+        )
+    family, place = frame.current.family(decl.name), frame.place(decl.span)
+    frame.enter(ParameterSymbol(decl.name, family, unit.dimension, value.truth, place))
+    node = ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
+    frame.parts.parameters[family.name] = Parameter(family.name, (), unit, (node,), (), place)
+    frame.parts.discretes.add(family.name)
+
+
+# -- when, every -------------------------------------------------------------------------------------------
+
+
+def when(frame: Frame, s: syntax.When) -> None:
+    """`when condition { target := value }`."""
+    resolver = frame.resolver
+    _outside_loops(frame, s.span, "when")
+    condition = resolver.condition(s.condition)
+    moving = any(ex.variables(n) or _discretes(frame, n) for n in ex.topological([condition]) if n.op == "cmp")
+    if not moving:
+        raise resolver.fail("E701", "'when' condition has no relation that can cross", s.condition.span)
+    place = frame.place(s.span)
+    name = " ".join(resolver.source.text[s.condition.span.start : s.condition.span.end].split())
+    event = Event(f"when {name}", _watched(frame, condition, place), None, _actions(frame, s.actions), place)
+    frame.parts.events.append(event)
+
+
+def every(frame: Frame, s: syntax.Every) -> None:
+    """`every period { target := value }`."""
+    _outside_loops(frame, s.span, "every")
+    message = "the period of 'every' is in {}, wants s"
+    period = frame.resolver.wanted(s.period, dim.TIME, "E703", message)
+    if ex.variables(period) or _discretes(frame, period) or (ex.is_const(period) and not period.data > 0.0):
+        raise frame.resolver.fail("E703", "the period of 'every' must be a positive constant", s.period.span)
+    place = frame.place(s.span)
+    name = " ".join(frame.resolver.source.text[s.period.span.start : s.period.span.end].split())
+    frame.parts.events.append(Event(f"every {name}", None, period, _actions(frame, s.actions), place))
+
+
+def _outside_loops(frame: Frame, span: syntax.Span, what: str) -> None:
+    if frame.resolver.loops:
+        raise frame.resolver.fail("N608", f"'{what}' in a 'for' is not supported yet", span)
+
+
+def _discretes(frame: Frame, root: Node) -> bool:
+    return any(n.op == "param" and n.data in frame.parts.discretes for n in ex.topological([root]))
+
+
+def _watched(frame: Frame, condition: Node, place: Place) -> Node:
+    """The condition with every comparison as one of an observation with zero."""
+    change: dict[Node, Node] = {}
+    for node in ex.topological([condition]):
+        if node.op == "cmp":
+            left, right = node.args
+            moves = "moves" if ex.variables(node) else "rests"
+            name = watch(frame, ex.sub(left, right), None, place)
+            change[node] = ex.compare(node.data, ex.var(name, moves), ex.const(0.0))
+    return ex.substitute(condition, change)
+
+
+def watch(frame: Frame, node: Node, dimension: Dimension | None, place: Place) -> str:
+    """The name of an observation of a node."""
+    name = f"event {len(frame.parts.watched)}"
+    frame.parts.watched.append(Observation(name, node, si(dimension or NONE), name, place, stored=False))
+    return name
+
+
+def _actions(frame: Frame, actions: tuple[syntax.Action, ...]) -> tuple[Action, ...]:
+    found: list[Action] = []
+    for action in actions:
+        target, truth = _target(frame, action)
+        value = frame.resolver.scalar_or_truth(action.value)
+        if value.truth != truth or (
+            not truth and value.dimension is not None and value.dimension != (target.dimension or NONE)
+        ):
+            have = "a condition" if value.truth else dim.show(value.dimension)
+            want = "a condition" if truth else dim.show(target.dimension)
+            raise frame.resolver.fail("E208", f"{target.node} := ...: {want} expected, {have} found", action.value.span)
+        node = ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
+        place = frame.place(action.span)
+        if any(a.target is target.node for a in found):
+            raise frame.resolver.fail("E704", f"the event assigns {target.node} twice", action.span)
+        found.append(Action(target.node, watch(frame, node, target.dimension, place), place))
+    return tuple(found)
+
+
+def _target(frame: Frame, action: syntax.Action) -> tuple[Typed, bool]:
+    """What an action assigns: the param of a discrete variable, a state, a flow; and whether it is a condition."""
+    value = frame.resolver.scalar_or_truth(action.target)
+    node = value.node
+    if value.truth and node.op == "cmp":  # a discrete condition reads `param != 0`
+        node = node.args[0]
+    if node.op == "param" and node.data in frame.parts.discretes:
+        return Typed(node, value.dimension), value.truth
+    if node.op == "var" and not node.args:
+        name, kind, order = node.data
+        if kind == "s" and order == 0:
+            return value, False
+        if (kind, order) in (("q", 1), ("f", 0), ("nf", 0), ("nq", 1)):
+            return Typed(ex.var(name, "f"), value.dimension), False
+    text = " ".join(frame.resolver.source.text[action.target.span.start : action.target.span.end].split())
+    message = f"event assigns {text} (only discrete variables, states and x' of a coordinate may jump)"
+    raise frame.resolver.fail("E702", message, action.target.span, help="a constraint")
+
+
+# -- constraints that hold at times --------------------------------------------------------------------------
+
+
+def guarded(frame: Frame, s: syntax.Constraint, constraint: Constraint) -> Constraint:
+    """The constraint as a row; where it holds at times only, the switch that says when."""
+    guard = restitution = None
+    for item in s.guards:
+        if item.kind == "while":
+            guard = _guard(frame, item)
+        else:
+            message = f"{s.kind} {s.decl.name}: restitution is in {{}}, wants a ratio"
+            restitution = frame.resolver.wanted(item.expr, NONE, "E208", message)
+            if s.relation == "=" or s.kind != "phi":
+                what = "an equality" if s.relation == "=" else f"a {s.kind}"
+                message = f"{s.kind} {s.decl.name}: restitution on {what}"
+                raise frame.resolver.fail("E514", message, item.span, help="phi ... >=")
+    if s.relation == "=" and guard is None:
+        return constraint
+    if s.kind == "gamma":
+        what = "an inequality" if s.relation != "=" else "'while'"
+        raise frame.resolver.fail("N608", f"gamma {s.decl.name}: {what} of a gamma is not supported yet", s.span)
+    kind = "guarded" if s.relation == "=" else s.kind
+    # a >= b is the row b - a: so its multiplier pushes a up and is positive
+    node = ex.neg(constraint.expression) if s.relation == ">=" else constraint.expression
+    value = constraint.expression if s.relation != "<=" else ex.neg(constraint.expression)
+    multiplier = ex.var(constraint.name, "kappa" if s.kind == "phi" else "mu", *constraint.at)
+    draft = Draft(
+        constraint.name, constraint.at, constraint.loops, kind, constraint.place, constraint.unit, value, multiplier,
+        guard=guard, restitution=restitution,
+    )  # fmt: skip
+    frame.parts.drafts.append(draft)
+    return Constraint(
+        constraint.kind, constraint.name, constraint.at, node, constraint.loops, constraint.unit, constraint.place
+    )
+
+
+def _guard(frame: Frame, guard: syntax.Guard) -> Node:
+    node = frame.resolver.condition(guard.expr)
+    if ex.variables(node) or not _discretes(frame, node):
+        raise frame.resolver.fail(
+            "E515", "'while' needs a discrete condition", guard.span, help="discrete locked = false, and a 'when'"
+        )
+    return node
+
+
+def sticking(frame: Frame, root: Node, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place) -> Node:
+    """A law or content with its set-valued terms c*setsign(u), c*abs(u) as c*sense and c*sense*u; the switches that
+    say which sense, and psi: u = 0 for sticking.
+    """
+    found = [n for n in ex.topological([root]) if n.op == "call" and n.data == "setsign"]
+    for k, node in enumerate(found):
+        name = f"{label} sticking" + (f" {k + 1}" if k else "")
+        sense = _sense(frame, name, at, loops, place)
+        inner = node.args[0]
+        bound = ex.derivative(ex.substitute(root, {node: ex.var("#sign", "s")}), ex.var("#sign", "s"))
+        _stick(frame, name, (at, loops), (inner, bound, sense), place, label)
+        root = ex.substitute(root, {node: sense})
+    return root
+
+
+def set_valued(frame: Frame, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:
+    """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language)."""
+    at = tuple(ex.index(loop.index) for loop in loops)
+    for node in ex.topological([root]):
+        if node.op != "call" or node.data != "abs" or not _rates(node.args[0]):
+            continue
+        if any(n.op == "reduce" and node in ex.topological([n.args[2]]) for n in ex.topological([root])):
+            continue
+        name = f"content of line {place.start[0]}" + (f" ({len(frame.parts.drafts)})" if frame.parts.drafts else "")
+        sense, mark = _sense(frame, name, at, loops, place), ex.var("#abs", "s")
+        bound = ex.derivative(ex.substitute(root, {node: mark}), mark)
+        _stick(frame, name, (at, loops), (node.args[0], bound, sense), place)
+        root = ex.substitute(root, {node: ex.mul(sense, node.args[0])})
+    return root
+
+
+def _rates(root: Node) -> bool:
+    return any(n.op == "var" and (n.data[1] in ("f", "nf", "bf") or n.data[2] == 1) for n in ex.variables(root))
+
+
+def _sense(frame: Frame, name: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place) -> Node:
+    """The parameter that holds the sense of a slip: 1, -1, or 0 while it sticks."""
+    shape = tuple((loop.first, loop.last) for loop in loops) if at else ()
+    indices = tuple(loop.index for loop in loops) if at else ()
+    parameter = Parameter(f"{name} sense", shape, si(NONE), (ex.const(0.0),), indices, place)
+    frame.parts.parameters[parameter.name] = parameter
+    frame.parts.discretes.add(parameter.name)
+    return ex.param(parameter.name, *at)
+
+
+def _stick(
+    frame: Frame,
+    name: str,
+    where: tuple[tuple[Node, ...], tuple[Loop, ...]],
+    what: tuple[Node, Node, Node],
+    place: Place,
+    element: str = "",
+) -> None:
+    (at, loops), (value, bound, sense) = where, what
+    unit = si(NONE)
+    frame.parts.constraints.append(Constraint("psi", name, at, value, loops, unit, place))
+    multiplier = ex.var(name, "mu", *at)
+    frame.parts.drafts.append(
+        Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense)
+    )
+
+
+# -- switches of arrays, one by one --------------------------------------------------------------------------
+
+
+def expanded(frame: Frame, known: Values) -> None:
+    """Switches and their observations, an array's element by element."""
+    for draft in frame.parts.drafts:
+        for change in _iterations(draft.loops, known):
+            frame.parts.switches.append(_switch(frame, draft, change, known))
+
+
+def _bounds(draft: Draft) -> tuple[Node | None, Node | None, Node | None]:
+    """The bound of a multiplier, and what it lacks to it on both sides."""
+    if draft.bound is None:
+        return None, None, None
+    return draft.bound, ex.sub(draft.bound, draft.multiplier), ex.add(draft.bound, draft.multiplier)
+
+
+def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, Node]]:
+    """Numbers for the loop variables."""
+    ranges: list[range] = []
+    for loop in loops:
+        first, last = known.number(loop.first), known.number(loop.last)
+        if not math.isfinite(first + last):  # a bound that follows an outer loop
+            return
+        ranges.append(range(int(first), int(last) + 1))
+    number = 1
+    for r in ranges:
+        number *= len(r)
+    budget.charge(budget.NODE * max(number - 1, 0), "inequalities that are written out one by one")
+    for at in product(*ranges):
+        yield {ex.index(loop.index): ex.const(float(i)) for loop, i in zip(loops, at, strict=True)}
+
+
+def _switch(frame: Frame, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:
+    def of(node: Node) -> Node:
+        return ex.substitute(node, change)
+
+    def seen(node: Node | None) -> str | None:
+        return None if node is None else watch(frame, of(node), NONE, draft.place)
+
+    bound, upper, lower = (seen(n) for n in _bounds(draft))
+    at = tuple(int(known.number(of(n))) for n in draft.at)
+    name = f"{draft.label}[{', '.join(map(str, at))}]" if at else draft.label
+    guard = None if draft.guard is None else ex.conditional(draft.guard, ex.const(1.0), ex.const(0.0))
+    value = watch(frame, of(draft.value), draft.unit.dimension, draft.place)
+    rate = watch(frame, ex.time_derivative(of(draft.value)), NONE, draft.place)
+    multiplier = watch(frame, of(draft.multiplier), NONE, draft.place)
+    twice = ex.time_derivative(ex.time_derivative(of(draft.value))) if draft.kind == "phi" else None
+    acceleration = None if twice is None else watch(frame, twice, NONE, draft.place)
+    sense = None if draft.sense is None else of(draft.sense)
+    restitution = None if draft.restitution is None else of(draft.restitution)
+    return Switch(
+        name, draft.label, at, draft.kind, draft.place, value, rate, multiplier, draft.element,
+        acceleration, bound, upper, lower, sense, seen(guard), restitution,
+    )  # fmt: skip

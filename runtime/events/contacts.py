@@ -1,0 +1,230 @@
+"""Which of the constraints that hold at times hold: complementarity over all of them at once.
+
+    phi, psi     value >= 0,  multiplier >= 0,  their product 0
+    friction     abs(multiplier) <= bound where value = 0;  else the effort bound*sense, sense = sign(value)
+
+A guess of the active set gives flows (impulses in the metric of the inertia where they must jump) and, by the settled
+rows, rates and multipliers; the first condition that does not hold, in the order written, changes its member, and so on
+(Murty's least-index principal pivoting, which ends for a positive definite matrix and is watched for cycles).  Where a
+gap closes with speed v, Newton's law asks for value' = -restitution v first, by the same pivoting on impulses >= 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.events.observer import Observer
+from sysdyn.runtime.events.plan import Contact
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.held_rows import multiplier_row
+from sysdyn.runtime.model.system import System
+
+TRIALS = 20
+"""Trials a contact, beside TRIALS for all."""
+
+Settle = Callable[[float, Floats, Floats], tuple[Floats, Floats, Floats] | None]
+"""t, y, yd -> y, yd consistent with the active set and the impulses [unknowns] that took the flows there; None: no
+such point was found."""
+Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]
+"""t, y, yd, aims [settled rows] -> y after impulses that bring the flow rows to their aims; the impulses [unknowns]."""
+
+
+class NoActiveSetError(Exception):
+    """No set of constraints fits; names: of those that kept changing."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        super().__init__(", ".join(names))
+        self.names = names
+
+
+class Contacts:
+    """The active set and the senses of a model; p: its parameters, where senses stand."""
+
+    def __init__(self, contacts: tuple[Contact, ...], system: System, observer: Observer, p: Floats) -> None:
+        self.contacts, self.system, self.observer, self.p = contacts, system, observer, p
+        self.switches = system.description.switches
+        self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
+        self.fastest = np.zeros(len(contacts))
+        places = self.switches.places
+        self._multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
+
+    def begin(self) -> None:
+        """Nothing holds and nothing slips: where a start is sought from."""
+        self.active[:] = False
+        for contact in self.contacts:
+            if contact.sense >= 0:
+                self.p[contact.sense] = 0.0
+        self.apply()
+
+    def take(self, switches: NDArray[np.bool_]) -> None:
+        """The active set of the switches as it is given."""
+        self.active = np.array([switches[c.number] for c in self.contacts], dtype=bool)
+        self.switches.set(switches)
+
+    def apply(self) -> None:
+        """The systems of the model follow the active set."""
+        now = np.zeros(len(self.switches.places), dtype=bool)
+        for k, contact in enumerate(self.contacts):
+            now[contact.number] = self.active[k]
+        self.switches.set(now)
+
+    def state(self) -> tuple[float, ...]:
+        """The active set and the senses."""
+        senses = (float(self.p[c.sense]) if c.sense >= 0 else 0.0 for c in self.contacts)
+        return (*map(float, self.active), *senses)
+
+    def word(self, k: int) -> str:
+        """How a contact stands."""
+        contact = self.contacts[k]
+        if contact.kind == "friction":
+            return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
+        return "holds" if self.active[k] else "free"
+
+    # -- what does not fit ---------------------------------------------------------------------------------------
+
+    def flip(self, k: int, values: Floats) -> None:
+        """The other state of a contact."""
+        contact = self.contacts[k]
+        self.active[k] = not self.active[k]
+        if contact.kind == "friction":
+            self.p[contact.sense] = 0.0 if self.active[k] else np.sign(values[contact.multiplier])
+
+    def wrong(self, values: Floats, impulses: Floats) -> int:
+        """The first contact whose condition does not hold; -1 where all do."""
+        for k, contact in enumerate(self.contacts):
+            test = self._friction if contact.kind == "friction" else self._unilateral
+            if contact.kind == "guarded":
+                if bool(values[contact.guard]) != bool(self.active[k]):
+                    return k
+            elif test(k, contact, values, float(impulses[self._multiplier[k]])):
+                return k
+        return -1
+
+    def _unilateral(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
+        zero = self.observer.zero
+        if self.active[k]:
+            return impulse < 0.0 or bool(values[c.multiplier] < -zero(c.multiplier))
+        if values[c.value] > zero(c.value):
+            return False
+        if c.kind == "psi":
+            return bool(values[c.value] < -zero(c.value) or values[c.rate] < -zero(c.rate))
+        closing = values[c.rate] < -zero(c.rate)
+        return bool(
+            closing or (values[c.rate] <= zero(c.rate) and values[c.acceleration] < -zero(c.acceleration))
+        )
+
+    def _friction(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
+        zero, sense = self.observer.zero, float(self.p[c.sense])
+        if self.active[k]:
+            return bool(abs(values[c.multiplier]) > values[c.bound] * (1.0 + 1e-9) + zero(c.multiplier))
+        if sense == 0.0:
+            return True
+        slip = sense * values[c.value]
+        return bool(slip < -zero(c.value) or (slip <= zero(c.value) and sense * values[c.rate] < -zero(c.rate)))
+
+    # -- pivoting ------------------------------------------------------------------------------------------------
+
+    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
+        """A consistent point whose active set fits, from the present one; NoActiveSetError."""
+        seen: set[tuple[float, ...]] = set()
+        changed: list[int] = []
+        k = 0
+        for _ in range(TRIALS * (1 + len(self.contacts))):
+            self.apply()
+            state = self.state()
+            if state in seen:  # another order of pivots: from the other end
+                changed.reverse()
+            seen.add(state)
+            found = settle(t, y, yd)
+            if found is None:
+                values, k = self.observer(t, y, yd), (k + 1) % max(len(self.contacts), 1)
+            else:
+                values = self.observer(t, found[0], found[1])
+                k = self.wrong(values, found[2])
+                if k < 0:
+                    return found[0], found[1]
+            changed.append(k)
+            self.turn(k, values)
+        names = dict.fromkeys(self.contacts[k].name for k in changed[-6:])
+        raise NoActiveSetError(tuple(names))
+
+    def turn(self, k: int, values: Floats) -> None:
+        """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
+        contact = self.contacts[k]
+        slips = contact.kind == "friction" and not self.active[k]
+        if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
+            self.p[contact.sense] = np.sign(values[contact.value])
+            return
+        self.flip(k, values)
+
+    # -- impacts -------------------------------------------------------------------------------------------------
+
+    def strike(self, t: float, y: Floats, yd: Floats, strike: Strike, rest: float) -> Floats:
+        """Y after the impacts of the gaps that close; rest: see plan.Plan."""
+        values = self.observer(t, y, yd)
+        near = [k for k, c in enumerate(self.contacts) if c.kind == "phi" and self._touches(k, c, values)]
+        speed = {k: float(values[self.contacts[k].rate]) for k in near}
+        closing = [k for k in near if speed[k] < -self.observer.zero(self.contacts[k].rate)]
+        if not closing:
+            return y
+        for k in closing:
+            self.fastest[k] = max(self.fastest[k], -speed[k])
+        aim = {}
+        for k in near:
+            bounces = -speed[k] > rest * self.fastest[k]
+            aim[k] = self.contacts[k].restitution * max(-speed[k], 0.0) if bounces else 0.0
+        y, after = self._struck(t, y, yd, strike, (near, closing, aim))
+        for k in near:
+            rate = self.contacts[k].rate
+            self.active[k] = aim[k] == 0.0 and after[rate] <= self.observer.zero(rate)
+        self.apply()
+        return y
+
+    def _touches(self, k: int, c: Contact, values: Floats) -> bool:
+        return bool(self.active[k] or values[c.value] <= self.observer.zero(c.value))
+
+    def _struck(
+        self, t: float, y: Floats, yd: Floats, strike: Strike, what: tuple[list[int], list[int], dict[int, float]]
+    ) -> tuple[Floats, Floats]:
+        """Pivoting on impulses: 0 <= impulse, value'+ >= aim, one of both with equality."""
+        near, closing, aim = what
+        struck = set(closing)
+        for _ in range(TRIALS * (1 + len(near))):
+            for k in near:
+                self.active[k] = k in struck
+            self.apply()
+            found, impulses = strike(t, y, yd, self._aims(aim, struck))
+            values = self.observer(t, found, yd)
+            wrong = (k for k in near if self._bounces_wrong(k, struck, values, impulses, aim))
+            k = next(wrong, -1)
+            if k < 0:
+                return found, values
+            struck ^= {k}
+        raise NoActiveSetError(tuple(self.contacts[k].name for k in near))
+
+    def _bounces_wrong(
+        self, k: int, struck: set[int], values: Floats, impulses: Floats, aim: dict[int, float]
+    ) -> bool:
+        if k in struck:
+            return bool(impulses[self._multiplier[k]] < 0.0)
+        rate = self.contacts[k].rate
+        return bool(values[rate] < aim[k] - self.observer.zero(rate))
+
+    def _aims(self, aim: dict[int, float], struck: set[int]) -> Floats:
+        """What the rows phi_rate shall be: -value' there."""
+        settled = self._settled
+        aims = np.zeros(settled.rows)
+        first = {(group, family): row for group, family, row in settled.form.groups}
+        for k in struck:
+            family, position = self.switches.places[self.contacts[k].number]
+            row = first["phi_rate", multiplier_row(settled.description, family)] + position
+            aims[row] = -aim[k]
+        return aims
+
+    @property
+    def _settled(self) -> System:
+        if not hasattr(self, "_form"):
+            self._form = self.system.another("settled")
+        return self._form

@@ -1,0 +1,302 @@
+"""One run's events: what is watched, where it changes, what that does.
+
+At an instant, in this order: the relations that cross take their new side; `when`s that became true fire, all values
+read before anything is assigned; what they changed may fire others; the constraints that hold are found anew, and with
+them the consistent point from which the next piece begins.  Senses and discrete variables stand in the parameters p,
+which begin every run as they were bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.events.locate import Dense, crossing
+from sysdyn.runtime.events.observer import Observer
+from sysdyn.runtime.events.plan import Assignment, Condition, Happened, Plan
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.impulses import group_rows
+from sysdyn.runtime.start.restart import Restart
+
+CASCADE = 100
+"""Rounds of events at one instant: more will never end."""
+STALLED = 200
+"""Events in a row within NOTHING of the span: they chatter."""
+NOTHING = 1e-12
+
+LEAST = 1e-3
+"""Of what is zero of a row: beyond it a change is one."""
+
+Point = tuple[Floats, Floats]
+Standing = tuple[Floats, NDArray[np.bool_]]
+"""Parameters, and which of the constraints that may hold do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A row of block observe on the side 1 or -1 of zero; relation or contact: whose it is, the other -1."""
+
+    relation: int
+    contact: int
+    row: int
+    side: int
+
+
+class Handler:
+    """Events of one run.  system: as the stepper sees it; restart: consistent points of it."""
+
+    def __init__(self, plan: Plan, system: System, span: tuple[float, float], begin: Standing) -> None:
+        self.plan, self.system, self.span = plan, system, span
+        self.p = system.description.p
+        self.restart: Restart | None = None
+        self.observer = Observer(system)
+        self.contacts = Contacts(plan.contacts, system, self.observer, self.p)
+        self.side = np.ones(len(plan.relations))
+        self.truth = [False] * len(plan.whens)
+        self.happened: list[Happened] = []
+        self.samples = 0
+        self._next = [0] * len(plan.sampled)
+        self._stalled, self._last = 0, -np.inf
+        self.back(begin)
+        self.before = self.now()
+
+    # -- what stands ---------------------------------------------------------------------------------------------
+
+    def now(self) -> Standing:
+        """Parameters and active switches."""
+        return self.p.copy(), self.contacts.switches.active.copy()
+
+    def back(self, standing: Standing) -> None:
+        """These stand again."""
+        self.p[:] = standing[0]
+        self.contacts.take(standing[1])
+        if self.restart is not None:
+            self.restart.settler.core.contents.ready = 0
+
+    # -- what is watched -----------------------------------------------------------------------------------------
+
+    def watched(self) -> list[Watched]:
+        """Everything whose change ends a piece: a relation on neither side yet is watched on both."""
+        found: list[Watched] = []
+        for k, (r, side) in enumerate(zip(self.plan.relations, self.side, strict=True)):
+            if r.moves:
+                found += [Watched(k, -1, r.row, s) for s in ((int(side),) if side else (1, -1))]
+        for k, c in enumerate(self.plan.contacts):
+            sticks = bool(self.contacts.active[k])
+            if c.kind == "friction":
+                rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)
+                found += [Watched(-1, k, row, side) for row, side in rows]
+            elif c.kind in ("phi", "psi"):
+                found.append(Watched(-1, k, c.multiplier if sticks else c.value, 1))
+        return found
+
+    def core(self) -> Any:
+        """The same as the core's array."""
+        found = self.watched()
+        array = (lib.Watch * max(len(found), 1))()
+        for k, w in enumerate(found):
+            array[k] = lib.Watch(w.row, w.side, LEAST * self.observer.zero(w.row))
+        return array
+
+    # -- the start -----------------------------------------------------------------------------------------------
+
+    def begin(self, t: float, y: Floats, yd: Floats) -> Point | None:
+        """Sides and conditions at the start; samples due there.  The point where they changed it."""
+        values = self.observer(t, y, yd)
+        for k, relation in enumerate(self.plan.relations):
+            self.side[k] = self._side(k, values[relation.row], 1.0)
+        self.truth = [self._holds(w.condition, ()) for w in self.plan.whens]
+        due = self.due(t)
+        return self.fire(t, y, yd, due) if due else None
+
+    def _side(self, k: int, value: float, before: float) -> float:
+        relation = self.plan.relations[k]
+        small = LEAST * self.observer.zero(relation.row) if relation.moves else 0.0
+        return before if abs(value) <= small and value != 0.0 else float(np.sign(value))
+
+    # -- samples -------------------------------------------------------------------------------------------------
+
+    def next_sample(self) -> float:
+        """The next instant of an `every`."""
+        t0 = self.span[0]
+        times = (t0 + n * s.period for n, s in zip(self._next, self.plan.sampled, strict=True))
+        return min(times, default=np.inf)
+
+    def due(self, t: float) -> list[int]:
+        """Numbers of the samples at t, which are counted."""
+        found = []
+        for k, s in enumerate(self.plan.sampled):
+            while self.span[0] + self._next[k] * s.period <= t:
+                self._next[k] += 1
+                found.append(k)
+        return list(dict.fromkeys(found))
+
+    # -- what happens --------------------------------------------------------------------------------------------
+
+    def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
+        """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
+        watched = self.watched()
+        rows = [(w.row, w.side, LEAST * self.observer.zero(w.row)) for w in watched]
+        found = crossing(dense, rows, begin, end)
+        return None if found is None else (found[0], [watched[k] for k in found[1]])
+
+    def fire(
+        self, t: float, y: Floats, yd: Floats, samples: Sequence[int] = (), which: Sequence[Watched] = ()
+    ) -> Point | None:
+        """The point after everything that happens at t; None where nothing changes.  which: of the watched."""
+        self._count(t)
+        said = [self.contacts.word(k) for k in range(len(self.plan.contacts))]
+        crossed = [w.relation for w in which if w.relation >= 0]
+        for w in which:
+            if w.relation >= 0:
+                self.side[w.relation] = -float(w.side)
+        changed = bool(samples)
+        y, yd = y.copy(), yd.copy()
+        assigned: list[tuple[str, tuple[Assignment, ...]]] = [
+            (self.plan.sampled[k].name, self.plan.sampled[k].assignments) for k in samples
+        ]
+        for _ in range(CASCADE):
+            fired = self._risen(crossed)
+            assigned += [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired]
+            if not assigned:
+                break
+            y = self._assign(t, y, yd, assigned)
+            changed, assigned, crossed = True, [], []
+            self._renew(t, y, yd)
+        else:
+            raise SolverFailure("chatter", t, 0.0, self._names())
+        touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
+        if not (changed or touched):
+            return None
+        return self.settled(t, y, yd, said, touched)
+
+    def settled(
+        self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
+    ) -> Point:
+        """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
+        assert self.restart is not None
+        restart = self.restart
+        if not self.plan.contacts:
+            found = restart.across(t, y, yd)
+            if found is None:
+                raise SolverFailure("newton", t, 0.0)
+            self._renew(t, *found)
+            return found
+        try:
+            self._guards(t, y, yd)
+            y = self.contacts.strike(t, y, yd, self._strike, self.plan.rest)
+            values = self.observer(t, y, yd)
+            for k in touched:
+                if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
+                    self.contacts.turn(k, values)
+            self.contacts.apply()
+            found = self.contacts.fit(t, y, yd, restart.struck)
+        except NoActiveSetError as error:
+            raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
+        self._renew(t, *found)
+        self._note(t, said, touched)
+        return found
+
+    def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
+        assert self.restart is not None
+        return self.restart.impulses.after(t, y, yd, self.restart.magnitude(y.size), aims)
+
+    def _guards(self, t: float, y: Floats, yd: Floats) -> None:
+        values = self.observer(t, y, yd)
+        for k, contact in enumerate(self.plan.contacts):
+            if contact.kind == "guarded":
+                self.contacts.active[k] = bool(values[contact.guard])
+        self.contacts.apply()
+
+    def _note(self, t: float, said: list[str], touched: Sequence[int]) -> None:
+        for k, contact in enumerate(self.plan.contacts):
+            now = self.contacts.word(k)
+            if now != said[k]:
+                self.happened.append(Happened(t, contact.name, contact.name, said[k], now))
+            elif k in touched:
+                self.happened.append(Happened(t, f"impact {contact.name}", contact.name, said[k], now))
+
+    # -- conditions and assignments ------------------------------------------------------------------------------
+
+    def _holds(self, condition: Condition, crossed: Sequence[int]) -> bool:
+        match condition[0]:
+            case "and":
+                return all(self._holds(c, crossed) for c in condition[1:])
+            case "or":
+                return any(self._holds(c, crossed) for c in condition[1:])
+            case "not":
+                return not self._holds(condition[1], crossed)
+        _, k, operator = condition
+        side = self.side[k]
+        if operator in ("==", "!=") and self.plan.relations[k].moves:
+            return bool((k in crossed) == (operator == "=="))  # equal at the instant of a crossing alone
+        if operator in ("==", "!="):
+            return bool((side == 0.0) == (operator == "=="))
+        strict = {">": side > 0.0, "<": side < 0.0, ">=": side >= 0.0, "<=": side <= 0.0}
+        return bool(strict[operator])
+
+    def _risen(self, crossed: Sequence[int]) -> list[int]:
+        now = [self._holds(w.condition, crossed) for w in self.plan.whens]
+        fired = [k for k, (was, is_) in enumerate(zip(self.truth, now, strict=True)) if is_ and not was]
+        self.truth = [self._holds(w.condition, ()) for w in self.plan.whens]
+        return fired
+
+    def _assign(
+        self, t: float, y: Floats, yd: Floats, events: list[tuple[str, tuple[Assignment, ...]]]
+    ) -> Floats:
+        """All values are read, then all assigned."""
+        values = self.observer(t, y, yd)
+        y, set_by = y.copy(), dict[tuple[str, int], str]()
+        for name, assignments in events:
+            said, now = [], []
+            for a in assignments:
+                other = set_by.setdefault((a.kind, a.place), name)
+                if other != name:
+                    raise SolverFailure("conflict", t, 0.0, f"{a.name} (by '{other}' and by '{name}')")
+                target = self.p if a.kind == "discrete" else y
+                said.append(f"{a.name} = {target[a.place]:.9g}")
+                target[a.place] = values[a.row]
+                now.append(f"{a.name} = {values[a.row]:.9g}")
+            element = assignments[0].name.rpartition(".")[0] if assignments else ""
+            self.happened.append(Happened(t, name, element, ", ".join(said), ", ".join(now)))
+        if any(a.kind == "flow" for _, assignments in events for a in assignments):
+            y = self._momenta(t, y, yd)
+        return y
+
+    def _momenta(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """Momenta that follow from flows that were assigned: the rows of block momentum, solved for p."""
+        settled = self.restart.impulses.system if self.restart else self.system
+        rows = np.flatnonzero(group_rows(settled, "momentum"))
+        p = np.flatnonzero(settled.kinds == "p")
+        for _ in range(3 if rows.size else 0):
+            jy, _ = settled.jacobian(t, y, yd)
+            matrix = settled.dense(jy)[np.ix_(rows, p)]
+            y = y.copy()
+            y[p] -= np.linalg.lstsq(matrix, settled.residual(t, y, yd)[rows], rcond=None)[0]
+        return y
+
+    def _renew(self, t: float, y: Floats, yd: Floats) -> None:
+        """Sides after a jump."""
+        values = self.observer(t, y, yd)
+        for k, relation in enumerate(self.plan.relations):
+            self.side[k] = self._side(k, values[relation.row], self.side[k])
+
+    # -- what never ends -----------------------------------------------------------------------------------------
+
+    def _count(self, t: float) -> None:
+        near = t - self._last <= NOTHING * (self.span[1] - self.span[0])
+        self._stalled, self._last = (self._stalled + 1 if near else 0), t
+        if self._stalled > STALLED:
+            raise SolverFailure("chatter", t, 0.0, self._names())
+        if self.plan.limit is not None and len(self.happened) > self.plan.limit:
+            raise SolverFailure("max_events", t, 0.0, self._names())
+
+    def _names(self) -> str:
+        return ", ".join(dict.fromkeys(h.name for h in self.happened[-6:]))

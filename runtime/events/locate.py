@@ -1,0 +1,77 @@
+"""The first instant within a step at which something watched changes: bracketed on a grid, then Ridders.
+
+Ridders' method on the settled dense output: it needs no derivative and never leaves the bracket (Ridders 1979).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+
+PARTS = 4
+"""Of a step, as core/run.c looks at it."""
+ITERATIONS = 60
+
+Dense = Callable[[float], Floats]
+"""t (s) -> values [observed] there."""
+Watch = tuple[int, int, float]
+"""(row, side, tolerance): it changes where side*value falls below -tolerance."""
+
+
+def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -> tuple[float, list[int]] | None:
+    """The first instant, and the numbers of the watches that change there; None where none does."""
+    grid = [begin + (end - begin) * k / PARTS for k in range(1, PARTS)] + [end]
+    low, before = begin, dense(begin)
+    for high in grid:
+        values = dense(high)
+        hit = [k for k, (row, side, small) in enumerate(watches) if side * values[row] < -small]
+        if hit:
+            return _first(dense, watches, hit, (low, before), (high, values))
+        low, before = high, values
+    return None
+
+
+def _first(
+    dense: Dense,
+    watches: Sequence[Watch],
+    hit: list[int],
+    low: tuple[float, Floats],
+    high: tuple[float, Floats],
+) -> tuple[float, list[int]]:
+    found = {}
+    for k in hit:
+        row, side, _ = watches[k]
+        found[k] = _root(dense, row, side, (low[0], side * float(low[1][row])), (high[0], side * float(high[1][row])))
+    first = min(found.values())
+    same = 8.0 * float(np.spacing(max(abs(low[0]), abs(high[0]))))
+    return first, [k for k in hit if found[k] <= first + same]
+
+
+def _root(dense: Dense, row: int, side: int, low: tuple[float, float], high: tuple[float, float]) -> float:
+    """Where side*value falls through zero; low where it is not above zero there already."""
+    (a, fa), (b, fb) = low, high
+    if fa <= 0.0:
+        return a
+    for _ in range(ITERATIONS):
+        middle = 0.5 * (a + b)
+        if not a < middle < b:
+            break
+        fm = side * float(dense(middle)[row])
+        root = math.sqrt(fm * fm - fa * fb)
+        t = middle + (middle - a) * fm / root if root else middle
+        if fm > 0.0:
+            a, fa = middle, fm
+        else:
+            b, fb = middle, fm
+        if a < t < b:
+            ft = side * float(dense(t)[row])
+            if ft > 0.0:
+                a, fa = t, ft
+            else:
+                b, fb = t, ft
+        if b - a <= 2.0 * float(np.spacing(max(abs(a), abs(b)))) or fb == 0.0:
+            break
+    return b

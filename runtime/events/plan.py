@@ -1,0 +1,99 @@
+"""What may happen to a model: relations that cross, assignments, constraints that hold at times.
+
+Rows are places in block observe: a relation a > b is the row a - b.  Made by whoever has the text; see simulate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+Condition = tuple[Any, ...]
+"""("and" | "or", condition, ...), ("not", condition), ("relation", number, operator)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """row - against zero; moves: it does between events, else at events alone."""
+
+    row: int
+    moves: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """target := value of a row.  kind: discrete (place in p), state or flow (place in y as written)."""
+
+    name: str
+    kind: str
+    place: int
+    row: int
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """Fires where its condition becomes true."""
+
+    name: str
+    condition: Condition
+    assignments: tuple[Assignment, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """Fires at t0 + k period (s), k = 0, 1, ..."""
+
+    name: str
+    period: float
+    assignments: tuple[Assignment, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A constraint that holds at times.
+
+    kind: phi, psi (value >= 0, multiplier >= 0 where it holds), guarded (holds while the row `guard` is not zero),
+    friction (where it holds, abs(multiplier) <= bound; else the place `sense` of p is the sign of the value).
+    value, rate, acceleration (of phi), multiplier, bound, bound - multiplier (upper),
+    bound + multiplier (lower), guard: rows; number: of its switch; restitution: of phi.
+    """
+
+    name: str
+    kind: str
+    number: int
+    value: int
+    rate: int
+    multiplier: int
+    acceleration: int = -1
+    bound: int = -1
+    upper: int = -1
+    lower: int = -1
+    sense: int = -1
+    guard: int = -1
+    restitution: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """limit: of events; rest: an impact slower than this part of the fastest is the last."""
+
+    relations: tuple[Relation, ...] = ()
+    whens: tuple[When, ...] = ()
+    sampled: tuple[Sampled, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    limit: int | None = None
+    rest: float = 1e-6
+
+    def __bool__(self) -> bool:
+        return bool(self.whens or self.sampled or self.contacts)
+
+
+@dataclass(frozen=True, slots=True)
+class Happened:
+    """One event: time (s), name, element, what it changed before and after."""
+
+    time: float
+    name: str
+    element: str
+    before: str
+    after: str

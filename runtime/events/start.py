@@ -1,0 +1,46 @@
+"""A consistent start with the constraints that hold at it: complementarity over starts."""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.events.observer import Observer
+from sysdyn.runtime.events.plan import Plan
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import InconsistentStart
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState, consistent_start
+
+
+def eventful_start(system: System, t0: float, plan: Plan) -> ConsistentState:
+    """A state at t0 with the active set and the senses that fit it, which the model then has.
+
+    Raises InconsistentStart.
+    """
+    if not plan.contacts:
+        return consistent_start(system, t0)
+    contacts = Contacts(plan.contacts, system, Observer(system), system.description.p)
+    contacts.begin()
+    zeros = np.zeros(system.form.written)
+    values = contacts.observer(t0, zeros, zeros)
+    for k, contact in enumerate(plan.contacts):
+        if contact.kind == "guarded":
+            contacts.active[k] = bool(values[contact.guard])
+    found: list[ConsistentState] = []
+    errors: list[InconsistentStart] = []
+
+    def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        try:
+            found.append(consistent_start(system, t))
+        except InconsistentStart as error:
+            if not found:
+                raise
+            errors.append(error)
+            return None
+        return found[-1].y, found[-1].yd, np.zeros_like(zeros)
+
+    try:
+        contacts.fit(t0, zeros, zeros, settle)
+    except NoActiveSetError as error:
+        raise errors[-1] if errors else InconsistentStart("stuck", float("inf"), names=error.names) from error
+    return found[-1]

@@ -1,0 +1,139 @@
+"""The pieces of a run between events: where each ends on the dense output, and how the next one begins.
+
+Received: an `Integration` under way and a plan of events; the handler (runtime/events) says what happens, this file
+tells the core.  What an event reads is settled at the instant, so that multipliers are as exact as positions.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from sysdyn.runtime.events.handler import Handler
+from sysdyn.runtime.events.plan import Plan
+from sysdyn.runtime.integrate.request import TRACE
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+
+if TYPE_CHECKING:
+    from sysdyn.runtime.integrate.integrate import Integration, Sink
+
+_DENSE = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p)
+_REFINE = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
+
+
+class Pieces:
+    """Drives the events of one integration."""
+
+    def __init__(self, run: Integration, plan: Plan) -> None:
+        self.run = run
+        start = run.start
+        assert run.request.begin is not None
+        self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin)
+        self.handler.restart = run.restart
+        n = run.system.form.written
+        self._first(self.handler.begin(start.t, run.y[:n].copy(), run._start_rate[:n].copy()))
+        self._watch()
+
+    def _first(self, point: tuple[Floats, Floats] | None) -> None:
+        """The start, where samples due at it change it."""
+        if point is None:
+            return
+        run, n = self.run, self.run.system.form.written
+        run.y[:n], run._start_rate[:n] = point
+        run.yd = np.where(run.roles.differential, run._start_rate, 0.0)
+        run.method.start(run.start.t, run.y, run.yd)
+
+    def _watch(self) -> None:
+        self.handler.observer.know(self.run.largest())
+        self._array = self.handler.core()
+        core = self.run.run_.contents
+        core.watch, core.watches = c.addressof(self._array), len(self.handler.watched())
+
+    def aim(self, end: float) -> None:
+        """The next step ends no later than at the next sample, or the end (s) of the segment."""
+        sample = self.handler.next_sample()
+        self.run.method.contents.t_end = min(end, sample)
+        self.run.run_.contents.end_kind = TRACE if sample <= end else 0
+
+    # -- where a piece ends --------------------------------------------------------------------------------------
+
+    def _point(self, t: float) -> tuple[Floats, Floats]:
+        """y, yd [unknowns as written] at t within the last step, settled."""
+        system, stepper = self.run.system, self.run.method.contents.stepper
+        y, yd = np.zeros(system.form.extended), np.zeros(system.form.extended)
+        _DENSE(stepper.dense)(stepper.self, t, lib.pointer(y), lib.pointer(yd))
+        n = system.form.written
+        y, yd, _ = self.run.settler.settle(t, y[:n], yd[:n])
+        return y, yd
+
+    def _values(self, t: float) -> Floats:
+        return self.handler.observer(t, *self._point(t))
+
+    def event(self, sink: Sink) -> float:
+        """What changes within the last step, which is counted up to there; CPU seconds spent."""
+        began = time.process_time()
+        run, core, method = self.run, self.run.run_.contents, self.run.method.contents
+        stepper = method.stepper
+        self.handler.before = self.handler.now()
+        if stepper.refine:
+            _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
+        begin, end = core.t_from, method.t
+        while True:
+            found = self.handler.crossed(self._values, begin, end)
+            if found is None:
+                self._accept(end, 0, sink)
+                self._watch()
+                return time.process_time() - began
+            t, which = found
+            before = self._point(t)
+            point = self.handler.fire(t, *before, which=which)
+            if point is not None:
+                self._accept(t, TRACE, sink)
+                self._go_on(t, point, before)
+                return time.process_time() - began
+            begin = t
+
+    def _accept(self, t: float, kind: int, sink: Sink) -> None:
+        """The last step counts up to t; rows of before the event are written with the parameters of before."""
+        after = self.handler.now()
+        self.handler.back(self.handler.before)
+        full = lib.core.sd_run_accept(self.run.run_, t, kind)
+        while full:
+            self.run.drain(sink)
+            full = lib.core.sd_run_drain(self.run.run_)
+        self.run.drain(sink)
+        self.handler.back(after)
+
+    def _go_on(self, t: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats]) -> None:
+        core = self.run.run_.contents
+        core.start_kind = TRACE
+        self.run.go_on(t, t, point, before)
+        core.start_kind = 0
+        self._watch()
+
+    def sample(self, end: float, sink: Sink) -> bool:
+        """What is due where a piece has met its end; whether the segment, which ends at `end` (s), goes on."""
+        run, method = self.run, self.run.method.contents
+        due = self.handler.due(method.t)
+        if due:
+            n = run.system.form.written
+            y, yd = run.method.point()
+            y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
+            point = self.handler.fire(method.t, y, yd, samples=due)
+            run.drain(sink)
+            self.aim(end)
+            if point is not None:
+                self._go_on(method.t, point, (y, yd))
+        return bool(due) and method.t < end
+
+    def jump(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
+        """The point behind an instant at which the text jumps."""
+        said = [self.handler.contacts.word(k) for k in range(len(self.handler.plan.contacts))]
+        due = self.handler.due(t)
+        found = self.handler.fire(t, y, yd, samples=due) if due else None
+        point = found or self.handler.settled(t, y, yd, said)
+        self._watch()
+        return point

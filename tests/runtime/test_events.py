@@ -1,0 +1,54 @@
+"""Events against closed forms: impacts, dry friction, samples; what the trace and the books say of them."""
+
+import numpy as np
+import pytest
+from sysdyn.api import simulate
+
+G = 9.81
+BALL = """
+model ball {
+  param m = 1 kg
+  param r = 0.8
+  coord h: translation = 1 m
+  energy T* = 1/2*m*h'^2
+  energy V = m*9.81 m/s^2*h
+  phi floor: h >= 0 m restitution r
+  init h' = 0 m/s
+}
+scene s of ball {
+  time 0 s to 2.5 s
+  trace h, h' as v, floor.multiplier as push
+}
+"""
+
+
+def run(text, tmp_path, **options):
+    file = tmp_path / "m.sd"
+    file.write_text(text)
+    return simulate(file, output=tmp_path / "m.h5", **options)
+
+
+def impacts(r, number):
+    """Instants of the first impacts from 1 m, and the speed after each."""
+    speed = np.sqrt(2.0 * G)
+    times, after = [speed / G], [r * speed]
+    while len(times) < number:
+        times.append(times[-1] + 2.0 * after[-1] / G)
+        after.append(r * after[-1])
+    return np.array(times), np.array(after)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.parametrize("method", ["radau", "bdf"])
+def test_a_ball_bounces_at_the_exact_instants(tmp_path, formulation, method):
+    trace = run(BALL, tmp_path, formulation=formulation, method=method, accuracy=1e-9)
+    times, after = impacts(0.8, 4)
+    found = [e.time for e in trace.events if e.element == "floor"]
+    assert np.abs(np.array(found) - times).max() < 1e-10
+    for t, v in zip(times, after, strict=True):
+        (here,) = np.nonzero(np.abs(trace.time - t) < 1e-9)
+        assert len(here) == 2  # the instant stands twice: before and after
+        assert trace["v"][here[0]] == pytest.approx(-v / 0.8, rel=1e-9)
+        assert trace["v"][here[1]] == pytest.approx(v, rel=1e-9)
+    end = 2.5 - times[-1]
+    assert trace["h"][-1] == pytest.approx(after[-1] * end - 0.5 * G * end**2, abs=1e-9)
