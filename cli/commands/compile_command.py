@@ -40,6 +40,7 @@ def command(
     backend: str,
     settings: tuple[tuple[str, str], ...],
     levels: tuple[tuple[str, str], ...],
+    no_prune: bool,
     folder: str | None,
     dump: str | None,
     explain: bool,
@@ -63,7 +64,7 @@ def command(
         if dump == "network":
             console.data(network_text.show(network))
             return console.finish()
-        prepared = prepare(network, console.report, formulation=formulation, backend=backend)
+        prepared = prepare(network, console.report, formulation=formulation, backend=backend, prune=not no_prune)
         if prepared is None:
             return console.finish(1)
         if dump:
@@ -87,7 +88,8 @@ def command(
 def _account(prepared: Prepared) -> str:
     """What became of nodes, branches and coordinates, by which rule."""
     compiled = prepared.compiled
-    rows = [(s.rule, s.what, s.became) for s in compiled.steps]
+    rows = [("8.7", r.what, r.why) for r in prepared.left_out]
+    rows += [(s.rule, s.what, s.became) for s in compiled.steps]
     held = {f.owner for f in compiled.form.families if f.kind == "q"}
     unseen = [c.name for c in compiled.energies.coordinates if c.name not in held]
     rows += [("8.7", f"displacement of {name}", "pruned: nothing reads it; its flow is the unknown") for name in unseen]
