@@ -37,6 +37,7 @@ def chosen(function: Callable[..., Any]) -> Callable[..., Any]:
             click.option("--backend", type=click.Choice(["c", "numpy"]), default="c", show_default=True),
             click.option("--set", "settings", type=Setting(), multiple=True, help="Parameter or input; repeatable."),
             click.option("--level", "levels", type=Setting(), multiple=True, help="PATH=NAME; repeatable."),
+            click.option("--no-prune", is_flag=True, help="Keep what the scene does not need."),
         ]
     ):
         function = option(function)

@@ -12,12 +12,11 @@ from pathlib import Path
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
-from sysdyn.dsl.elaborate.parts import Parts
 from sysdyn.dsl.elaborate.scenes import SceneReader
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Network, Scene
+from sysdyn.dsl.model.network import Network, Scene, nodes_read
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.context import Failed
@@ -141,7 +140,7 @@ def _network(
         events.expanded(elaborator, known)
     checks.values(elaborator, known, report)
     if not report.failed and not _incomplete(report):
-        graph_checks.run(elaborator, known, _read(elaborator.parts), report)
+        graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
     found = _result(elaborator, reader, read_scene)
     laws.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
@@ -193,22 +192,13 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         discretes=frozenset(parts.discretes),
         events=tuple(parts.events),
         switches=tuple(parts.switches),
-        read=_read(parts),
+        read=nodes_read(parts),
     )
 
 
 def _incomplete(report: Report) -> bool:
     """Whether a part of the text was left out."""
     return any(d.code == "N608" for d in report)
-
-
-def _read(parts: Parts) -> frozenset[str]:
-    """Common-effort nodes whose effort an equation reads."""
-    roots = [e.expression for e in parts.energies] + [c.expression for c in parts.constraints]
-    roots += [n for w in parts.works for n in (w.effort, w.on)] + [d.expression for d in parts.dynamics]
-    roots += [b.law for b in parts.branches if b.law is not None] + [c.ratio for c in parts.couplings]
-    found = (n for n in ex.topological(roots) if n.op == "var")
-    return frozenset(n.data[0] for n in found if n.data[1] == "ne")
 
 
 def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:

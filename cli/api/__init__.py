@@ -152,8 +152,9 @@ def compile_model(
     formulation: str = "auto",
     index: str = "auto",
     backend: str = "c",
+    no_prune: bool = False,
 ) -> Module:
-    """Compile a model of a file, of a scene where one is named.
+    """Compile a model of a file, of a scene where one is named (without what that does not need).
 
     index: 3 as written, 2 stabilised, 2v, 1, 0 (yd - F(t, y)); auto: the one that `simulate` takes.
     """
@@ -167,7 +168,9 @@ def compile_model(
         network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
         report.extend(inner if network else targets.unsupported(inner))
         wanted = None if formulation == "auto" else formulation
-        prepared = None if network is None else prepare(network, report, formulation=wanted, backend=backend)
+        if network is None:
+            raise ModelError(report.diagnostics)
+        prepared = prepare(network, report, formulation=wanted, backend=backend, prune=not no_prune)
         if prepared is None:
             raise ModelError(report.diagnostics)
         said = prepared.network.scene

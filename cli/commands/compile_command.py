@@ -18,6 +18,7 @@ from sysdyn.compiler.program import program_text
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
+from sysdyn.dsl.model.network import Event, Switch
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.model.failures import NoSuchForm
 
@@ -40,6 +41,7 @@ def command(
     backend: str,
     settings: tuple[tuple[str, str], ...],
     levels: tuple[tuple[str, str], ...],
+    no_prune: bool,
     folder: str | None,
     dump: str | None,
     explain: bool,
@@ -63,7 +65,7 @@ def command(
         if dump == "network":
             console.data(network_text.show(network))
             return console.finish()
-        prepared = prepare(network, console.report, formulation=formulation, backend=backend)
+        prepared = prepare(network, console.report, formulation=formulation, backend=backend, prune=not no_prune)
         if prepared is None:
             return console.finish(1)
         if dump:
@@ -87,7 +89,8 @@ def command(
 def _account(prepared: Prepared) -> str:
     """What became of nodes, branches and coordinates, by which rule."""
     compiled = prepared.compiled
-    rows = [(s.rule, s.what, s.became) for s in compiled.steps]
+    rows = [("8.7", r.what, r.why) for r in prepared.left_out]
+    rows += [(s.rule, s.what, s.became) for s in compiled.steps]
     held = {f.owner for f in compiled.form.families if f.kind == "q"}
     unseen = [c.name for c in compiled.energies.coordinates if c.name not in held]
     rows += [("8.7", f"displacement of {name}", "pruned: nothing reads it; its flow is the unknown") for name in unseen]
@@ -98,7 +101,7 @@ def _write(console: Console, prepared: Prepared, index: str | None, folder: Path
     """The files of one index form; nothing where the model has no start or no such form."""
     scene = prepared.network.scene
     t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
-    happens = (*prepared.network.events, *prepared.network.switches)
+    happens: list[Event | Switch] = [*prepared.network.events, *prepared.network.switches]
     if happens:
         text = f"'{happens[0].name}' is not part of an exported residual yet: it is one smooth piece"
         console.report.error("E608", text, happens[0].place, help="sysdyn simulate, or --dump")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.running import Ran, Request, integrate, options_of, ready
+from sysdyn.cli.run.starting import as_written
 from sysdyn.compiler.model import energies
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
@@ -117,8 +118,13 @@ def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
 
 
 def _structure(ran: Ran, trace: Arrays) -> dict[str, Any]:
-    """Equations, degrees of freedom, index, counts of one formulation: independent of parameters' values."""
-    facts, manifest = ran.started.facts, ran.prepared.manifest
+    """Equations, degrees of freedom, index, counts of one formulation: independent of parameters' values, and of what
+    the scene needs of the model.
+    """
+    prepared, started = ran.prepared, ran.started
+    if prepared.left_out:
+        prepared, started = as_written(prepared, started.state.t) or (prepared, started)
+    facts, manifest = started.facts, prepared.manifest
     return {
         "coordinates": facts.coordinates,
         "m1": facts.m1,
@@ -129,6 +135,6 @@ def _structure(ran: Ran, trace: Arrays) -> dict[str, Any]:
         "index": facts.index,
         "unknowns": [[u["name"], u["kind"], u["unit"], u["differential"]] for u in manifest["unknowns"]],
         "rows": [[r["label"], r["kind"]] for r in manifest["rows"]],
-        "equations": energies.show(ran.prepared.compiled.energies).splitlines(),
+        "equations": energies.show(prepared.compiled.energies).splitlines(),
         "quantities": sorted(trace.values),
     }

@@ -14,6 +14,7 @@ from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.formulations import choose
+from sysdyn.compiler.network.pruning import Removal, pruned
 from sysdyn.compiler.pipeline import CompiledModel, compile_network
 from sysdyn.compiler.program import build
 from sysdyn.dsl.model.network import Network
@@ -24,7 +25,10 @@ from sysdyn.runtime.model.carrier import Carrier
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A compiled model with its numbers bound; backend says which carrier it has."""
+    """A compiled model with its numbers bound; backend says which carrier it has.
+
+    network: what was compiled; whole: what was written; left_out: the parts that the scene does not need.
+    """
 
     network: Network
     compiled: CompiledModel
@@ -34,6 +38,8 @@ class Prepared:
     formulation: str
     backend: str
     cpu_compile_s: float
+    whole: Network
+    left_out: tuple[Removal, ...] = ()
 
     @property
     def arrays(self) -> dict[str, Any]:
@@ -54,15 +60,25 @@ class Prepared:
 
 
 def prepare(
-    network: Network, report: Report, *, formulation: str | None = None, backend: str = "c", traced: bool = False
+    network: Network,
+    report: Report,
+    *,
+    formulation: str | None = None,
+    backend: str = "c",
+    traced: bool = False,
+    prune: bool = False,
 ) -> Prepared | None:
     """Compile and bind a network; None where the report says why not.
 
     traced: a run is asked, which traces every coordinate where the text traces nothing.
+    prune: leave out what the scene does not need; that the rest is well-formed is judged of the whole all the same.
     formulation None: the scene's, else auto.  A missing C compiler is reported as a note and NumPy takes over.
     """
     cpu = time.process_time()
-    place = None
+    whole, place = network, None
+    network, left_out = pruned(whole) if prune else (whole, ())
+    if left_out and not _well_formed(whole, report):
+        return None
     if formulation is None:
         formulation = (network.scene.formulation if network.scene else None) or "auto"
         place = network.scene.formulation_place if network.scene else None
@@ -78,7 +94,20 @@ def prepare(
         return None
     report.extend(compiled.notes)
     manifest = compiled.manifest(binding)
-    return Prepared(network, compiled, binding, manifest, made, chosen, backend, time.process_time() - cpu)
+    spent = time.process_time() - cpu
+    return Prepared(network, compiled, binding, manifest, made, chosen, backend, spent, whole, left_out)
+
+
+def _well_formed(network: Network, report: Report) -> bool:
+    """Whether the structure of a whole network is right (language, section 9); its findings go to the report."""
+    formulation, found = choose(network, "auto", None)
+    try:
+        if not found:
+            compile_network(network, formulation, "numpy").bind()
+    except ModelError as error:
+        found = error.diagnostics
+    report.extend(found)
+    return not any(d.severity == "error" for d in found)
 
 
 def _compiled(

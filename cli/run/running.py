@@ -21,6 +21,7 @@ from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import differences, stopped, verdict
 from sysdyn.compiler.binding.instants import instants
+from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
 from sysdyn.dsl.model import dimensions as dim
@@ -66,6 +67,7 @@ class Request:
     max_steps: int | None = None
     max_wall: str | None = None
     timings: bool = True
+    no_prune: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +123,8 @@ def ready(request: Request, target: Target, report: Report) -> Prepared | None:
     network = load.network(target.document, target.model, target.scene, inner, request.settings, levels=request.levels)
     prepared = None
     if network is not None:
-        prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend, traced=True)
+        wanted, backend, prune = request.formulation, request.backend, not request.no_prune
+        prepared = prepare(network, inner, formulation=wanted, backend=backend, traced=True, prune=prune)
     report.extend(inner if prepared else targets.unsupported(inner))
     return prepared
 
@@ -260,6 +263,7 @@ def _default_output(file: str, scene: str) -> str:
 
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
     text = target.document.file.source.text
+    left_out = {"pruned": listed(prepared.left_out)} if prepared.left_out else {}
     return {
         "Conventions": "CF-1.11",
         "title": target.name,
@@ -268,6 +272,7 @@ def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
         "scene": prepared.network.scene.name if prepared.network.scene else "",
         "formulation": prepared.formulation,
         "model_sha256": hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest(),
+        **left_out,
     }
 
 

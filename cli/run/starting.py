@@ -61,6 +61,23 @@ def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None 
     return Started(system, state, facts)
 
 
+def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None:
+    """The model as written at its start, in the same formulation where that can express it; None where it has none."""
+    for formulation in (prepared.formulation, "auto"):
+        whole = prepare(prepared.whole, Report(), formulation=formulation, backend="numpy")
+        if whole is not None:
+            break
+    else:
+        return None
+    system = System(whole.manifest, whole.arrays, whole.carrier)
+    try:
+        with np.errstate(all="ignore"):
+            state = eventful_start(system, t0, plan(whole, system))
+            return whole, Started(system, state, structure(system, state))
+    except (InconsistentStart, NotFiniteError):
+        return None
+
+
 def described(state: ConsistentState) -> list[str]:
     """What the start moved, a line each."""
     return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
@@ -163,6 +180,13 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
 
     Claims of a model hold in each of its scenes: where there is a Lagrangian formulation, that is counted.
     """
+    if prepared.left_out and prepared.network.statics:
+        written = as_written(prepared, state.t)
+        if written is None:
+            text = "claims about counts are of the whole model, a part of which has no start: 'check' says why"
+            report.note("N608", text, prepared.network.statics[0].place)
+            return
+        prepared, (system, state, facts) = written[0], (written[1].system, written[1].state, written[1].facts)
     if _without_primal_rows(prepared) and prepared.network.statics:
         facts = replace(_primal(prepared, state.t) or facts, index=facts.index)
     known = {

@@ -8,8 +8,9 @@ A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
 
@@ -400,3 +401,11 @@ class Network:
     events: tuple[Event, ...] = ()
     switches: tuple[Switch, ...] = ()
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
+
+
+def nodes_read(said: Any) -> frozenset[str]:
+    """Common-effort nodes whose effort a statement (not a trace) reads; said: a Network, or the parts of one."""
+    roots = [e.expression for e in said.energies] + [c.expression for c in said.constraints]
+    roots += [n for w in said.works for n in (w.effort, w.on)] + [d.expression for d in said.dynamics]
+    roots += [b.law for b in said.branches if b.law is not None] + [c.ratio for c in said.couplings]
+    return frozenset(n.data[0] for n in topological(roots) if n.op == "var" and n.data[1] == "ne")

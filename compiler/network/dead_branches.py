@@ -1,0 +1,56 @@
+"""Branches that end at a node which no other element touches: their flow is zero (their effort, at common-flow nodes).
+
+Such an element acts on nothing: the balance of that node is its flow alone.  It stays where anything reads it or its
+node, where an initial value is given to either, and where it is a source of what the node balances (the contradiction
+is the compiler's to tell).  Single nodes only; a part without a ground keeps them, for the node that its efforts
+count from is chosen by how many elements touch it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from sysdyn.compiler.network.influence import Link, Quantity
+from sysdyn.dsl.model.network import Branch, Network
+
+STORES = frozenset(("kinetic", "potential", "dissipator"))
+
+
+def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quantity]) -> list[frozenset[Quantity]]:
+    """Each dead branch with its end node."""
+    touched: dict[Quantity, list[Link]] = {}
+    read = set(asked)
+    for link in found:
+        read |= link.reads - (link.joined if isinstance(link.item, Branch) else frozenset())
+        for q in link.joined:
+            touched.setdefault(q, []).append(link)
+    dead: list[frozenset[Quantity]] = []
+    for b in network.branches:
+        if len(touched["b", b.name]) == 1 and ("b", b.name) not in read:
+            dead += [frozenset({("b", b.name), end}) for end in _ends(network, b, touched, read)][:1]
+    return dead
+
+
+def _ends(
+    network: Network, b: Branch, touched: dict[Quantity, list[Link]], read: set[Quantity]
+) -> Iterator[Quantity]:
+    """End nodes of the branch that nothing else touches or reads."""
+    shapes = {n.name: n.shape for n in network.nodes}
+    balanced = "flow" if b.domain.common == "effort" else "effort"
+    allowed = STORES | {"effort", "flow"} - {balanced}
+    names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
+    if b.loops or b.kind not in allowed or len(names) != 2 or names[0] == names[1]:
+        return
+    for name in names:
+        alone = not shapes[name] and len(touched["n", name]) == 1 and ("n", name) not in read
+        if alone and _grounded(network, name):
+            yield "n", name
+
+
+def _grounded(network: Network, node: str) -> bool:
+    """Whether branches join a node to the ground of its domain."""
+    ends = [{end.node for end in (b.plus, b.minus) if end is not None} for b in network.branches]
+    seen: set[str | None] = {node}
+    while any(new := [e for e in ends if e & seen and not e <= seen]) and None not in seen:
+        seen.update(*new)
+    return None in seen
