@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
-_HELD, _SETTLED, _RANK = 1e-9, 2e-15, 1e-11
+_HELD, _SETTLED, _RANK, _NOISE = 1e-9, 2e-15, 1e-11, 1e-13
 _ITERATIONS, _HALVINGS, _NEWTON = 60, 12, 30
 
 
@@ -343,6 +343,9 @@ class _Seeking:
                 self.guess = self.x.copy()
         if not holds:
             raise StartError("no consistent start was found at these parameters")
+        # round-off beside its magnitude: rows whose slopes underflow leave a rate open
+        rates = np.abs(self.x[self.n : self.first]) <= _NOISE * np.asarray(self.tables["scale"])[self.n : self.first]
+        self.x[self.n : self.first][rates] = 0.0
         return self.expand(self.x)
 
     def attempt(self, use: NDArray[np.int_], free: NDArray[np.int_]) -> bool:

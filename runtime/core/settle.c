@@ -9,6 +9,7 @@
 #define EPSILON 1e-14   /* of redundant rows */
 #define ITERATIONS 6
 #define EXACT 4e-15     /* scaled residual that counts as round-off */
+#define FINE 1e-13      /* ... and that with which old factors have done what they can */
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define HELD 1e8        /* weight of the state in a second attempt */
@@ -150,7 +151,7 @@ static double move(sd_settle *settle, double *y, double *yd)
 static void iterate(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
     int32_t n = settle->unknowns;
-    int failed = !settle->ready && factorise(settle, t, y, yd);
+    int fresh = !settle->ready, failed = fresh && factorise(settle, t, y, yd);
     double moved = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     *best = before;
     memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
@@ -163,10 +164,12 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, double *
             for (int32_t k = 0; k < settle->rates; k++)
                 settle->x[n + k] = yd[settle->rate[k]];
         }
-        if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < CLOSE && moved < SMALL))
+        if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < (fresh ? CLOSE : FINE) && moved < SMALL))
             break;
-        if (now > CONTRACTS * before && now > EXACT)
+        if (now > CONTRACTS * before && now > EXACT) {
             failed = factorise(settle, t, y, yd);
+            fresh = 1;
+        }
         before = now;
     }
 }

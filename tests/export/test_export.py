@@ -225,6 +225,23 @@ def test_starts_at_other_parameters(tmp_path, model, changed, index):
 
 
 @C
+def test_rates_of_a_blocked_diode_are_no_noise(tmp_path):
+    """Its slope is 1e-50 A/V: whatever stands in the voltage's rate, the rows hold; 1e33 V/s stood there."""
+    changed = {"K": 0.353, "th_0": 0.326}
+    found = inside("seed/rectifier_motor_crank", "auto", scene="reference")
+    y, yd = found.start(changed)
+    model, options = "seed/rectifier_motor_crank", ("--scene", "reference")
+    assert compiled(tmp_path / "c", model, *options) == 0
+    assert compiled(tmp_path / "numpy", model, *options, "--backend", "numpy") == 0
+    outside, python = Outside(tmp_path / "c"), module(tmp_path / "numpy")
+    code, *start = outside.start(outside.changed(**changed))
+    assert code == 0
+    for a, b in (start, python.sd_start(python.parameters(**changed))):
+        np.testing.assert_allclose(a, y, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(b, yd, rtol=1e-6, atol=1e-6 * np.abs(yd).max())
+
+
+@C
 def test_what_follows_from_parameters(tmp_path):
     """Parameters by others, arrays too, and the constant of an integrated row: 3 gap - 2 gap."""
     path = tmp_path / "chain.sd"

@@ -4,11 +4,12 @@ A slice of the numbers runs always; SYSDYN_LONG=1 runs all 200.
 """
 
 import os
+import re
 from collections import Counter
 
 import numpy as np
 import pytest
-from circuits import circuit
+from circuits import INSTANTS, circuit
 from running import ran
 
 LONG = os.environ.get("SYSDYN_LONG") == "1"
@@ -59,3 +60,15 @@ def test_the_energy_of_steep_laws_balances_in_every_row(tmp_path, number):
     assert run.met
     turned_over = np.abs(np.asarray(run.trace["w"])).max()
     assert np.abs(np.asarray(run.trace["audit.energy"])).max() <= 1e-3 * turned_over
+
+
+@pytest.mark.parametrize(("number", "formulation"), [(0, "lagrangian"), (5, "co_lagrangian")])
+def test_rows_between_steps_are_as_accurate_as_steps(tmp_path, number, formulation):
+    """1600 instants of a rectifier and a freewheeling coil, most of them within steps: interpolated, then settled."""
+    made = circuit(number)
+    time = np.linspace(0.0, made.time[-1], 10 * INSTANTS + 1)[1:]
+    text = re.sub(r"every .* s", f"every {float(time[0])!r} s", made.text)
+    run = ran(tmp_path, text, formulation=formulation, accuracy=1e-5)
+    assert run.met
+    for name, values in made.reference(time).items():
+        assert np.abs(run.at(name, time) - values).max() <= 3e-5 * np.abs(values).max()
