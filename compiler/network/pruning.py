@@ -59,7 +59,7 @@ def pruned(network: Network) -> tuple[Network, tuple[Removal, ...]]:
     if not asked:
         return network, ()
     removals: list[Removal] = []
-    while True:
+    for _ in range(len(network.branches) + 1):  # a round takes a branch away
         found = links(network)
         kept = reached(found, asked)
         gone = frozenset(quantities(network)) - kept
@@ -69,9 +69,10 @@ def pruned(network: Network) -> tuple[Network, tuple[Removal, ...]]:
         found = links(network)
         dead = dead_branches(network, found, asked)
         if not dead:
-            return network, tuple(removals)
+            break
         removals += [Removal("dead branch", _named(network, part)) for part in dead]
         network = _without(network, found, frozenset().union(*dead))
+    return network, tuple(removals)
 
 
 def listed(removals: Iterable[Removal], most: int = 8000) -> str:

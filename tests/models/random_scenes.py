@@ -2,7 +2,8 @@
 
 Circuits, trains of masses, points with coordinates, controllers, implicit unknowns; transactors, forces and states that
 read other parts; gyrators, springs and resistors between parts; energies whose one statement spans islands; dead ends.
-Every scale is near one, so that no part is stiff and all run at the same accuracy.
+Every scale is near one, so that no part is stiff and all run at the same accuracy; every store has a written start, for
+what a search finds for unwritten ones is another matter.
 """
 
 import numpy as np
@@ -58,10 +59,10 @@ class Sketch:
         else:
             self.say(f"I{first}: current(i = 1 A*{self.signal()}) ground -> {first}")
         for k, node in enumerate(nodes):
-            self.say(f"C{node}: capacitor(C = {self.value()} F) {node} -> ground")
+            self.say(f"C{node}: capacitor(C = {self.value()} F) {node} -> ground", f"init {node}.e = {self.value()} V")
             self.say(f"G{node}: resistor(R = {self.value()} ohm) {node} -> {self.pick([*nodes[:k], 'ground'])}")
             if self.chance(0.3):
-                self.say(f"L{node}: inductor(L = {self.value()} H) {node} -> ground")
+                self.say(f"L{node}: inductor(L = {self.value()} H) {node} -> ground", f"init L{node}.f = 0 A")
                 self.readable(f"L{node}.f", "A")
             self.readable(f"{node}.e", "V")
         self.wires += nodes
@@ -74,6 +75,7 @@ class Sketch:
             self.say(f"M{node}: mass(m = {self.value()} kg) {node}")
             self.say(f"K{node}: spring(k = {self.value()} N/m) {node} -> {other}")
             self.say(f"B{node}: damper(b = 0.3 N.s/m) {node} -> {other}")
+            self.say(f"init {node}.f = {self.value()} m/s", f"init {node}.q = {self.value()} m")
             self.readable(f"{node}.f", "m/s")
         self.say(f"F{nodes[0]}: force(F = 1 N*{self.signal()}) ground -> {nodes[0]}")
         self.points += nodes
@@ -84,7 +86,7 @@ class Sketch:
         self.coordinates = True
         for name in names:
             self.say(f"coord {name}: translation = {self.value()} m")
-            self.say(f"energy V = 1/2*({self.value()} N/m)*{name}^2")
+            self.say(f"init {name}' = 0 m/s", f"energy V = 1/2*({self.value()} N/m)*{name}^2")
             self.say(f"content D = 1/2*(0.2 N.s/m)*{name}'^2")
             self.readable(name, "m")
         squares = " + ".join(f"{name}'^2" for name in names)
@@ -118,7 +120,8 @@ class Sketch:
             self.say(f"Kb: spring(k = {self.value()} N/m) {a} -> {b}")
         if self.wires and self.points and self.chance(0.4):
             a, b = self.pick(self.wires), self.pick(self.points)
-            self.say(f"Gb: gyrator(e1 = ({self.value()} V.s/m)*f2) {a} -> ground, {b} -> ground")
+            self.say("node mid: electrical", f"Rg: resistor(R = {self.value()} ohm) {a} -> mid")
+            self.say(f"Gb: gyrator(e1 = ({self.value()} V.s/m)*f2) mid -> ground, {b} -> ground")
         if self.wires and self.chance(0.4):
             self.say("node open: electrical", f"Rd: resistor(R = {self.value()} ohm) {self.pick(self.wires)} -> open")
             self.say("state probe: V = 0 V", "dynamic probe' = (open.e - probe)/(1 s)")

@@ -202,7 +202,8 @@ def verified(model: str) -> tuple[int | str, set[str]]:
     run, said = importlib.import_module("sysdyn.cli.main").run, io.StringIO()
     try:
         with contextlib.redirect_stdout(said):
-            code = run(["verify", "--json", "--progress", "never", "--max-wall", "30", str(MODELS[model])])
+            options = ["--json", "--progress", "never", "--max-wall", "30", "--no-prune"]
+            code = run(["verify", *options, str(MODELS[model])])
     except BaseException as error:  # what a mutant may do
         return type(error).__name__, set()
     return code, {r["formulation"] for r in json.loads(said.getvalue())["result"]["runs"]} if not code else set()

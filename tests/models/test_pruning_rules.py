@@ -1,0 +1,171 @@
+"""Each rule of pruning, broken, is noticed: what is left out of a table of texts is another then.
+
+The texts are loaded once; a mutant is the text of a module with one place changed, and only says what it leaves out.
+"""
+
+import sys
+import types
+from pathlib import Path
+
+import pytest
+from sysdyn.compiler.network.pruning import pruned
+from sysdyn.dsl import load
+from sysdyn.dsl.text.diagnostics import Report, SourceText
+from test_pruning import ISLES, KEPT, OPEN, UNREAD, with_more
+
+ROOM = Path(load.__file__).parents[1] / "compiler" / "network"
+MODULES = ("influence", "dead_branches", "pruning")
+LEVER = "  node w: translation\n  Mw: mass(m = 1 kg) w\n"
+TEXTS = {
+    **{name: with_more(lines) for name, lines in UNREAD.items()},
+    **{f"kept: {name}": with_more(UNREAD[part] + f"  {line}\n") for name, (line, part) in KEPT.items()},
+    "isles": ISLES,
+    "open": OPEN,
+    "constraint that reads": with_more(
+        f"{UNREAD['island']}{LEVER}  input u: 1 = x.q/(1 m)\n  psi lever: z.f = (1 + u^2)*w.f\n"
+    ),
+    "ratio that reads": with_more(
+        f"{UNREAD['island']}{LEVER}  input u: 1 = x.q/(1 m)\n"
+        "  T: transformer(f1 = (1 + u^2)*f2) z -> ground, w -> ground\n"
+    ),
+    "gamma that reads": with_more("  implicit h: N ~ 0 N\n  gamma g: h = 1 N/m*x.q\n"),
+    "expected": with_more("  node z: translation\n  Mz: mass(m = 1 kg) z\n  expect always: abs(z.f) <= 1 m/s\n"),
+    "meter": with_more("  coord y: translation\n  energy T* = 1/2*(1 kg)*y'^2\n").replace("as v", "as v, audit.energy"),
+    "accuracy": with_more("  coord y: translation\n  energy T* = 1/2*(1 kg)*y'^2\n").replace(
+        "as v", "as v\n  accuracy 1e-3 on audit.energy"
+    ),
+    "open, given a start": OPEN.replace("}\nscene s", "  init d.e = 0 V\n}\nscene s", 1),
+    "open, what is in it given": OPEN.replace("R3: resistor(R = 1 ohm)", "R3: capacitor(C = 1 F)").replace(
+        "}\nscene s", "  init R3.e = 1 V\n}\nscene s", 1
+    ),
+    "open, read by what is traced": OPEN.replace(
+        "}\nscene s", "  state z: V = 0 V\n  dynamic z' = (R3.e - z)/(1 s)\n}\nscene s", 1
+    ).replace("as e", "as e, z"),
+    "expected, nothing traced": ISLES.replace("trace x }", "expect always: abs(x) <= 9 m }"),
+    "open, a source": OPEN.replace("R3: resistor(R = 1 ohm)", "R3: current(i = 0 A)"),
+    "energy that reads": with_more(
+        "  state h: 1 = 0\n  dynamic h' = (x.q/(1 m) - h)/(1 s)\n  coord y: translation\n"
+        "  energy T* = 1/2*(1 kg)*y'^2\n  energy V = 1/2*(1 N/m)*(2 + h)*y^2\n"
+    ).replace("as v", "as v, h"),
+    "open, no ground": OPEN.replace("ground", "b")
+    .replace("a -> b\n  R1", "a -> e\n  node e: electrical\n  R4: resistor(R = 1 ohm) e -> b\n  R1")
+    .replace("b -> b", "b -> a"),
+    "open, of two-ports": OPEN.replace(
+        "R3: resistor(R = 1 ohm) c -> d", "R3: gyrator(e1 = 1 ohm*f2) c -> d, b -> ground"
+    ),
+}
+MUTANTS = {
+    "influence": [
+        ('MECHANICAL = frozenset("xnb")', 'MECHANICAL = frozenset("xn")'),
+        ('MECHANICAL = frozenset("xnb")', 'MECHANICAL = frozenset("xb")'),
+        ('MECHANICAL = frozenset("xnb")', 'MECHANICAL = frozenset("nb")'),
+        ('MECHANICAL = frozenset("xnb")', 'MECHANICAL = frozenset("xnbus")'),
+        ("[w.on], [w.effort]", "[w.on], []"),
+        ("[w.on], [w.effort]", "[w.on, w.effort], []"),
+        ("read_by(network, [d.expression]))", "frozenset())"),
+        ('frozenset({("s", d.state.data[0])})', "read_by(network, [d.state, d.expression])"),
+        ("Link(i, read_by(network, [i.target, i.value]), frozenset())", "Link(i, frozenset(), frozenset())"),
+        (
+            "Link(i, read_by(network, [i.target, i.value]), frozenset())",
+            "Link(i, frozenset(), read_by(network, [i.target]))",
+        ),
+        ("(all_ - joined) | read_by", "read_by"),
+        ("[signals_held(root)[0]], [root]", "[root], []"),
+        ("[signals_held(root)[0]], [root]", "[signals_held(root)[0]], []"),
+        ("found.joined | own", "found.joined"),
+        ("[] if b.on is None else [b.on], [] if", "[], [] if"),
+        ("[] if b.law is None else [b.law])", "[])"),
+        ("[] if b.on is None else [b.on], [] if b.law is None else [b.law]", "[n for n in (b.on, b.law) if n], []"),
+        ('found.joined | ends | {("b", b.name)}', 'found.joined | {("b", b.name)}'),
+        ('found.joined | ends | {("b", b.name)}', "found.joined | ends"),
+        ('frozenset({("b", c.first), ("b", c.second)})', 'frozenset({("b", c.first)})'),
+        ('frozenset({("c", c.name)})', "frozenset()"),
+        ("Link(item, closed, read_by(network, [item.expression]))", "Link(item, closed, frozenset())"),
+        (
+            "Link(item, closed, read_by(network, [item.expression]))",
+            "Link(item, read_by(network, [item.expression]), frozenset())",
+        ),
+        ("if len(left) == 1 and", "if False and"),
+        ("new = (link.joined | link.reads) - kept", "new = link.joined - kept"),
+        ("new = (link.joined | link.reads) - kept", "new = link.reads - kept"),
+        ("for q in link.joined:\n            of", "for q in link.joined | link.reads:\n            of"),
+        ("for piece in summands(e.expression)", "for piece in [e.expression]"),
+        ('case "kappa" | "mu":\n            return "c", name', 'case "kappa" | "mu":\n            return "s", "none"'),
+        ('case "e" if name in unknowns:', 'case "e" if False:'),
+    ],
+    "dead_branches": [
+        ("read |= link.reads - (link.joined if isinstance(link.item, Branch) else frozenset())", "pass"),
+        ("read = set(asked)", "read = set()"),
+        ('len(touched["b", b.name]) == 1', "True"),
+        ('and ("b", b.name) not in read', ""),
+        ('len(touched["n", name]) == 1', "True"),
+        ('and ("n", name) not in read', ""),
+        ("alone and _grounded(network, name)", "alone"),
+        ('{"effort", "flow"} - {balanced}', '{"effort", "flow"}'),
+        ("b.kind not in allowed or ", ""),
+        ('balanced = "flow" if b.domain.common == "effort" else "effort"', 'balanced = "effort"'),
+    ],
+    "pruning": [
+        ("roots += [n for e in network.expectations", "roots = roots + [n for e in ()"),
+        ("return frozenset() if EVERYTHING in found else found", "return found - {EVERYTHING}"),
+        ('any(name.startswith("audit.") for name in scene.accuracy_on)', "False"),
+        ("or not roots", ""),
+        ("if len(left) == len(own):", "if left:"),
+        ("if not dead:", "if True:"),
+        ("range(len(network.branches) + 1)", "range(1)"),
+        ('Removal("downstream" if read else "island"', 'Removal("island"'),
+    ],
+}  # fmt: skip
+
+
+def _networks():
+    for text in TEXTS.values():
+        document, report = load.document(SourceText("m", text), Report()), Report()
+        for scene in document.scenes.values():
+            model = load.model_of(document, scene, report)
+            network = load.network(document, model, scene, report)
+            assert network is not None, (text, [d.message for d in report])
+            yield network
+
+
+@pytest.fixture(scope="module")
+def networks():
+    return list(_networks())
+
+
+def _left_out(networks, cut):
+    """What goes, by which rule, and what stays of the energies."""
+    found = []
+    for network in networks:
+        left, parts = cut(network)
+        found.append(([(p.rule, p.names, p.reads) for p in parts], [repr(e.expression) for e in left.energies]))
+    return found
+
+
+def _mutated(monkeypatch, changed, old, new):
+    """`pruned` of the modules with one place of one of them changed."""
+    for name in MODULES:
+        text = (ROOM / f"{name}.py").read_text(encoding="utf-8")
+        if name == changed:
+            assert text.count(old) == 1, (name, old, text.count(old))
+            text = text.replace(old, new)
+        full = f"sysdyn.compiler.network.{name}"
+        module = types.ModuleType(full)
+        monkeypatch.setitem(sys.modules, full, module)
+        exec(compile(text, full, "exec"), module.__dict__)  # noqa: S102 (our own text)
+    return module.pruned
+
+
+def test_a_broken_rule_is_noticed(networks, monkeypatch):
+    right = _left_out(networks, pruned)
+    assert right == _left_out(networks, _mutated(monkeypatch, "", "", ""))
+    unnoticed = []
+    for name, changes in MUTANTS.items():
+        for old, new in changes:
+            try:
+                same = _left_out(networks, _mutated(monkeypatch, name, old, new)) == right
+            except (KeyError, ValueError, AttributeError):
+                same = False
+            if same:
+                unnoticed.append((name, old, new))
+    assert not unnoticed
