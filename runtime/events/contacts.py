@@ -67,6 +67,8 @@ class Contacts:
         """The systems of the model follow the active set."""
         now = np.zeros(len(self.switches.places), dtype=bool)
         for k, contact in enumerate(self.contacts):
+            if contact.kind == "follows":
+                self.active[k] = self.active[k - 1]
             now[contact.number] = self.active[k]
         self.switches.set(now)
 
@@ -80,6 +82,8 @@ class Contacts:
         contact = self.contacts[k]
         if contact.kind == "friction":
             return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
+        if contact.kind == "planar":
+            return "sticks" if self.active[k] else "slips"
         return "holds" if self.active[k] else "free"
 
     # -- what does not fit ---------------------------------------------------------------------------------------
@@ -90,15 +94,26 @@ class Contacts:
         self.active[k] = not self.active[k]
         if contact.kind == "friction":
             self.p[contact.sense] = 0.0 if self.active[k] else np.sign(values[contact.multiplier])
+        elif contact.kind == "planar":
+            self._direct(contact, values[list(contact.aim[2:4])])
+            self.p[contact.sense] = 0.0 if self.active[k] else 1.0
+
+    def _direct(self, contact: Contact, along: Floats) -> None:
+        """The direction of a slip in the plane."""
+        size = float(np.hypot(*along))
+        if size > 0.0:
+            self.p[list(contact.direction)] = along / size
 
     def wrong(self, values: Floats, impulses: Floats) -> int:
         """The first contact whose condition does not hold; -1 where all do."""
         for k, contact in enumerate(self.contacts):
-            test = self._friction if contact.kind == "friction" else self._unilateral
+            test = _TESTS.get(contact.kind, Contacts._unilateral)
+            if contact.kind == "follows":
+                continue
             if contact.kind == "guarded":
                 if bool(values[contact.guard]) != bool(self.active[k]):
                     return k
-            elif test(k, contact, values, float(impulses[self._multiplier[k]])):
+            elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
                 return k
         return -1
 
@@ -123,6 +138,16 @@ class Contacts:
             return True
         slip = sense * values[c.value]
         return bool(slip < -zero(c.value) or (slip <= zero(c.value) and sense * values[c.rate] < -zero(c.rate)))
+
+    def _planar(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
+        zero, speed = self.observer.zero, values[c.aim[4]]
+        if self.active[k]:
+            return bool(values[c.upper] < -zero(c.multiplier))
+        if self.p[c.sense] == 0.0:
+            return True
+        if speed > zero(c.aim[4]):
+            return bool(values[c.value] < 0.0)
+        return bool(values[c.rate] < -zero(c.rate))
 
     # -- pivoting ------------------------------------------------------------------------------------------------
 
@@ -153,6 +178,11 @@ class Contacts:
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
         contact = self.contacts[k]
+        if contact.kind == "planar" and not self.active[k]:
+            if values[contact.aim[4]] > self.observer.zero(contact.aim[4]):
+                self._direct(contact, values[list(contact.aim[:2])])
+                self.p[contact.sense] = 1.0
+                return
         slips = contact.kind == "friction" and not self.active[k]
         if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
             self.p[contact.sense] = np.sign(values[contact.value])
@@ -228,3 +258,6 @@ class Contacts:
         if not hasattr(self, "_form"):
             self._form = self.system.another("settled")
         return self._form
+
+
+_TESTS = {"friction": Contacts._friction, "planar": Contacts._planar}

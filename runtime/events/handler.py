@@ -93,6 +93,8 @@ class Handler:
             if c.kind == "friction":
                 rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)
                 found += [Watched(-1, k, row, side) for row, side in rows]
+            elif c.kind == "planar":
+                found.append(Watched(-1, k, c.upper if sticks else c.value, 1))
             elif c.kind in ("phi", "psi"):
                 found.append(Watched(-1, k, c.multiplier if sticks else c.value, 1))
         return found
