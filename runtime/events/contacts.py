@@ -21,6 +21,8 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.system import System
 
+FAINT = 1e-3
+"""Of the magnitude of an unknown."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
 
@@ -47,8 +49,31 @@ class Contacts:
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.fastest = np.zeros(len(contacts))
+        self.time = 0.0
         places = self.switches.places
+        kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
+        for kind in sorted(kinds):
+            same = [c for c in contacts if (c.kind, observer.unit(c.value)) == kind]
+            for name in ("value", "rate", "multiplier"):
+                observer.alike([getattr(c, name) for c in same])
         self._multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
+
+    def size(self, magnitude: Floats, time: float) -> None:
+        """Least sizes of values, rates and multipliers: FAINT of those of the unknowns (magnitude [unknowns]) and of a
+        change of them in `time` (s), so that noise is no size where nothing has happened yet.
+        """
+        self.time = time
+        kinds, largest = self.system.kinds, self.observer.largest
+        families = self.system.description.families
+        units = np.array([families[k].unit if k >= 0 else "" for k in self.system.family_of])
+        for contact, place in zip(self.contacts, self._multiplier, strict=True):
+            own = kinds == ("q" if contact.kind == "phi" else "f")
+            alike = own & (units == self.observer.unit(contact.value))
+            size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
+            rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time**2))
+            for row, least in (*rows, (contact.multiplier, FAINT * float(magnitude[place]))):
+                if row >= 0:
+                    largest[row] = max(largest[row], least)
 
     def begin(self) -> None:
         """Nothing holds and nothing slips: where a start is sought from."""
@@ -120,7 +145,8 @@ class Contacts:
     def _unilateral(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero = self.observer.zero
         if self.active[k]:
-            return impulse < 0.0 or bool(values[c.multiplier] < -zero(c.multiplier))
+            least = zero(c.multiplier)  # and an impulse is one over the time in which things change
+            return bool(impulse < -least * self.time or values[c.multiplier] < -least)
         if values[c.value] > zero(c.value):
             return False
         if c.kind == "psi":
@@ -238,7 +264,7 @@ class Contacts:
         self, k: int, struck: set[int], values: Floats, impulses: Floats, aim: dict[int, float]
     ) -> bool:
         if k in struck:
-            return bool(impulses[self._multiplier[k]] < 0.0)
+            return bool(impulses[self._multiplier[k]] < -self.observer.zero(self.contacts[k].multiplier) * self.time)
         rate = self.contacts[k].rate
         return bool(values[rate] < aim[k] - self.observer.zero(rate))
 
