@@ -84,7 +84,8 @@ class CompiledModel:
         """The numbers for one set of parameter values; never recompiles.  ModelError where they make no model."""
         binding = binding_.bind(self.network, self.energies, self.form, self.program, overrides)
         scene = self.network.scene
-        found = check_counts(self.form, self.program, binding)
+        at_times = frozenset(s.label for s in self.network.switches)
+        found = check_counts(self.form, self.program, binding, at_times)
         if scene is not None and scene.redundancy in ("drop", "minimum_norm"):
             found = tuple(d for d in found if d.code != "E517")
         if found:

@@ -102,6 +102,7 @@ class _Planner:
         return Contact(
             s.name, s.kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
+            tuple(self.row[name] for name in s.aim), tuple(self.parameter(n) for n in s.direction),
         )  # fmt: skip
 
 

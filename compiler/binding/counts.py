@@ -22,9 +22,11 @@ LARGEST = 2_000  # rows: beyond, the matching in Python would take longer than t
 Element = tuple[int, int]  # family, position
 
 
-def check_counts(form: DescriptorForm, program: Program, binding: Binding) -> tuple[Diagnostic, ...]:
-    """All findings; none where a model is too large to match."""
-    return (*_implicit(form, program, binding), *_constraints(form, program, binding))
+def check_counts(
+    form: DescriptorForm, program: Program, binding: Binding, at_times: frozenset[str] = frozenset()
+) -> tuple[Diagnostic, ...]:
+    """All findings; none where a model is too large to match.  at_times: labels of constraints that hold at times."""
+    return (*_implicit(form, program, binding), *_constraints(form, program, binding, at_times))
 
 
 def _size(box: tuple[tuple[int, int], ...]) -> int:
@@ -53,12 +55,14 @@ def _implicit(form: DescriptorForm, program: Program, binding: Binding) -> list[
     return [Diagnostic("E504", f"{message}: no unknown is left for {', '.join(names)}", form.rows[free[0][0]].place)]
 
 
-def _constraints(form: DescriptorForm, program: Program, binding: Binding) -> list[Diagnostic]:
+def _constraints(
+    form: DescriptorForm, program: Program, binding: Binding, at_times: frozenset[str]
+) -> list[Diagnostic]:
     """E517: no block of constraints larger than its set of coordinates."""
     left = [
         (k, i)
         for k, r in enumerate(form.rows)
-        if r.block in ("phi", "psi")
+        if r.block in ("phi", "psi") and r.owner not in at_times
         for i in range(_size(binding.row_shapes[k]))
     ]
     if len(left) > LARGEST:

@@ -25,8 +25,8 @@ from sysdyn.dsl.names.symbols import ParameterSymbol, Typed
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 
-MOST = 1000
-"""Switches of one array of statements: each is text of its own in the compiled model."""
+BESIDE = 1e-20
+"""m/s and the like: a flow in the plane that is no flow yet, and has a direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +46,9 @@ class Draft:
     sense: Node | None = None
     guard: Node | None = None
     restitution: Node | None = None
+    rate: Node | None = None
+    aim: tuple[Node, ...] = ()
+    direction: tuple[Node, ...] = ()
 
 
 # -- discrete variables ------------------------------------------------------------------------------------
@@ -222,7 +225,7 @@ def sticking(frame: Frame, root: Node, label: str, at: tuple[Node, ...], loops: 
     found = [n for n in ex.topological([root]) if n.op == "call" and n.data == "setsign"]
     for k, node in enumerate(found):
         name = f"{label} sticking" + (f" {k + 1}" if k else "")
-        sense = _sense(frame, name, at, loops, place)
+        sense = _sense(frame, f"{name} sense", at, loops, place)
         inner = node.args[0]
         bound = ex.derivative(ex.substitute(root, {node: ex.var("#sign", "s")}), ex.var("#sign", "s"))
         _stick(frame, name, (at, loops), (inner, bound, sense), place, label)
@@ -234,16 +237,51 @@ def set_valued(frame: Frame, root: Node, loops: tuple[Loop, ...], place: Place) 
     """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language)."""
     at = tuple(ex.index(loop.index) for loop in loops)
     for node in ex.topological([root]):
-        if node.op != "call" or node.data != "abs" or not _rates(node.args[0]):
+        if node.op != "call" or node.data not in ("abs", "hypot") or not any(map(_rates, node.args)):
             continue
         if any(n.op == "reduce" and node in ex.topological([n.args[2]]) for n in ex.topological([root])):
             continue
         name = f"content of line {place.start[0]}" + (f" ({len(frame.parts.drafts)})" if frame.parts.drafts else "")
-        sense, mark = _sense(frame, name, at, loops, place), ex.var("#abs", "s")
+        sense, mark = _sense(frame, f"{name} sense", at, loops, place), ex.var("#abs", "s")
         bound = ex.derivative(ex.substitute(root, {node: mark}), mark)
-        _stick(frame, name, (at, loops), (node.args[0], bound, sense), place)
-        root = ex.substitute(root, {node: ex.mul(sense, node.args[0])})
+        if node.data == "abs":
+            _stick(frame, name, (at, loops), (node.args[0], bound, sense), place)
+            root = ex.substitute(root, {node: ex.mul(sense, node.args[0])})
+        else:
+            speed = _stick_in_plane(frame, name, (at, loops), (node, bound, sense), place)
+            root = ex.substitute(root, {node: ex.mul(sense, speed)})
     return root
+
+
+def _stick_in_plane(
+    frame: Frame,
+    name: str,
+    where: tuple[tuple[Node, ...], tuple[Loop, ...]],
+    what: tuple[Node, Node, Node],
+    place: Place,
+) -> Node:
+    """The speed abs(f) of friction in the plane, continued through zero along the direction n in which it slips:
+    sign((f + BESIDE n) n) abs(f + BESIDE n), whose gradient is the direction of f, and n where f vanishes.
+    """
+    (at, loops), (node, bound, sense) = where, what
+    unit, flows = si(NONE), node.args
+    n = tuple(_sense(frame, f"{name} direction {k}", at, loops, place) for k in (1, 2))
+    labels = (name, f"{name} across")
+    for label, flow in zip(labels, flows, strict=True):
+        frame.parts.constraints.append(Constraint("psi", label, at, flow, loops, unit, place))
+    multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
+    along = ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True)))
+    value = ex.sub(along, ex.scale(0.5, node))
+    frame.parts.drafts.append(
+        Draft(
+            name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
+            rate=ex.time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
+        )  # fmt: skip
+    )
+    frame.parts.drafts.append(Draft(labels[1], at, loops, "follows", place, unit, flows[1], multipliers[1]))
+    beside = [ex.add(f, ex.scale(BESIDE, d)) for f, d in zip(flows, n, strict=True)]
+    forward = ex.call("sign", ex.add(*(ex.mul(d, b) for d, b in zip(n, beside, strict=True))))
+    return ex.mul(forward, ex.call("hypot", *beside))
 
 
 def _rates(root: Node) -> bool:
@@ -251,10 +289,10 @@ def _rates(root: Node) -> bool:
 
 
 def _sense(frame: Frame, name: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place) -> Node:
-    """The parameter that holds the sense of a slip: 1, -1, or 0 while it sticks."""
+    """A parameter that holds the sense of a slip: 1, -1, or 0 while it sticks."""
     shape = tuple((loop.first, loop.last) for loop in loops) if at else ()
     indices = tuple(loop.index for loop in loops) if at else ()
-    parameter = Parameter(f"{name} sense", shape, si(NONE), (ex.const(0.0),), indices, place)
+    parameter = Parameter(name, shape, si(NONE), (ex.const(0.0),), indices, place)
     frame.parts.parameters[parameter.name] = parameter
     frame.parts.discretes.add(parameter.name)
     return ex.param(parameter.name, *at)
@@ -322,7 +360,7 @@ def _switch(frame: Frame, draft: Draft, change: dict[Node, Node], known: Values)
     name = f"{draft.label}[{', '.join(map(str, at))}]" if at else draft.label
     guard = None if draft.guard is None else ex.conditional(draft.guard, ex.const(1.0), ex.const(0.0))
     value = watch(frame, of(draft.value), draft.unit.dimension, draft.place)
-    rate = watch(frame, ex.time_derivative(of(draft.value)), NONE, draft.place)
+    rate = watch(frame, of(draft.rate or ex.time_derivative(draft.value)), NONE, draft.place)
     multiplier = watch(frame, of(draft.multiplier), NONE, draft.place)
     twice = ex.time_derivative(ex.time_derivative(of(draft.value))) if draft.kind == "phi" else None
     acceleration = None if twice is None else watch(frame, twice, NONE, draft.place)
@@ -331,4 +369,5 @@ def _switch(frame: Frame, draft: Draft, change: dict[Node, Node], known: Values)
     return Switch(
         name, draft.label, at, draft.kind, draft.place, value, rate, multiplier, draft.element,
         acceleration, bound, upper, lower, sense, seen(guard), restitution,
+        tuple(watch(frame, of(n), NONE, draft.place) for n in draft.aim), tuple(of(n) for n in draft.direction),
     )  # fmt: skip

@@ -177,7 +177,7 @@ static double newton_norm(const sd_bdf *bdf, const double *x)
         double v = x[i] * bdf->newton_weight[i];
         sum += v * v;
     }
-    return sqrt(sum / bdf->n);
+    return bdf->n ? sqrt(sum / bdf->n) : 0.0;
 }
 
 /* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an

@@ -310,7 +310,7 @@ static double correct(sd_radau *radau)
     }
     radau->newton_iterations++;
     radau->state_size = sqrt(state / (3.0 * n));
-    return sqrt(sum / (3.0 * n));
+    return n ? sqrt(sum / (3.0 * n)) : 0.0; /* nothing may move: samples alone */
 }
 
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */

@@ -21,6 +21,8 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.system import System
 
+FAINT = 1e-3
+"""Of the magnitude of an unknown."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
 
@@ -47,8 +49,31 @@ class Contacts:
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.fastest = np.zeros(len(contacts))
+        self.time = 0.0
         places = self.switches.places
+        kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
+        for kind in sorted(kinds):
+            same = [c for c in contacts if (c.kind, observer.unit(c.value)) == kind]
+            for name in ("value", "rate", "multiplier"):
+                observer.alike([getattr(c, name) for c in same])
         self._multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
+
+    def size(self, magnitude: Floats, time: float) -> None:
+        """Least sizes of values, rates and multipliers: FAINT of those of the unknowns (magnitude [unknowns]) and of a
+        change of them in `time` (s), so that noise is no size where nothing has happened yet.
+        """
+        self.time = time
+        kinds, largest = self.system.kinds, self.observer.largest
+        families = self.system.description.families
+        units = np.array([families[k].unit if k >= 0 else "" for k in self.system.family_of])
+        for contact, place in zip(self.contacts, self._multiplier, strict=True):
+            own = kinds == ("q" if contact.kind == "phi" else "f")
+            alike = own & (units == self.observer.unit(contact.value))
+            size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
+            rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time**2))
+            for row, least in (*rows, (contact.multiplier, FAINT * float(magnitude[place]))):
+                if row >= 0:
+                    largest[row] = max(largest[row], least)
 
     def begin(self) -> None:
         """Nothing holds and nothing slips: where a start is sought from."""
@@ -67,6 +92,8 @@ class Contacts:
         """The systems of the model follow the active set."""
         now = np.zeros(len(self.switches.places), dtype=bool)
         for k, contact in enumerate(self.contacts):
+            if contact.kind == "follows":
+                self.active[k] = self.active[k - 1]
             now[contact.number] = self.active[k]
         self.switches.set(now)
 
@@ -80,6 +107,8 @@ class Contacts:
         contact = self.contacts[k]
         if contact.kind == "friction":
             return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
+        if contact.kind == "planar":
+            return "sticks" if self.active[k] else "slips"
         return "holds" if self.active[k] else "free"
 
     # -- what does not fit ---------------------------------------------------------------------------------------
@@ -90,22 +119,34 @@ class Contacts:
         self.active[k] = not self.active[k]
         if contact.kind == "friction":
             self.p[contact.sense] = 0.0 if self.active[k] else np.sign(values[contact.multiplier])
+        elif contact.kind == "planar":
+            self._direct(contact, values[list(contact.aim[2:4])])
+            self.p[contact.sense] = 0.0 if self.active[k] else 1.0
+
+    def _direct(self, contact: Contact, along: Floats) -> None:
+        """The direction of a slip in the plane."""
+        size = float(np.hypot(*along))
+        if size > 0.0:
+            self.p[list(contact.direction)] = along / size
 
     def wrong(self, values: Floats, impulses: Floats) -> int:
         """The first contact whose condition does not hold; -1 where all do."""
         for k, contact in enumerate(self.contacts):
-            test = self._friction if contact.kind == "friction" else self._unilateral
+            test = _TESTS.get(contact.kind, Contacts._unilateral)
+            if contact.kind == "follows":
+                continue
             if contact.kind == "guarded":
                 if bool(values[contact.guard]) != bool(self.active[k]):
                     return k
-            elif test(k, contact, values, float(impulses[self._multiplier[k]])):
+            elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
                 return k
         return -1
 
     def _unilateral(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero = self.observer.zero
         if self.active[k]:
-            return impulse < 0.0 or bool(values[c.multiplier] < -zero(c.multiplier))
+            least = zero(c.multiplier)  # and an impulse is one over the time in which things change
+            return bool(impulse < -least * self.time or values[c.multiplier] < -least)
         if values[c.value] > zero(c.value):
             return False
         if c.kind == "psi":
@@ -123,6 +164,16 @@ class Contacts:
             return True
         slip = sense * values[c.value]
         return bool(slip < -zero(c.value) or (slip <= zero(c.value) and sense * values[c.rate] < -zero(c.rate)))
+
+    def _planar(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
+        zero, speed = self.observer.zero, values[c.aim[4]]
+        if self.active[k]:
+            return bool(values[c.upper] < -zero(c.multiplier))
+        if self.p[c.sense] == 0.0:
+            return True
+        if speed > zero(c.aim[4]):
+            return bool(values[c.value] < 0.0)
+        return bool(values[c.rate] < -zero(c.rate))
 
     # -- pivoting ------------------------------------------------------------------------------------------------
 
@@ -153,6 +204,11 @@ class Contacts:
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
         contact = self.contacts[k]
+        if contact.kind == "planar" and not self.active[k]:
+            if values[contact.aim[4]] > self.observer.zero(contact.aim[4]):
+                self._direct(contact, values[list(contact.aim[:2])])
+                self.p[contact.sense] = 1.0
+                return
         slips = contact.kind == "friction" and not self.active[k]
         if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
             self.p[contact.sense] = np.sign(values[contact.value])
@@ -208,7 +264,7 @@ class Contacts:
         self, k: int, struck: set[int], values: Floats, impulses: Floats, aim: dict[int, float]
     ) -> bool:
         if k in struck:
-            return bool(impulses[self._multiplier[k]] < 0.0)
+            return bool(impulses[self._multiplier[k]] < -self.observer.zero(self.contacts[k].multiplier) * self.time)
         rate = self.contacts[k].rate
         return bool(values[rate] < aim[k] - self.observer.zero(rate))
 
@@ -228,3 +284,6 @@ class Contacts:
         if not hasattr(self, "_form"):
             self._form = self.system.another("settled")
         return self._form
+
+
+_TESTS = {"friction": Contacts._friction, "planar": Contacts._planar}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.locate import Dense, crossing
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Assignment, Condition, Happened, Plan
@@ -30,9 +31,6 @@ CASCADE = 100
 STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
-
-LEAST = 1e-3
-"""Of what is zero of a row: beyond it a change is one."""
 
 Point = tuple[Floats, Floats]
 Standing = tuple[Floats, NDArray[np.bool_]]
@@ -52,12 +50,15 @@ class Watched:
 class Handler:
     """Events of one run.  system: as the stepper sees it; restart: consistent points of it."""
 
-    def __init__(self, plan: Plan, system: System, span: tuple[float, float], begin: Standing) -> None:
+    def __init__(
+        self, plan: Plan, system: System, span: tuple[float, float], begin: Standing, rtol: float = 0.0
+    ) -> None:
         self.plan, self.system, self.span = plan, system, span
         self.p = system.description.p
         self.restart: Restart | None = None
-        self.observer = Observer(system)
+        self.observer = Observer(system, rtol)
         self.contacts = Contacts(plan.contacts, system, self.observer, self.p)
+        self.determined = Determined(self.contacts)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
         self.happened: list[Happened] = []
@@ -93,6 +94,8 @@ class Handler:
             if c.kind == "friction":
                 rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)
                 found += [Watched(-1, k, row, side) for row, side in rows]
+            elif c.kind == "planar":
+                found.append(Watched(-1, k, c.upper if sticks else c.value, 1))
             elif c.kind in ("phi", "psi"):
                 found.append(Watched(-1, k, c.multiplier if sticks else c.value, 1))
         return found
@@ -102,7 +105,7 @@ class Handler:
         found = self.watched()
         array = (lib.Watch * max(len(found), 1))()
         for k, w in enumerate(found):
-            array[k] = lib.Watch(w.row, w.side, LEAST * self.observer.zero(w.row))
+            array[k] = lib.Watch(w.row, w.side, self.observer.zero(w.row))
         return array
 
     # -- the start -----------------------------------------------------------------------------------------------
@@ -118,7 +121,7 @@ class Handler:
 
     def _side(self, k: int, value: float, before: float) -> float:
         relation = self.plan.relations[k]
-        small = LEAST * self.observer.zero(relation.row) if relation.moves else 0.0
+        small = self.observer.zero(relation.row) if relation.moves else 0.0
         return before if abs(value) <= small and value != 0.0 else float(np.sign(value))
 
     # -- samples -------------------------------------------------------------------------------------------------
@@ -143,7 +146,7 @@ class Handler:
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        rows = [(w.row, w.side, LEAST * self.observer.zero(w.row)) for w in watched]
+        rows = [(w.row, w.side, self.observer.zero(w.row)) for w in watched]
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
@@ -197,7 +200,7 @@ class Handler:
                 if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                     self.contacts.turn(k, values)
             self.contacts.apply()
-            found = self.contacts.fit(t, y, yd, restart.struck)
+            found = self.determined.fit(t, y, yd, restart.struck, touched)
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
         self._renew(t, *found)
@@ -218,9 +221,11 @@ class Handler:
     def _note(self, t: float, said: list[str], touched: Sequence[int]) -> None:
         for k, contact in enumerate(self.plan.contacts):
             now = self.contacts.word(k)
+            if contact.kind == "follows":
+                continue
             if now != said[k]:
                 self.happened.append(Happened(t, contact.name, contact.name, said[k], now))
-            elif k in touched:
+            elif k in touched and contact.kind == "phi":
                 self.happened.append(Happened(t, f"impact {contact.name}", contact.name, said[k], now))
 
     # -- conditions and assignments ------------------------------------------------------------------------------

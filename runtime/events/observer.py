@@ -6,23 +6,30 @@ import ctypes as c
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 
 SMALL = 1e-9
 """Of the largest value and terms met of a row: what is less is zero."""
+NOISE = 0.01
+"""Of a run's tolerance: what it leaves of a zero."""
 
 
 class Observer:
     """largest [observed]: of values and of the terms of their expressions, at the points asked for."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, rtol: float = 0.0) -> None:
+        self.small = max(SMALL, min(NOISE * rtol, 1e-6))
         self._number = system.observed_rows("observe")[1]
         self._calls = [system.observer(name) for name in ("observe", "observe_scale")]
         self._y, self._yd = np.zeros(system.form.extended), np.zeros(system.form.extended)
         self._out = np.zeros(max(self._number, 1))
         self.largest = np.zeros(self._number)
+        families = [system.description.rows[k] for k in system.description.rows_of("observe")]
+        self._units = [family.unit for family in families for _ in range(family.size)]
+        self._alike: list[NDArray[np.int64]] = []
 
     def _rows(self, call: lib.Call | None, t: float) -> Floats:
         self._out[:] = 0.0
@@ -39,16 +46,23 @@ class Observer:
         scale = self._rows(self._calls[1], t)
         size = np.maximum(np.abs(values), np.abs(scale))
         self.largest = np.fmax(self.largest, np.where(np.isfinite(size), size, 0.0))
+        for rows in self._alike:
+            self.largest[rows] = self.largest[rows].max()
         return values
 
     def know(self, largest: Floats) -> None:
         """Take sizes that others met."""
         self.largest = np.fmax(self.largest, largest)
 
+    def alike(self, rows: Sequence[int]) -> None:
+        """Rows of one size: what one has never met, another has (a diode that has not conducted yet)."""
+        if len(rows) > 1:
+            self._alike.append(np.asarray(rows, dtype=np.int64))
+
+    def unit(self, row: int) -> str:
+        """The unit of a row."""
+        return self._units[row]
+
     def zero(self, row: int) -> float:
         """Below it a value of the row is zero."""
-        return SMALL * float(self.largest[row])
-
-    def zeros(self, rows: Sequence[int]) -> Floats:
-        """The same of several rows."""
-        return SMALL * self.largest[np.asarray(rows, dtype=np.int64)]
+        return self.small * float(self.largest[row])

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart
+from sysdyn.runtime.model.scales import magnitudes
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
+
+
+SPAN = 1.0
+"""s: in which what starts at rest may come to its magnitude."""
 
 
 def eventful_start(system: System, t0: float, plan: Plan) -> ConsistentState:
@@ -37,10 +43,12 @@ def eventful_start(system: System, t0: float, plan: Plan) -> ConsistentState:
                 raise
             errors.append(error)
             return None
-        return found[-1].y, found[-1].yd, np.zeros_like(zeros)
+        y, yd = found[-1].y, found[-1].yd
+        contacts.size(*magnitudes(system, t, t + SPAN, y, yd))
+        return y, yd, np.zeros_like(zeros)
 
     try:
-        contacts.fit(t0, zeros, zeros, settle)
+        y, _ = Determined(contacts).fit(t0, zeros, zeros, settle)
     except NoActiveSetError as error:
         raise errors[-1] if errors else InconsistentStart("stuck", float("inf"), names=error.names) from error
-    return found[-1]
+    return next(state for state in reversed(found) if state.y is y)

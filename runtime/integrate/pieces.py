@@ -31,8 +31,10 @@ class Pieces:
         self.run = run
         start = run.start
         assert run.request.begin is not None
-        self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin)
+        self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
         self.handler.restart = run.restart
+        run.restart.thorough = "dynamics_rate" in run.system.description.blocks and bool(plan.contacts)
+        self.handler.contacts.size(run.magnitude, run._time)
         n = run.system.form.written
         self._first(self.handler.begin(start.t, run.y[:n].copy(), run._start_rate[:n].copy()))
         self._watch()

@@ -26,6 +26,7 @@ class Restart:
         self.settler, self.state = settler, state
         self.impulses = Impulses(settler.system)
         self._starter: Starter | None = None
+        self.thorough = False
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
@@ -42,24 +43,42 @@ class Restart:
         for hold in (HELD, 1.0):
             self.settler.core.contents.ready = 0
             found, rate, done = self.settler.settle(t, y, yd, hold=hold)
+            if done and self.thorough:
+                # flows without inertia in loops of stores follow from the rate of their balance alone
+                further = self._search(t, found, rate, magnitude, most=1)
+                found, rate = further or (found, rate)
             if done:
                 return found, rate, impulse
         searched = self._search(t, y, yd, magnitude)
         return None if searched is None else (*searched, impulse)
 
+    def _rates(self, magnitude: Floats) -> Floats:
+        """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""
+        rates, known = self.settler.rates, self.settler.scale[magnitude.size :]
+        met = lib.reader(self.settler.core.contents.scale, self.settler._moves)[magnitude.size :]
+        quick = (known / self.settler.scale[rates]).max(initial=0.0)
+        found = magnitude * (quick or 1.0)
+        found[rates] = met
+        return np.asarray(found)
+
     def magnitude(self, number: int) -> Floats:
         """Magnitudes [number] of the first unknowns."""
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
-    def _search(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
+    def _search(
+        self, t: float, y: Floats, yd: Floats, magnitude: Floats, most: int = 2
+    ) -> tuple[Floats, Floats] | None:
         """The same by Gauss-Newton with shortened steps: first with the state held, then with everything free."""
         if self._starter is None:
             self._starter = Starter(self.settler.system.another("3"))
         starter = self._starter
         guess = np.concatenate([y, yd[starter.rates]])
-        rate = lib.reader(self.settler.core.contents.scale, self.settler._moves)[y.size :]
+        rate = self._rates(magnitude)[starter.rates]
         follows = np.concatenate([~self.state, np.ones(starter.rates.size, dtype=bool)])
-        for free in (follows, np.ones_like(follows)):
+        # a multiplier that is zero because its constraint does not hold stays zero
+        still = np.append(np.zeros(y.size, dtype=bool), np.isin(starter.rates, starter.system.idle_multipliers()))
+        guess[still] = 0.0
+        for free in (follows & ~still, ~still)[:most]:
             problem = Problem(
                 residual=lambda z: starter.residual(t, z),
                 jacobian=lambda z: starter.jacobian(t, z),

@@ -36,7 +36,7 @@ for backend in ("c", "numpy"):
         with x.fresh():
             model = compile_network(net(), "hamiltonian", backend)
             total.update(model.text.encode())
-            total.update(repr(structure(model.form, model.program)).encode())
+            total.update(repr(structure(model.form, model.program, model.network)).encode())
 print(total.hexdigest())
 """
 

@@ -223,7 +223,7 @@ def test_structure_and_text_do_not_depend_on_the_size(make):
     for size in (10, 100_000):
         with x.fresh():
             model = compiled(sized(make(), size), backend="c")
-            found.append((model.text, structure(model.form, model.program)))
+            found.append((model.text, structure(model.form, model.program, model.network)))
     assert found[0] == found[1]
 
 
@@ -234,7 +234,7 @@ def test_the_transmission_line_has_one_text():
             began = time.process_time()
             model = compiled(line_network(size), backend="c")
             seconds.append(time.process_time() - began)
-            found.append((model.text, structure(model.form, model.program)))
+            found.append((model.text, structure(model.form, model.program, model.network)))
     assert found[0] == found[1]
     assert seconds[1] < 3 * seconds[0] + 0.05  # 7 ms each when alone
     names = [f["name"] for f in found[0][1]["families"] if f["kind"] == "f"]

@@ -8,8 +8,8 @@ RING = sqrt(60 / 0.5 - CLOSED**2)
 
 
 def sampled(t):
-    """Of a proportional-integral law whose error is held."""
-    return minimum(0.8 * 1.5 + 2.0 * 0.1 * 1.5 * (floor(t / 0.1 + 1e-9) + 1), 4.0)
+    """Of a proportional-integral law whose error is held; a sample reads the integral before it assigns it."""
+    return minimum(0.8 * 1.5 + 2.0 * 0.1 * 1.5 * floor(t / 0.1 + 1e-9), 4.0)
 
 
 def held_back(t):
@@ -112,6 +112,5 @@ ROWS = (
 """,
         1.25,
         {"C.u": sampled},
-        planned=True,
     ),
 )

@@ -151,7 +151,6 @@ ROWS = (
             "D.e": lambda t: minimum(10 * sin(400 * t), 0),
         },
         PRIMAL,
-        planned=True,
     ),
     Row(
         "npn",

@@ -171,7 +171,6 @@ ROWS = (
         5.0,
         {"x.f": lambda t: -maximum(4 - 1.5 * t, 0)},
         PRIMAL,
-        planned=True,
     ),
     Row(
         "inertia",
@@ -287,7 +286,6 @@ ROWS = (
             "b.f": lambda t: 9 / 1.3 * 0.5 - 5 / 13 * maximum(9 - SLIP * t, 0),
         },
         PRIMAL,
-        planned=True,
     ),
     Row(
         "clutch.smooth",
@@ -319,7 +317,6 @@ ROWS = (
         2.0,
         {"a.f": lambda t: 9 / 1.3 * 0.5 + 8 / 13 * maximum(9 - SLIP * t, 0)},
         PRIMAL,
-        planned=True,
     ),
     Row(
         "rack",

@@ -27,7 +27,6 @@ class Row:
     """A component (`gear`, or a level of it `gear.losses`) in a network of known response.
 
     start: initial values that the scene sets in place of the component's own.
-    planned: refused until events and inequalities can be simulated.
     """
 
     component: str
@@ -36,7 +35,6 @@ class Row:
     expected: dict[str, Callable]
     formulations: tuple[str, ...] = ALL
     start: str = ""
-    planned: bool = False
 
     @property
     def text(self):
@@ -48,10 +46,6 @@ class Row:
         """Compare; the worst relative error."""
         at = self.end * INSTANTS
         found, report = traced(folder, self.text, at, formulation=formulation)
-        if self.planned:
-            assert found is None
-            assert {d.code for d in report} == {"E608"}
-            return 0.0
         assert found is not None, [f"{d.code} {d.message}" for d in report]
         span = np.linspace(0.0, self.end, 500)
         errors = {}

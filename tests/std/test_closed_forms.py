@@ -25,7 +25,7 @@ CASES = {
     f"{module}-{k}-{row.component}-{formulation}": (row, formulation)
     for module, rows in TABLES.items()
     for k, row in enumerate(rows)
-    for formulation in (row.formulations[:1] if row.planned else row.formulations)
+    for formulation in row.formulations
 }
 
 

@@ -1,0 +1,100 @@
+"""Active sets that leave something open: constraints that depend on each other, and flows that nothing determines.
+
+Four blocked diodes of a bridge say three things; four that conduct leave the current that circles in them open.  Among
+the active sets that fit, one is taken whose equations determine everything: of dependent constraints one lets go (its
+multiplier is zero, the others hold its value), of undetermined flows that are zero one is held.  Which sets are regular
+is a matter of structure: it is asked once for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError, Settle
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
+
+DENSE = 300
+"""Unknowns up to which matrices are full; larger models are taken as they come."""
+GENERIC = 0.7310585786300049
+"""Of dF/dyd beside dF/dy: at it a regular pencil is a regular matrix."""
+
+Point = tuple[Floats, Floats]
+
+
+class Determined:
+    """Finds active sets that leave nothing open."""
+
+    def __init__(self, contacts: Contacts) -> None:
+        self.contacts = contacts
+        self._regular: dict[tuple[bool, ...], int] = {}
+
+    @cached_property
+    def _system(self) -> System:
+        return self.contacts.system.another("3")
+
+    def nullity(self, t: float, y: Floats, yd: Floats) -> int:
+        """How many directions the equations with the present active set leave open."""
+        key = tuple(self.contacts.active.tolist())
+        if key not in self._regular:
+            system, n = self._system, self._system.form.written
+            jy, jyd = system.jacobian(t, y[:n], yd[:n])
+            if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
+                return 0
+            e, b = equilibrated(system.dense(jyd), system.dense(jy))
+            sigma = decomposed(b + GENERIC * e)[1]
+            self._regular[key] = sigma.size - count(sigma, CERTAIN)
+        return self._regular[key]
+
+    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle, turned: Sequence[int] = ()) -> Point:
+        """As Contacts.fit, of a set that leaves as little open as one can; turned: what has just changed changes back
+        last.
+        """
+        found = self.contacts.fit(t, y, yd, settle)
+        if self._system.unknowns > DENSE:
+            return found
+        open_ = self.nullity(t, *found)
+        while open_ > 0:
+            better = next(self._better(t, found, settle, (open_, turned)), None)
+            if better is None:
+                return found
+            found, open_ = better
+        return found
+
+    def _better(
+        self, t: float, point: Point, settle: Settle, what: tuple[int, Sequence[int]]
+    ) -> Iterator[tuple[Point, int]]:
+        """Points of neighbouring active sets that fit too and leave less open."""
+        contacts, (open_, turned) = self.contacts, what
+        values, before = contacts.observer(t, *point), contacts.active.copy()
+        for pivots in (False, True):
+            for k in sorted(range(len(contacts.contacts)), key=lambda k: k in turned):
+                contact = contacts.contacts[k]
+                small = abs(values[contact.value]) <= contacts.observer.zero(contact.value)
+                if contact.kind not in ("psi", "phi") or not small:
+                    continue
+                contacts.active[k] = not contacts.active[k]
+                contacts.apply()
+                found = self._near(t, point, settle, pivots=pivots)
+                if found is not None:
+                    less = self.nullity(t, *found)
+                    if less < open_:
+                        yield found, less
+                contacts.active[:] = before
+                contacts.apply()
+
+    def _near(self, t: float, point: Point, settle: Settle, *, pivots: bool) -> Point | None:
+        """The point of the present active set where that fits, or with pivots of one that fits; None without."""
+        if pivots:
+            try:
+                return self.contacts.fit(t, *point, settle)
+            except NoActiveSetError:
+                return None
+        found = settle(t, *point)
+        if found is None or self.contacts.wrong(self.contacts.observer(t, *found[:2]), found[2]) >= 0:
+            return None
+        return found[:2]
