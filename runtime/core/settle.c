@@ -152,14 +152,16 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, double *
 {
     int32_t n = settle->unknowns;
     int fresh = !settle->ready, failed = fresh && factorise(settle, t, y, yd);
-    double moved = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
+    double moved = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     *best = before;
     memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
     for (int m = 0; m < ITERATIONS && !failed && !(before <= EXACT && moved < SMALL) && !*settle->system->stop; m++) {
         moved = move(settle, y, yd);
         double now = measure(settle, t, y, yd);
-        if (now < *best || now <= EXACT) {
+        /* between residuals of round-off the later point is the better one: the state is back where it came from */
+        if (now < *best || now <= EXACT || (now <= FINE && drag >= SMALL)) {
             *best = now;
+            drag = moved;
             memcpy(settle->x, y, (size_t)n * sizeof *y);
             for (int32_t k = 0; k < settle->rates; k++)
                 settle->x[n + k] = yd[settle->rate[k]];

@@ -27,8 +27,8 @@ WATCHED = """
 import sys, time
 from sysdyn.runtime.trace import trace
 flush = trace.TraceWriter._turn
-def turn(self, last):
-    flush(self, last)
+def turn(self, *given):
+    flush(self, *given)
     rows = self._visible._length if self._visible is not None else 0
     print(rows, flush=True)
 trace.TraceWriter._turn = turn

@@ -27,7 +27,7 @@ def f(name):
 
 def expressions():
     a, b = q("a"), q("b")
-    for name in sorted(x.FUNCTIONS):
+    for name in sorted(set(x.FUNCTIONS) - {"setsign"}):  # set-valued: events take it out of laws
         two = name in ("atan2", "hypot", "min", "max", "mod")
         yield name, x.call(name, a, b) if two else x.call(name, a)
     for e in (-3.0, -2.0, -1.0, -0.5, 0.5, 1.5, 2.0, 3.0, 4.0, 7.0, 63.0, 64.0, 65.0, 0.3, -2.5):

@@ -42,6 +42,9 @@ TEXTS = {
         "}\nscene s", "  state z: V = 0 V\n  dynamic z' = (R3.e - z)/(1 s)\n}\nscene s", 1
     ).replace("as e", "as e, z"),
     "expected, nothing traced": ISLES.replace("trace x }", "expect always: abs(x) <= 9 m }"),
+    "an event writes": with_more(
+        "  coord y: translation\n  energy T* = 1/2*(1 kg)*y'^2\n  when x.q > 1 m { y.f = 0 m/s }\n"
+    ),
     "open, a source": OPEN.replace("R3: resistor(R = 1 ohm)", "R3: current(i = 0 A)"),
     "energy that reads": with_more(
         "  state h: 1 = 0\n  dynamic h' = (x.q/(1 m) - h)/(1 s)\n  coord y: translation\n"
@@ -109,7 +112,8 @@ MUTANTS = {
         ("roots += [n for e in network.expectations", "roots = roots + [n for e in ()"),
         ("return frozenset() if EVERYTHING in found else found", "return found - {EVERYTHING}"),
         ('any(name.startswith("audit.") for name in scene.accuracy_on)', "False"),
-        ("or not roots", ""),
+        ("or not traced", ""),
+        ("roots += [a.target for e in network.events", "roots = roots + [a.target for e in ()"),
         ("if len(left) == len(own):", "if left:"),
         ("if not dead:", "if True:"),
         ("range(len(network.branches) + 1)", "range(1)"),
