@@ -19,7 +19,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, Work, least_residual, solve, where_light
 from sysdyn.runtime.numerics.rank import rank
-from sysdyn.runtime.start.starter import STATE, WEIGHT, Mask, Starter, problem_of, row_scale
+from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of, row_scale
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
@@ -36,9 +36,10 @@ HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi
 """Groups of rows that are derivatives of others."""
 EXACT = 1e-9
 OWN = 1e-6
-BACK = 1e-9
-YIELDS = 1e-5
-"""Scaled change of a written guess for the sake of unwritten ones, whose weight is small but not zero."""
+NEARER = 12
+"""Steps towards the least change of the state."""
+YIELDS, BACK = 1e-5, 1e-9
+"""Scaled changes of a guess that are tried without: none is wanted, the weights are small but not zero."""
 EXPLAINED = 0.3
 """Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
 
@@ -211,9 +212,29 @@ def _bent(starter: Starter, t: float, x: Floats) -> Mask:
 def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: Mask) -> Solution:
     """The solution without what guesses of the state moved for the sake of what follows from it: that costs nothing.
 
-    Guesses that can stay do so exactly.  Positions in curved constraints are left alone, and what is too large for full
-    matrices.
+    The least weighted change of the state's guesses under all rows, by steps to the least of the rows linearised; what
+    follows from the state is free.  Guesses that can stay do so exactly.  Positions in curved constraints are left
+    alone, and what is too large for full matrices.
     """
+    if best.x.size > DENSE:
+        return best
+    clean = _without_noise(starter, t, best.x, guess, free)
+    best = best if clean is None else replace(best, x=clean)
+    last = np.inf
+    for _ in range(NEARER):
+        found, moved = _nearer(starter, t, best, guess, free)
+        if found is None or not moved < 0.5 * last:
+            break
+        best, last = found, moved
+        if moved < BACK:
+            break
+    return best
+
+
+def _nearer(
+    starter: Starter, t: float, best: Solution, guess: Floats, free: Mask
+) -> tuple[Solution | None, float]:
+    """One step of it, and how far it went in units of magnitudes; None where there is none."""
     x = best.x
     follows = starter.following(t, x) | starter.idle
     follows[starter.carried()] = True
@@ -222,23 +243,34 @@ def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: M
     curved[starter.columns[bent[starter.rows]]] = True
     free = free & ~(curved & (starter.moving == "q"))
     state = free & ~follows
-    if x.size > DENSE or not (x != guess)[state].any():
-        return best
+    if not (x != guess)[state].any():
+        return None, 0.0
     problem = problem_of(starter, t, x, guess, rows=starter.every, free=free)
     by_content = starter.by_content(t, x, problem.scale)
     problem = replace(problem, weight=np.where(state & ~starter.written, by_content, problem.weight))
     aim = where_light(problem, x, follows)
-    moved = np.abs(aim - guess) * problem.weight / problem.scale
-    stays = np.where(starter.written, YIELDS, BACK * WEIGHT["unwritten"])
-    aim = np.where(moved > stays, aim, guess)
-    for held in (state, state & (aim == guess)):
-        z = np.where(held, aim, x)
-        found = solve(replace(problem, free=free & ~held), z)
-        if found.residual < EXACT:
-            z = starter.without_noise(found.x, problem.scale)
-            if _own(starter, t, z, z) < OWN:
-                return replace(found, x=z)
-    return best
+    size = np.maximum(problem.scale, starter.scale(t, guess))
+
+    def change(z: Floats) -> float:
+        return float(np.linalg.norm(((z - guess) * problem.weight / problem.scale)[state]))
+
+    for stays in (YIELDS, BACK):
+        near = np.where(np.abs(aim - guess) > stays * size, aim, guess)
+        for held in (state, state & (near == guess)):
+            found = solve(replace(problem, free=free & ~held), np.where(held, near, x))
+            clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
+            if clean is not None and change(clean) <= change(x):
+                return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
+    return None, 0.0
+
+
+def _without_noise(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats | None:
+    """A solution with zeros where it is round-off of the magnitudes that the guesses make, or of what is alike; or as it
+    is.  The first that holds in its own magnitudes; None where none does.
+    """
+    z = starter.without_noise(x, starter.scale(t, x))
+    empty = np.where(free & (np.abs(z) < NOISE * starter.scale(t, guess)), 0.0, z)
+    return next((c for c in (empty, z, x) if _own(starter, t, c, c) < OWN), None)
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:
