@@ -37,6 +37,8 @@ _ITERATIONS = 60
 _FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number."""
 _HALVINGS = 12
+EMPTY = 1e-160
+"""Coefficients whose squares underflow say nothing: a row of them is empty (slopes of diodes far from conduction)."""
 _ROUND_OFF = 2e-15
 _BESIDE = 1e-8
 """Scaled rows below which round-off alone can keep them from shrinking."""
@@ -139,11 +141,12 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
     i, j, v = entries
     if not (np.isfinite(v).all() and np.isfinite(aim).all()):
         raise NotFiniteError
-    # rows of equal size: a row of small coefficients must not pass for a redundant one
+    # by a power of two before squares are formed, which could overflow
     largest = np.zeros(shape[0])
     np.maximum.at(largest, i, np.abs(v))
-    largest = np.where(largest > 0.0, largest, 1.0)
-    v, aim = v / largest[i], aim / largest
+    power = np.ldexp(1.0, np.frexp(np.where(largest > EMPTY, largest, 1.0))[1])
+    v, aim = v / power[i], aim / power
+    # rows of equal size: a row of small coefficients must not pass for a redundant one
     size = np.zeros(shape[0])
     np.add.at(size, i, v * v)
     size = np.where(size > 0.0, np.sqrt(size), 1.0)
