@@ -281,7 +281,9 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
         return best, True
     best, holds = _rescaled(starter, t, x, guess, free)
     if not holds:
+        own, starter.work = starter.work, Work(EXPLAINED)
         found, holds = _rescaled(starter, t, _as_written(starter, t, x, guess, free), guess, free)
+        starter.work = own
         best = found if holds or found.residual < best.residual else best
     for shaken in _shaken(x, free, starter.scale(t, x)):
         if holds or starter.work.done:
