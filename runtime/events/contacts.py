@@ -204,11 +204,11 @@ class Contacts:
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
         contact = self.contacts[k]
-        if contact.kind == "planar" and not self.active[k]:
-            if values[contact.aim[4]] > self.observer.zero(contact.aim[4]):
-                self._direct(contact, values[list(contact.aim[:2])])
-                self.p[contact.sense] = 1.0
-                return
+        slides = contact.kind == "planar" and not self.active[k]
+        if slides and values[contact.aim[4]] > self.observer.zero(contact.aim[4]):
+            self._direct(contact, values[list(contact.aim[:2])])
+            self.p[contact.sense] = 1.0
+            return
         slips = contact.kind == "friction" and not self.active[k]
         if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
             self.p[contact.sense] = np.sign(values[contact.value])

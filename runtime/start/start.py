@@ -19,7 +19,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, Work, least_residual, solve, where_light
 from sysdyn.runtime.numerics.rank import rank
-from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of, row_scale
+from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of, row_scale
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
@@ -265,8 +265,8 @@ def _nearer(
 
 
 def _without_noise(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats | None:
-    """A solution with zeros where it is round-off of the magnitudes that the guesses make, or of what is alike; or as it
-    is.  The first that holds in its own magnitudes; None where none does.
+    """A solution with zeros where it is round-off of the magnitudes that the guesses make, or of what is alike; or as
+    it is.  The first that holds in its own magnitudes; None where none does.
     """
     z = starter.without_noise(x, starter.scale(t, x))
     empty = np.where(free & (np.abs(z) < NOISE * starter.scale(t, guess)), 0.0, z)

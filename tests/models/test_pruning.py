@@ -319,8 +319,8 @@ def test_every_part_of_a_network_is_known_to_pruning():
     """A new kind of statement must be told to `influence.py` (and `pruning.py`) before it is listed here."""
     known = (
         "model place parameters tables coordinates unknowns states energies works constraints dynamics initials"
-        " observations expectations statics goldens scene elements nodes branches couplings slopes quasis read discretes"
-        " events switches"
+        " observations expectations statics goldens scene elements nodes branches couplings slopes quasis read"
+        " discretes events switches"
     )
     assert set(Network.__dataclass_fields__) == set(known.split())
 
