@@ -68,6 +68,9 @@ def _judged(found: Verified, console: Console) -> int:
     for text in _complaints(found):
         console.complain(text, 1)
         code = 1
+    for text in shortened(_doubts(found)):
+        console.complain(text, SOLVER)
+        code = SOLVER
     for text in shortened(_unbalanced(found)):
         console.complain(text, SOLVER)
         code = SOLVER
@@ -90,6 +93,8 @@ def _judged(found: Verified, console: Console) -> int:
 def _complaints(found: Verified) -> list[str]:
     pairs = []
     for d in found.disagreements:
+        if d.doubted:
+            continue
         pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d.gap)}")
     carriers = [
         f"{' and '.join(t.backends)} disagree in {t.formulation}: row {t.row} by {t.difference:.1e} of itself"
@@ -97,6 +102,16 @@ def _complaints(found: Verified) -> list[str]:
         if not t.agree
     ]
     return [*shortened(pairs), *carriers]
+
+
+def _doubts(found: Verified) -> list[str]:
+    """Differences from runs that are not met by their own estimate: nothing is known from them."""
+    return [
+        f"{' and '.join(run.name for run in d.doubted)}: not met by its own estimate, and apart from "
+        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d.gap)}"
+        for d in found.disagreements
+        if d.doubted
+    ]
 
 
 def _unbalanced(found: Verified) -> list[str]:
@@ -119,10 +134,8 @@ def _warnings(found: Verified) -> list[str]:
     """Warnings of the runs, each once with the runs that have it."""
     names: dict[str, list[str]] = {}
     for run in (*found.runs, found.finer):
-        judgement = run.outcome.judgement
-        unmet = "the accuracy asked for was not reached by its own estimate"
-        inaccurate = [unmet for m in judgement.not_met if m.what == "accuracy"] if judgement else []
-        for text in (*run.outcome.warnings, *inaccurate):
+        unmet = ("the accuracy asked for was not reached by its own estimate",) if run.inaccurate else ()
+        for text in (*run.outcome.warnings, *unmet):
             names.setdefault(text, []).append(run.name)
     return [f"{', '.join(dict.fromkeys(runs))}: {text}" for text, runs in names.items()]
 
@@ -180,8 +193,10 @@ def _horizon(found: Verified) -> str:
 
 def _verdict(found: Verified) -> str:
     number = len(found.runs)
-    if found.disagreements or not all(t.agree for t in found.twins):
+    if any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
         return f"{number} runs: they disagree"
+    if found.disagreements:
+        return f"{number} runs, of which some are not met: the others agree"
     return f"{number} runs agree on {len(found.compared)} quantities"
 
 

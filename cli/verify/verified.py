@@ -42,6 +42,12 @@ class Run:
         return float(np.max(np.abs(self.trace["audit.energy"].values), initial=0.0))
 
     @property
+    def inaccurate(self) -> bool:
+        """Whether its own estimate is above the accuracy."""
+        judgement = self.outcome.judgement
+        return judgement is not None and any(m.what == "accuracy" for m in judgement.not_met)
+
+    @property
     def unbalanced(self) -> tuple[NotMet, ...]:
         """Ledgers of energy and invariants that are off."""
         judgement = self.outcome.judgement
@@ -69,6 +75,11 @@ class Disagreement:
     one: Run
     other: Run
     gap: Gap
+
+    @property
+    def doubted(self) -> tuple[Run, ...]:
+        """Those of the two that say themselves that they have not reached their accuracy: no witnesses."""
+        return tuple(run for run in (self.one, self.other) if run.inaccurate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +119,13 @@ def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
 
 
 def disagreements(runs: Sequence[Run], bounds: Bounds, until: float) -> tuple[Disagreement, ...]:
-    """Runs that differ from the first up to `until` [s], then pairs among those that do not."""
+    """Runs that differ from the first up to `until` [s], then pairs among those that do not or cannot be judged by it."""
     found, agreeing = [], []
     for run in runs[1:]:
         gap = worst(runs[0], run, bounds, until)
         if gap is not None and gap.ratio > 1.0:
             found.append(Disagreement(runs[0], run, gap))
-        else:
+        if gap is None or gap.ratio <= 1.0 or runs[0].inaccurate:
             agreeing.append(run)
     for k, one in enumerate(agreeing):
         for other in agreeing[k + 1 :]:

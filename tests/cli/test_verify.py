@@ -126,6 +126,8 @@ def scenes():
 
 REFUSED = ("benchmark/ring.sd",)
 """Scenes at which one of the methods stops with a reason: the matrix of bdf becomes singular."""
+UNMET = ("benchmark/tube.sd",)
+"""Scenes at which one of the methods says that it has not reached the accuracy: roots at flows through zero, in bdf."""
 
 
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
@@ -136,7 +138,11 @@ def test_every_scene_agrees(file, scene, capsys):
         assert not found["result"].get("disagreements")
         assert any("the solver stopped" in d["message"] for d in found["diagnostics"])
         return
-    assert code == 0, [d["message"] for d in found["diagnostics"] if d["severity"] == "error"]
+    errors = [d["message"] for d in found["diagnostics"] if d["severity"] == "error"]
+    if file in UNMET and code == 3:
+        assert all("not met by its own estimate" in text and "bdf" in text.split(":")[0] for text in errors), errors
+    else:
+        assert code == 0, errors
     assert found["result"]["horizon"] == found["result"]["runs"][0]["reached"]
     assert all(not r["warnings"] for r in found["result"]["runs"])
 
