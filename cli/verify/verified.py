@@ -119,7 +119,7 @@ def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
 
 
 def disagreements(runs: Sequence[Run], bounds: Bounds, until: float) -> tuple[Disagreement, ...]:
-    """Runs that differ from the first up to `until` [s], then pairs among those that do not or cannot be judged by it."""
+    """Runs that differ from the first up to `until` [s], then pairs among those that do not, or all where it is not met."""
     found, agreeing = [], []
     for run in runs[1:]:
         gap = worst(runs[0], run, bounds, until)
