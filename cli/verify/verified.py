@@ -119,7 +119,10 @@ def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
 
 
 def disagreements(runs: Sequence[Run], bounds: Bounds, until: float) -> tuple[Disagreement, ...]:
-    """Runs that differ from the first up to `until` [s], then pairs among those that do not, or all where it is not met."""
+    """Runs that differ from the first up to `until` [s], then pairs among those that do not.
+
+    A first run that is not met by its own estimate judges no other.
+    """
     found, agreeing = [], []
     for run in runs[1:]:
         gap = worst(runs[0], run, bounds, until)
