@@ -40,6 +40,8 @@ NEARER = 12
 """Steps towards the least change of the state."""
 YIELDS, BACK = 1e-5, 1e-9
 """Scaled changes of a guess that are tried without: none is wanted, the weights are small but not zero."""
+EVEN = 1.05
+"""Growth of the whole change for which a guess stays as written: what it yields is small to second order."""
 EXPLAINED = 0.3
 """Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
 
@@ -259,7 +261,7 @@ def _nearer(
         for held in (state, state & (near == guess)):
             found = solve(replace(problem, free=free & ~held), np.where(held, near, x))
             clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
-            if clean is not None and change(clean) <= change(x):
+            if clean is not None and change(clean) <= EVEN * change(x):
                 return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
     return None, 0.0
 
