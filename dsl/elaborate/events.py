@@ -272,12 +272,11 @@ def _stick_in_plane(
     multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
     along = ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True)))
     value = ex.sub(along, ex.scale(0.5, node))
-    frame.parts.drafts.append(
-        Draft(
-            name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
-            rate=ex.time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
-        )  # fmt: skip
-    )
+    draft = Draft(
+        name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
+        rate=ex.time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
+    )  # fmt: skip
+    frame.parts.drafts.append(draft)
     frame.parts.drafts.append(Draft(labels[1], at, loops, "follows", place, unit, flows[1], multipliers[1]))
     beside = [ex.add(f, ex.scale(BESIDE, d)) for f, d in zip(flows, n, strict=True)]
     forward = ex.call("sign", ex.add(*(ex.mul(d, b) for d, b in zip(n, beside, strict=True))))

@@ -204,11 +204,11 @@ class Contacts:
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
         contact = self.contacts[k]
-        if contact.kind == "planar" and not self.active[k]:
-            if values[contact.aim[4]] > self.observer.zero(contact.aim[4]):
-                self._direct(contact, values[list(contact.aim[:2])])
-                self.p[contact.sense] = 1.0
-                return
+        moves = contact.kind == "planar" and values[contact.aim[4]] > self.observer.zero(contact.aim[4])
+        if moves and not self.active[k]:
+            self._direct(contact, values[list(contact.aim[:2])])
+            self.p[contact.sense] = 1.0
+            return
         slips = contact.kind == "friction" and not self.active[k]
         if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
             self.p[contact.sense] = np.sign(values[contact.value])
@@ -229,8 +229,9 @@ class Contacts:
             self.fastest[k] = max(self.fastest[k], -speed[k])
         aim = {}
         for k in near:
-            bounces = -speed[k] > rest * self.fastest[k]
-            aim[k] = self.contacts[k].restitution * max(-speed[k], 0.0) if bounces else 0.0
+            back = self.contacts[k].restitution * max(-speed[k], 0.0)
+            bounces = back > max(rest * self.fastest[k], self.observer.zero(self.contacts[k].rate))
+            aim[k] = back if bounces else 0.0
         y, after = self._struck(t, y, yd, strike, (near, closing, aim))
         for k in near:
             rate = self.contacts[k].rate

@@ -13,7 +13,6 @@ from sysdyn.runtime.model.scales import magnitudes
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 
-
 SPAN = 1.0
 """s: in which what starts at rest may come to its magnitude."""
 
