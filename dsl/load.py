@@ -135,6 +135,7 @@ def _network(
         return None  # what is missing would be found missing again, in other words
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
+    checks.set_valued_results(elaborator, reader.observations, report)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
         events.expanded(elaborator, known)

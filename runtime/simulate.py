@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.accuracy import FINEST, Achieved, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
 from sysdyn.runtime.integrate.runs import LONG, Runs, Samples
@@ -34,7 +35,7 @@ class Outcome:
     """What a simulation did.  statistics and timings as the trace holds them; reached [s]; error_estimate relative
     (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0);
     judgement: of a run that ended; below_round_off: the estimate is less than double precision resolves;
-    cancelled: traced differences of terms much larger than they are.
+    cancelled: traced differences of terms much larger than they are; events: of a run that ended.
     """
 
     trace: Path
@@ -53,6 +54,7 @@ class Outcome:
     judgement: Judgement | None = None
     below_round_off: bool = False
     cancelled: tuple[Cancelled, ...] = ()
+    events: tuple[Happened, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -228,7 +230,8 @@ def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tu
     ended = outcome(True, options.t_end, achieved, None)
     lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, ended.error_estimate))
     below = achieved is not None and achieved.below_round_off
-    return replace(ended, judgement=judgement, below_round_off=below, cancelled=lost)
+    said = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
+    return replace(ended, **said)
 
 
 def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

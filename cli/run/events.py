@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.binding.binding import places_of
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Event, Switch
-from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
-from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Plan, Relation, Sampled, When
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Happened, Plan, Relation, Sampled, When
 from sysdyn.runtime.model.description import RowFamily, element
 from sysdyn.runtime.model.system import System
+
+ZENO = 8
+"""Impacts before a rest that are told."""
 
 
 def plan(prepared: Prepared, system: System, rest: float = 1e-6) -> Plan:
@@ -20,6 +24,23 @@ def plan(prepared: Prepared, system: System, rest: float = 1e-6) -> Plan:
     if not network.events and not network.switches:
         return Plan()
     return _Planner(prepared, system).plan(rest)
+
+
+def zeno(prepared: Prepared, events: Sequence[Happened], report: Report) -> None:
+    """N923 for each contact whose impacts came ever faster until they were too slow to tell from rest."""
+    impacts: dict[str, list[float]] = {}
+    said: set[str] = set()
+    places = {s.name: s.place for s in prepared.network.switches}
+    for event in events:
+        name = event.element
+        if event.name.startswith("impact ") and event.after == "free":
+            impacts.setdefault(name, []).append(event.time)
+        elif event.after == "holds":
+            times = impacts.pop(name, [])
+            if len(times) >= ZENO and name not in said:
+                said.add(name)
+                text = f"{name}: {len(times)} impacts from {times[0]:.9g} s on, ever faster, end at {event.time:.9g} s"
+                report.note("N923", f"{text}: what was left of them is rest", places.get(name, prepared.network.place))
 
 
 class _Planner:

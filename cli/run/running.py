@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.events import plan, zeno
 from sysdyn.cli.run.expectations import Claim, judge, watch
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
@@ -328,4 +328,5 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
     if outcome.judgement is not None:
         verdict(target, prepared, outcome.judgement, report)
         differences(prepared, outcome.cancelled, report)
+        zeno(prepared, outcome.events, report)
     return Ran(target, prepared, started, outcome, claims, code, failure)

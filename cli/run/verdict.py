@@ -31,9 +31,15 @@ _CAUSES = {
     "step_too_small": ("E930", "the step size fell below the resolution of time"),
     "max_steps": ("E934", "the limit of steps is reached"),
     "max_wall": ("E934", "the limit of wall time is reached"),
+    "max_events": ("E934", "the limit of events is reached"),
+    "chatter": ("E930", "events follow each other without end at one instant"),
+    "complementarity": ("E930", "no set of constraints that hold fits: each one asks for another"),
+    "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }
+_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict")
 _REMEDIES = {
+    "E704": "one event for both, or conditions that do not become true together",
     "E930": "another --method or --index, a looser --accuracy, or a smoother law there",
     "E931": "a range of the law that keeps it positive, or an earlier end: --until",
     "E932": "data that reach further, or 'clamp' or 'extend' in the table",
@@ -53,7 +59,7 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     if error.row is not None and found is None:
         text += f", in {_named(error.row)}, {where.file}:{where.start[0]}"
     if error.unknown is not None:
-        text += f", unknown {error.unknown}"
+        text += f", {'of' if error.cause in _OF_EVENTS else 'unknown'} {error.unknown}"
         if error.row is None:
             text += f", {where.file}:{where.start[0]}"
     partial = error.partial
@@ -135,7 +141,7 @@ def _place(target: Target, prepared: Prepared, error: SolverFailure, found: Culp
         return author_place(target, prepared, found.row)
     if error.row is not None:
         return author_place(target, prepared, error.row)
-    if error.unknown is not None:
+    if error.unknown is not None and error.cause not in _OF_EVENTS:
         return _declared(target, prepared, re.split(r"[^\w]", error.unknown, maxsplit=1)[0])
     return prepared.network.place
 

@@ -305,8 +305,9 @@ class Switch:
 
     kind: phi or psi (with a multiplier >= 0 where it holds, and value >= 0 elsewhere), guarded (while), friction (the
     multiplier bounded by `bound` on both sides where it holds; elsewhere the param `sense` is the sign of the value),
-    planar (friction in the plane: value is the speed along the params `direction`, less half the speed, rate that of
-    the former; aim: names of both flows, both multipliers and the speed), follows (holds where the one before it does).
+    planar (friction in the plane: value is the speed along the params `direction`, less half the speed, rate that
+    of the former; aim: names of both flows, both multipliers and the speed),
+    follows (holds where the one before it does).
     at: indices in the family of the label.  value, rate, acceleration, multiplier, bound, bound - multiplier
     (upper), bound + multiplier (lower), guard: names of observations.
     """

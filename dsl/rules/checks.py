@@ -12,7 +12,17 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Loop, NodeFamily, Shape, State, Unknown
+from sysdyn.dsl.model.network import (
+    Branch,
+    Constraint,
+    Coordinate,
+    Loop,
+    NodeFamily,
+    Observation,
+    Shape,
+    State,
+    Unknown,
+)
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.letters import letter, samples, unknowns_of
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
@@ -155,14 +165,30 @@ def _set_valued(model: Elaborator, report: Report) -> None:
     said += [(e.expression, e.place, e.function) for e in parts.energies]
     said += [(o.expression, o.place, "") for o in parts.watched]
     for node, place, kind in said:
-        if any(n.op == "call" and n.data == "setsign" for n in ex.topological([node])):
+        if _has_setsign(node):
             if kind in ("gamma", "D", "law"):
                 what = {"law": "a law that gives a flow"}.get(kind, f"a {kind}")
                 help_ = "dissipator(e = c*setsign(f))"
                 report.note("N608", f"setsign in {what} is not supported yet", place, help=help_)
             else:
-                message = "setsign outside a law, gamma or content"
-                report.error("E705", message, place, help="sign for an ordinary function")
+                _no_set(place, report)
+
+
+def set_valued_results(model: Elaborator, observations: Iterable[Observation], report: Report) -> None:
+    """E705: setsign in what is traced, expected or initial: there is no multiplier that could say its value."""
+    said = [(o.place, o.expression) for o in observations]
+    said += [(e.place, node) for e in model.parts.expectations for node in (e.left, e.right)]
+    said += [(i.place, node) for i in model.parts.initials for node in (i.target, i.value)]
+    for place in dict.fromkeys(place for place, node in said if _has_setsign(node)):
+        _no_set(place, report)
+
+
+def _has_setsign(root: Node) -> bool:
+    return any(n.op == "call" and n.data == "setsign" for n in ex.topological([root]))
+
+
+def _no_set(place: Place, report: Report) -> None:
+    report.error("E705", "setsign outside a law, gamma or content", place, help="sign for an ordinary function")
 
 
 def _corner(node: Node, place: Place, report: Report) -> None:

@@ -204,8 +204,8 @@ class Contacts:
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
         contact = self.contacts[k]
-        slides = contact.kind == "planar" and not self.active[k]
-        if slides and values[contact.aim[4]] > self.observer.zero(contact.aim[4]):
+        moves = contact.kind == "planar" and values[contact.aim[4]] > self.observer.zero(contact.aim[4])
+        if moves and not self.active[k]:
             self._direct(contact, values[list(contact.aim[:2])])
             self.p[contact.sense] = 1.0
             return
@@ -229,8 +229,9 @@ class Contacts:
             self.fastest[k] = max(self.fastest[k], -speed[k])
         aim = {}
         for k in near:
-            bounces = -speed[k] > rest * self.fastest[k]
-            aim[k] = self.contacts[k].restitution * max(-speed[k], 0.0) if bounces else 0.0
+            back = self.contacts[k].restitution * max(-speed[k], 0.0)
+            bounces = back > max(rest * self.fastest[k], self.observer.zero(self.contacts[k].rate))
+            aim[k] = back if bounces else 0.0
         y, after = self._struck(t, y, yd, strike, (near, closing, aim))
         for k in near:
             rate = self.contacts[k].rate

@@ -146,9 +146,16 @@ class Handler:
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        rows = [(w.row, w.side, self.observer.zero(w.row)) for w in watched]
+        rows = [(w.row, w.side, self.observer.zero(w.row), self._rate(w)) for w in watched]
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
+
+    def _rate(self, watched: Watched) -> int:
+        """The row of the rate of what is watched, where there is one."""
+        if watched.contact < 0:
+            return -1
+        contact = self.plan.contacts[watched.contact]
+        return contact.rate if watched.row == contact.value else -1
 
     def fire(
         self, t: float, y: Floats, yd: Floats, samples: Sequence[int] = (), which: Sequence[Watched] = ()

@@ -17,8 +17,8 @@ ITERATIONS = 60
 
 Dense = Callable[[float], Floats]
 """t (s) -> values [observed] there."""
-Watch = tuple[int, int, float]
-"""(row, side, tolerance): it changes where side*value falls below -tolerance."""
+Watch = tuple[int, int, float, int]
+"""(row, side, tolerance, row of its rate or -1): it changes where side*value falls below -tolerance."""
 
 
 def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -> tuple[float, list[int]] | None:
@@ -27,7 +27,7 @@ def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -
     low, before = begin, dense(begin)
     for high in grid:
         values = dense(high)
-        hit = [k for k, (row, side, small) in enumerate(watches) if side * values[row] < -small]
+        hit = [k for k, (row, side, small, _) in enumerate(watches) if side * values[row] < -small]
         if hit:
             return _first(dense, watches, hit, (low, before), (high, values))
         low, before = high, values
@@ -43,11 +43,23 @@ def _first(
 ) -> tuple[float, list[int]]:
     found = {}
     for k in hit:
-        row, side, _ = watches[k]
-        found[k] = _root(dense, row, side, (low[0], side * float(low[1][row])), (high[0], side * float(high[1][row])))
+        found[k] = _instant(dense, watches[k], low, high)
     first = min(found.values())
     same = 8.0 * float(np.spacing(max(abs(low[0]), abs(high[0]))))
     return first, [k for k in hit if found[k] <= first + same]
+
+
+def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[float, Floats]) -> float:
+    """Where a watch falls through zero; what begins at zero and rises (a bounce lower than the tolerance) falls from
+    its crest.
+    """
+    row, side, _, rate = watch
+    begin, value = low[0], side * float(low[1][row])
+    if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
+        ends = ((at, side * float(values[rate])) for at, values in (low, high))
+        begin = _root(dense, rate, side, *ends)
+        value = side * float(dense(begin)[row])
+    return _root(dense, row, side, (begin, value), (high[0], side * float(high[1][row])))
 
 
 def _root(dense: Dense, row: int, side: int, low: tuple[float, float], high: tuple[float, float]) -> float:

@@ -80,7 +80,7 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """limit: of events; rest: an impact slower than this part of the fastest is the last."""
+    """limit: of events; rest: an impact left slower than this part of the fastest is the last."""
 
     relations: tuple[Relation, ...] = ()
     whens: tuple[When, ...] = ()

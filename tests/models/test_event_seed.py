@@ -71,7 +71,22 @@ def test_a_ball_with_other_parameters(changed, tmp_path):
     wanted = [bounce(t, p["h_0"], p["v_0"], p["g"], p["e"]) for t in times]
     assert np.abs(values(trace, "h", times) - [w[0] for w in wanted]).max() < 1e-9
     assert np.abs(values(trace, "v", times) - [w[1] for w in wanted]).max() < 5e-9
-    assert happened(trace, wanted[-1][2]) < INSTANTS
+    least = ASKED * math.sqrt(p["v_0"] ** 2 + 2.0 * p["g"] * p["h_0"])  # slower than that it is at rest
+    assert happened(trace, bounce(times[-1], p["h_0"], p["v_0"], p["g"], p["e"], least)[2]) < INSTANTS
+
+
+def test_a_ball_through_fifty_impacts_and_to_rest(tmp_path):
+    """Through its Zeno time, e = 0.8: instants, speeds behind the impacts, and what the books say."""
+    end = math.sqrt(2.0 / 9.81) * (1.0 + 0.8) / (1.0 - 0.8)
+    trace = run("bouncing_ball", tmp_path, [end + 0.1], until=repr(end + 0.2))
+    instants = bounce(end, 1.0, 0.0, 9.81, 0.8, 1e-5)[2]
+    assert len(instants) >= 50
+    assert happened(trace, instants) < INSTANTS
+    assert sum(e.name.startswith("impact") for e in trace.events) >= 50
+    assert [e.after for e in trace.events][-1] == "holds"
+    assert np.abs(trace["h"].values[trace.time > end]).max() == pytest.approx(0.0, abs=1e-9)
+    books = trace["audit.energy"].values
+    assert np.abs(books - books[0]).max() < 1e-9 * 9.81
 
 
 def test_a_ball_beyond_its_last_impact(tmp_path):
@@ -107,10 +122,11 @@ def test_stiction_with_other_parameters(changed, tmp_path):
     x, turns = p["x_0"], 0
     while abs(x) * p["k"] > p["mus"] * p["M"] * p["g"]:
         x, turns = -x + 2.0 * shift * math.copysign(1.0, x), turns + 1
-    trace = run("stiction_oscillator", tmp_path, [5.0], changed)
-    assert abs(values(trace, "x", [5.0])[0] - x) < STATES
+    end = half * (turns + 1)
+    trace = run("stiction_oscillator", tmp_path, [end], changed, until=repr(end))
+    assert abs(values(trace, "x", [end])[0] - x) < STATES
     assert happened(trace, [half * (k + 1) for k in range(turns)]) < INSTANTS
-    assert abs(values(trace, "v", [5.0])[0]) < 1e-12
+    assert abs(values(trace, "v", [end])[0]) < 1e-12
 
 
 @pytest.mark.parametrize("changed", [{"vx_0": 0.7, "vy_0": 1.1}, {"mu": 0.2, "vx_0": 0.0, "vy_0": -1.0}])
