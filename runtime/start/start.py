@@ -42,6 +42,8 @@ YIELDS, BACK = 1e-5, 1e-9
 """Scaled changes of a guess that are tried without: none is wanted, the weights are small but not zero."""
 EVEN = 1.05
 """Growth of the whole change for which a guess stays as written: what it yields is small to second order."""
+WALKED = 0.1
+"""Share of the work of a search that walking down steep laws may take."""
 EXPLAINED = 0.3
 """Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
 
@@ -283,7 +285,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
         return best, True
     best, holds = _rescaled(starter, t, x, guess, free)
     if not holds:
-        own, starter.work = starter.work, Work(EXPLAINED)
+        own, starter.work = starter.work, Work(WALKED)
         found, holds = _rescaled(starter, t, _as_written(starter, t, x, guess, free), guess, free)
         starter.work = own
         best = found if holds or found.residual < best.residual else best
