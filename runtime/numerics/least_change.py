@@ -25,8 +25,8 @@ EPS = 1e-13
 """Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
-GRANTED = 4e9
-"""Operations that a search may take: about three seconds; the hardest start of our models takes a third of it."""
+GRANTED = 3e9
+"""Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
 ITERATIONS = 40
 """Iterations that a search may take however large they are."""
 EVALUATION = 1e6
