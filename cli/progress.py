@@ -1,9 +1,12 @@
-"""A progress line with the time left, on runs of over a second."""
+"""A progress line with the time left, on runs of over a second; a long forecast is said whatever the mode."""
 
 from __future__ import annotations
 
 import sys
 import time
+
+LONG = 600.0
+"""Seconds left that are said at once."""
 
 
 class ProgressLine:
@@ -15,9 +18,16 @@ class ProgressLine:
         self._began = time.monotonic()
         self._last = 0.0
         self._shown = False
+        self._warns = mode != "never"
 
     def __call__(self, fraction: float, left: float | None) -> None:
         """Fraction of the span done, seconds left (None: not known yet)."""
+        if self._warns and left is not None and left > LONG:
+            self._warns = False
+            self.clear()
+            remedies = "--max-wall, a looser --accuracy or a shorter span"
+            sys.stderr.write(f"about {_duration(left)} of integration lie ahead: {remedies} would shorten it\n")
+            sys.stderr.flush()
         now = time.monotonic()
         wait = 0.2 if self._terminal else 10.0 if self._shown else 0.0
         if not self._on or now - self._began < 1.0 or now - self._last < wait:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.integrate.accuracy import FINEST, Achieved, control
+from sysdyn.runtime.integrate.accuracy import LAWS, Achieved, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
-from sysdyn.runtime.integrate.runs import LONG, Runs, Samples
+from sysdyn.runtime.integrate.runs import LONG, Runs, Samples, Way
 from sysdyn.runtime.integrate.underlying import obstacle
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
 from sysdyn.runtime.model.carrier import Carrier
@@ -26,16 +26,17 @@ from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.claim import claimed
 
-FINEST_RADAU = 1e-17
-"""Smallest tolerance of Radau: its error test works with a tenth of the power 2/3 of it (core/radau.h)."""
+NOT_STIFF = "not stiff"
+"""Why method auto stays with the explicit method."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What a simulation did.  statistics and timings as the trace holds them; reached [s]; error_estimate relative
     (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0);
-    judgement: of a run that ended; below_round_off: the estimate is less than double precision resolves;
-    cancelled: traced differences of terms much larger than they are; events: of a run that ended.
+    judgement: of a run that ended; below_round_off: the estimate is less than double precision resolves; reason: why
+    method auto took its method ("" where it was named); cancelled: traced differences of terms much larger than they
+    are; events: of a run that ended.
     """
 
     trace: Path
@@ -53,6 +54,7 @@ class Outcome:
     failure: SolverFailure | None = None
     judgement: Judgement | None = None
     below_round_off: bool = False
+    reason: str = ""
     cancelled: tuple[Cancelled, ...] = ()
     events: tuple[Happened, ...] = ()
 
@@ -68,6 +70,14 @@ def _listed(names: tuple[str, ...]) -> str:
     return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
 
 
+def _left(method: str, failure: SolverFailure) -> str:
+    """Why a method was left."""
+    if failure.cause == "stiff":
+        return f"stiff: {method} is held to steps of {failure.step:.2g} s"
+    why = f"needs more than {LONG} steps" if failure.cause == "max_steps" else f"stopped at {failure.time:.6g} s"
+    return f"{method} {why}"
+
+
 def _targets(runs: Runs, options: Options) -> Floats:
     """Accuracy wanted of each compared quantity; infinite where none is."""
     names = list(runs.compared)
@@ -79,7 +89,7 @@ def _targets(runs: Runs, options: Options) -> Floats:
     return target
 
 
-def _controlled(runs: Runs, options: Options) -> Achieved | None:
+def _controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved | None:
     """Runs with accuracy control; None of one run with the solver's own tolerances."""
     if runs.method == "euler":
         if options.euler_step is None:
@@ -89,7 +99,7 @@ def _controlled(runs: Runs, options: Options) -> Achieved | None:
     if own_tolerances(options):
         runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol)
         return None
-    return _chosen(runs, options) if options.method == "auto" else _achieved(runs, options)
+    return _chosen(runs, options, others) if options.method == "auto" else _achieved(runs, options)
 
 
 def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Estimate, ...]:
@@ -101,26 +111,27 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
 
 
 def _achieved(runs: Runs, options: Options, *, doubted: bool = False) -> Achieved:
-    finest = FINEST_RADAU if runs.method == "radau" else FINEST
-    return control(runs.sampled, _targets(runs, options), finest, doubted=doubted)
+    return control(runs.sampled, _targets(runs, options), LAWS[runs.method], doubted=doubted)
 
 
-def _chosen(runs: Runs, options: Options) -> Achieved:
-    """With method auto: where one method fails, or the bdf needs more than LONG steps, another begins anew.
+def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
+    """With method auto: where one method fails, or is held back, the next begins anew.
 
     Lightly damped oscillations hold the bdf of orders 3 to 5, which are not A-stable, to steps of the fastest of them:
-    a line of 10000 sections takes it 25 times the work of radau.
+    a line of 10000 sections takes it 25 times the work of radau.  Stability holds the dopri where a model is stiff.
     """
-    if runs.method == "bdf":
-        runs.patience = LONG
-    try:
-        return _achieved(runs, options)
-    except SolverFailure as failure:
-        limited = failure.cause == "max_steps" and runs.most_steps == options.max_steps
-        if limited or failure.cause in ("max_wall", "memory"):
-            raise
-        runs.method, runs.patience = "bdf" if runs.method == "radau" else "radau", None
-        return _achieved(runs, options, doubted=failure.cause != "max_steps")
+    doubted = False
+    while True:
+        runs.patience = LONG if runs.method == "bdf" and others else None
+        try:
+            return _achieved(runs, options, doubted=doubted)
+        except SolverFailure as failure:
+            limited = failure.cause == "max_steps" and runs.most_steps == options.max_steps
+            if limited or failure.cause in ("max_wall", "memory") or not others:
+                raise
+            doubted = failure.cause not in ("max_steps", "stiff")
+            runs.take(replace(others[0], reason=_left(runs.method, failure)))
+            others = others[1:]
 
 
 def counted(
@@ -178,13 +189,37 @@ def simulate(
         name = options.events.contacts[0].name
         raise NoSuchForm(f"'{name}' holds at times: there is no one underlying equation; index 2 with bdf or radau")
     form = system.form.name
-    name = {"3": str(facts.index), "2": "2"}.get(form, form)
-    options = replace(options, attributes={**options.attributes, "index": name})
+    way = Way(method, system, index, {"3": str(facts.index), "2": "2"}.get(form, form))
+    ways = (way,) if options.method != "auto" else alternatives(way, written, start, options)
     with claimed(Path(options.output).resolve()):
-        return _runs(Runs(system, start, options, index, method), written, name, facts, warnings)
+        return _runs(Runs(start, options, ways[0]), ways[1:], written, facts, warnings)
 
 
-def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tuple[str, ...]) -> Outcome:
+def alternatives(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
+    """What method auto tries, in this order; `way` among it.
+
+    The explicit method on the underlying equation comes first where there is one and no law is steep: it is by far the
+    cheapest on a model that is not stiff, and gives up in a few steps on one that is.
+    """
+    other = replace(way, method="bdf" if way.method == "radau" else "radau")
+    if own_tolerances(options):
+        return way, other
+    if way.method == "dopri":
+        return replace(way, reason=NOT_STIFF), replace(way, method="radau"), replace(way, method="bdf")
+    if options.index != "auto":
+        return replace(way, reason=f"index {way.name} was asked for"), other
+    if options.events:
+        return replace(way, reason="events"), other
+    if way.system.form.scales or written.left_out:
+        return replace(way, reason="steep laws" if way.system.form.scales else "redundant constraints"), other
+    system = written.another("0")
+    missing = obstacle(system, start)
+    if missing:
+        return replace(way, reason=f"no underlying equation: {missing[0]} has no rate"), other
+    return Way("dopri", system, 1, "0", NOT_STIFF), way, other
+
+
+def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure, warnings: tuple[str, ...]) -> Outcome:
     """The runs of one simulation, whose trace is claimed."""
     options, start = runs.options, runs.start
     known = determined(written, start)
@@ -202,17 +237,18 @@ def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tu
             runs.timings(),
             estimate,
             runs.method,
-            name,
+            runs.way.name,
             start,
             facts,
             runs.collected(),
             warnings,
             failure,
+            reason=runs.way.reason,
         )
 
     achieved: Achieved | None = None
     try:
-        achieved = _controlled(runs, options)
+        achieved = _controlled(runs, options, others)
     except SolverFailure as failure:
         _close(runs, None, None)
         reached = failure.time if runs.done is None else options.t_end
@@ -230,8 +266,7 @@ def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tu
     ended = outcome(True, options.t_end, achieved, None)
     lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, ended.error_estimate))
     below = achieved is not None and achieved.below_round_off
-    said = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
-    return replace(ended, **said)
+    return replace(ended, judgement=judgement, below_round_off=below, cancelled=lost, events=finished.events)
 
 
 def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

@@ -21,6 +21,7 @@ from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import differences, stopped, verdict
 from sysdyn.compiler.binding.instants import instants
+from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
@@ -40,6 +41,8 @@ FINEST_RTOL = 1e-14
 """What double precision resolves."""
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
+STEPS = 20_000_000
+"""Of a run that has no limit of its own: hours of work; a count, so that traces stay equal."""
 LISTED = 1000
 """Elements of a parameter array that the trace lists: each is a data set of its own, about 0.5 kB and 60 us."""
 
@@ -192,7 +195,9 @@ def options_of(
     method = request.method or scene.solver or "auto"
     if method == "euler" and "step" not in solver:
         raise UsageError("method euler needs a step: 'solver euler(step = 1 ms)' in the scene")
-    steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), None)
+    if not solver.get("longest", 1.0) > 0.0:
+        raise UsageError(f"the longest step is {solver['longest']:g} s: it must be positive")
+    steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), STEPS)
     claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
     return Options(
         output=request.output or _default_output(request.file, scene.name),
@@ -208,6 +213,7 @@ def options_of(
         method=method,
         index=request.index or (f"{solver['index']:g}" if "index" in solver else "auto"),
         euler_step=solver.get("step"),
+        longest=solver.get("longest"),
         redundancy=_redundancy(request, prepared.network),
         max_steps=steps,
         max_wall=wall,
@@ -223,12 +229,12 @@ def options_of(
 
 
 def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
-    """Instants at which the text jumps or has kinks in time."""
-    tables = prepared.network.tables
-    found = instants(prepared.compiled.form, prepared.binding, options.t_start, options.t_end, tables)
+    """Instants at which the text jumps or has kinks in time, and those of pulses that steps would pass over."""
+    text = prepared.compiled.form, prepared.binding, options.t_start, options.t_end, prepared.network.tables
+    found = instants(*text)
     if found.note:
         report.note("N608", found.note, prepared.network.place)
-    return found.times
+    return np.union1d(found.times, pulses(*text))
 
 
 def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:

@@ -26,7 +26,7 @@ SOLVERS = ("auto", "bdf", "radau", "dopri", "euler")
 REDUNDANCY = ("error", "drop", "minimum_norm")
 FINEST_ACCURACY = 1e-13
 """Relative; what doubles resolve, and the estimate must be seen too."""
-_SOLVER_OPTIONS = ("order", "index", "step", "keep_implicit")
+_SOLVER_OPTIONS = ("order", "index", "step", "longest", "keep_implicit")
 
 
 class SceneReader:
@@ -213,7 +213,7 @@ class SceneReader:
             if arg.name == "keep_implicit":
                 node = ex.conditional(self.resolver.condition(arg.value), ex.const(1.0), ex.const(0.0))
             else:
-                node = self._constant(arg.value, dim.TIME if arg.name == "step" else NONE, arg.name)
+                node = self._constant(arg.value, dim.TIME if arg.name in ("step", "longest") else NONE, arg.name)
             options.append((arg.name, node))
         self._found["solver_options"] = tuple(options)
 

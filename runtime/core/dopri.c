@@ -14,6 +14,7 @@
 #define BOUNDARY 6.1     /* of h |lambda|: where the region of stability ends */
 #define STIFF 15         /* steps at the boundary that show stiffness */
 #define SMOOTH 6         /* steps inside it that show the contrary */
+#define REFUSED 50       /* steps refused beyond those taken: kinks that the method cannot cross with its order */
 
 static int step(void *dopri)
 {
@@ -276,6 +277,8 @@ int sd_dopri_step(sd_dopri *dopri)
         if (cause == SD_ERROR_TEST) {
             double ratio = pow(error, 0.125 - 0.2 * MEMORY) / SAFETY;
             dopri->rejected_steps++;
+            if (dopri->rejected_steps > dopri->steps + REFUSED && left / dopri->h > dopri->patience)
+                return dopri->cause = cause;
             dopri->h *= isfinite(ratio) ? 1.0 / fmax(1.0, fmin(1.0 / SHRINK, ratio)) : 0.1;
         } else {
             dopri->newton_failures++;

@@ -83,7 +83,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *comple
                           &radau->base[0], &radau->base[1], &radau->base[2],
                           &radau->full[0], &radau->full[1], &radau->full[2],
                           &radau->stage[0], &radau->stage[1], &radau->stage[2],
-                          &radau->stage_d[0], &radau->stage_d[1], &radau->stage_d[2]};
+                          &radau->stage_d[0], &radau->stage_d[1], &radau->stage_d[2], &radau->pull};
     size_t number = sizeof vectors / sizeof *vectors;
     radau->memory = calloc(number * m + 3 * nnz, sizeof(double));
     radau->w = calloc(m + nnz, sizeof(double complex));
@@ -485,6 +485,18 @@ static void fit_end(sd_radau *radau)
         radau->h = 0.5 * left;
 }
 
+/* how fast each unknown is pulled back by its own row, in steps */
+static void note_pulls(sd_radau *radau)
+{
+    const sd_system *system = radau->system;
+    for (int32_t j = 0; j < radau->n; j++) {
+        radau->pull[j] = 0.0;
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            if (radau->jyd[e] != 0.0)
+                radau->pull[j] = fmax(radau->pull[j], radau->h * fabs(radau->jy[e] / radau->jyd[e]));
+    }
+}
+
 /* the new point, and the next step's size */
 static void accept(sd_radau *radau, double error, int iterations)
 {
@@ -513,6 +525,7 @@ static void accept(sd_radau *radau, double error, int iterations)
     radau->refined[0] = 0;
     radau->h_before = radau->h_used;
     radau->h_used = h;
+    note_pulls(radau);
     for (int s = 0; s < SD_STAGES; s++) {
         const double *a = inverse_a[s];
         for (int32_t i = 0; i < radau->n; i++) {

@@ -10,7 +10,8 @@
  * (J + lambda/h E) w = r on one pattern.
  * Error test, weights and Newton's norm: as in bdf.h, with the tolerance 0.1 rtol^(2/3) that fits an estimate of order 3.
  * Values within a step: the cubic of the stages, or, for unknowns with derivatives, the quintic through values and
- * derivatives at the last three points, whose error is that of the method.  The stage's K at the end of a step has the
+ * derivatives at the last three points, whose error is that of the method.  Where an unknown is pulled back faster than
+ * the step follows, its derivative is its error times that rate, and the cubic serves.  The stage's K at the end of a step has the
  * multipliers' order only: where rows are asked for, derivatives come from the settled point.
  */
 #ifndef SYSDYN_RADAU_H
@@ -47,6 +48,7 @@ typedef struct sd_radau {
     double *d[SD_STAGES];                           /* right sides and corrections */
     double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it */
     double *point, *point_d;  /* [written and more] */
+    double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
     double complex *w, *gz;
     /* what happened */

@@ -155,7 +155,9 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, double *
     double moved = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     *best = before;
     memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
-    for (int m = 0; m < ITERATIONS && !failed && !(before <= EXACT && moved < SMALL) && !*settle->system->stop; m++) {
+    for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
+        if (moved < SMALL && before <= fmax(EXACT, settle->enough))
+            break;
         moved = move(settle, y, yd);
         double now = measure(settle, t, y, yd);
         /* between residuals of round-off the later point is the better one: the state is back where it came from */

@@ -32,6 +32,7 @@ typedef struct sd_settle {
     int32_t kinematics;
     double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;
     double hold;                     /* weight of the state; 1 but in a second attempt */
+    double enough;                   /* scaled residual with which a draft is content; 0: round-off */
     int32_t ready;
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
                                         rate of another; norm of the constraint rows */

@@ -1,10 +1,11 @@
 """An accuracy asked for, met by an estimate of the global error.
 
-The same problem is integrated with falling tolerances; two runs are compared at common instants.  With
-error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as measured
-over three runs, at most CREDIT.  The finest run is handed back with its estimate.  Each run finds the magnitudes of its
-unknowns for itself: those that an earlier run met late would hide what is small early and grows.  Two runs that took
-the same steps say nothing: a third takes steps of half the length at other instants.
+A draft is followed by a run at the tolerance that should do, a tenth of the draft's, and both are compared at instants
+of the draft's own rows.  With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of
+the tolerances)^p; p as measured over three runs, at most what the method's law credits.  Where the estimate misses what
+was asked, a finer run follows and is compared with the last one.  The finest run is handed back with its estimate.
+Each run finds the magnitudes of its unknowns for itself: those that an earlier run met late would hide what is small
+early and grows.  Two runs that took the same steps say nothing: a third takes steps of half the length elsewhere.
 """
 
 from __future__ import annotations
@@ -13,32 +14,63 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 
 RUNS = 7
-FINEST = 2e-14
-COARSEST = 1e-3
-POWER = 0.8
-"""With which the next tolerance is predicted."""
-CREDIT = 0.5
-"""Largest power with which the finer run's error is believed to be smaller: BDF's error falls irregularly where its
-order changes (measured on the harmonic oscillator: locally 0.3)."""
+COARSEST = 1e-2
+LOOSEST = 1e-1
+"""Tolerance of a draft at most."""
 SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
 RATIO = 0.1
 """Of the tolerances of the first two runs."""
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
+SHORT, SHORT_CREDIT = 60, 0.75
+"""Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
+FIRST_DROP = 1e-2
+STRETCH = 1.5
+"""Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
+differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 
 
 @dataclass(frozen=True, slots=True)
+class Law:
+    """How the global error of a method follows its tolerance, as measured (tests/bench/price.py).
+
+    gain, power: most runs' estimates stay below gain * tolerance^power; credit: largest power with which the finer
+    run's error is believed to be smaller; finest: the smallest tolerance that makes sense.
+    """
+
+    gain: float
+    power: float
+    credit: float
+    finest: float
+
+    def tolerance(self, wanted: float) -> float:
+        """The tolerance that should do for an accuracy."""
+        return float(np.clip((wanted / self.gain) ** (1.0 / self.power), self.finest, COARSEST))
+
+
+LAWS = {
+    # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
+    "bdf": Law(50.0, 1.0, 0.7, 2e-14),
+    # its error test works with a tenth of the power 2/3 of the tolerance (core/radau.h); on stiff models its order is 3
+    "radau": Law(4.0, 0.85, 0.6, 1e-17),
+    "dopri": Law(40.0, 1.0, 0.9, 2e-14),
+}
+
+
+@dataclass(frozen=True, slots=True)
 class Sampled:
     """What a run hands to the comparison.  values [instants, quantities]; largest [quantities] against
-    which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it is zero to round-off.
+    which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it is zero to round-off;
+    between [instants]: between an event of this run and the same one of the run before it.
     """
 
     tolerance: float
@@ -46,6 +78,7 @@ class Sampled:
     largest: Floats
     steps: int
     noise: Floats | float = 0.0
+    between: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +94,8 @@ class Achieved:
     tolerance: float
 
 
-Run = Callable[[float, float | None], Sampled]
-"""Integrates with a tolerance and a longest step as part of the span (None: the usual one)."""
+Run = Callable[[float, float], Sampled]
+"""Integrates with a tolerance and a longest step as part of the span."""
 
 
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
@@ -77,7 +110,9 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     use &= ~(np.maximum(np.abs(coarse.values), np.abs(fine.values)).max(axis=0) <= fine.noise)
     if not use.any():
         return 0.0, 0.0
-    relative = np.abs(fine.values[:, use] - coarse.values[:, use]).max(axis=0) / size[use]
+    there = ... if fine.between is None else ~fine.between
+    with np.errstate(all="ignore"):
+        relative = np.abs(fine.values - coarse.values)[there][:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative), relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
 
@@ -106,54 +141,101 @@ def _shifted(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
     return _achieved(apart, over <= 1.0, number + 1, last.tolerance)
 
 
-def control(run: Run, target: Floats, finest: float = FINEST, *, doubted: bool = False) -> Achieved:
+def _limited(failure: SolverFailure) -> bool:
+    """It ended because the caller wanted it to."""
+    return failure.cause in ("max_steps", "max_wall")
+
+
+def _draft(run: Run, tolerance: float, finest: float) -> Sampled:
+    """The first run; once more with a smaller tolerance where it fails."""
+    longest = STRETCH * LONGEST
+    try:
+        return run(min(tolerance / RATIO, LOOSEST), longest)
+    except SolverFailure as failure:
+        if _limited(failure) or failure.cause == "stiff":
+            raise
+        return run(max(1e-2 * tolerance, finest) / RATIO, longest)
+
+
+class _Estimate:
+    """The estimate of the last of two runs, and the power with which the errors fall."""
+
+    def __init__(self, law: Law, target: Floats) -> None:
+        self.law, self.target = law, target
+        self.over = self.apart = np.inf
+        self._before: tuple[float, float] | None = None
+        self._power: float | None = None
+
+    def compare(self, coarse: Sampled, fine: Sampled) -> float:
+        """Takes the pair in; returns the plain difference."""
+        step = float(np.log10(coarse.tolerance / fine.tolerance))
+        apart, over = difference(coarse, fine, self.target)
+        shrink = None
+        if self._before is not None:
+            over_before, step_before = self._before
+            if over > over_before:
+                shrink = 1.0  # no convergence seen: no credit for the smaller tolerance
+            elif over > 0.0 and np.isfinite(over_before):
+                self._power = float(np.clip(np.log10(over_before / over) / step_before, 0.3, 1.0))
+        if shrink is None:
+            credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, SHORT_CREDIT)
+            shrink = _shrink(credit if self._power is None else min(self._power, credit), step)
+        self._before = over, step
+        self.over, self.apart = over * shrink, apart * shrink
+        return apart
+
+    def next_tolerance(self, tolerance: float) -> float:
+        """The tolerance at which the next run should do, with the estimate's own safety.
+
+        What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
+        """
+        power = self.law.power if self._power is None else max(self._power, 0.5)
+        drop = (1.0 / max(1.5 * self.over, 1e-300)) ** (1.0 / power)
+        least = FIRST_DROP if self._power is None else 1e-3
+        return max(float(np.clip(drop, least, 0.2)) * tolerance, self.law.finest)
+
+
+def control(run: Run, target: Floats, law: Law, *, doubted: bool = False) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
 
-    finest: the smallest tolerance that makes sense for the method; doubted: another method failed here, and the first
-    pair of runs is not believed on its own.
+    doubted: another method failed here, and the first pair of runs is not believed on its own.
 
     Raises SolverFailure where the first runs fail.
     """
-    wanted = float(np.min(target, initial=1e-4))
-    tolerance = float(np.clip(wanted, finest / RATIO, COARSEST))
-    try:
-        last = run(tolerance, None)
-    except SolverFailure as failure:
-        if failure.cause in ("max_steps", "max_wall"):
-            raise
-        tolerance = max(1e-2 * tolerance, finest / RATIO)
-        last = run(tolerance, None)
-    before: float | None = None
-    power, last_step = POWER, 0.0
-    tolerance = max(RATIO * tolerance, finest)
-    estimate, relative = np.inf, np.inf
-    for number in range(2, RUNS + 1):
-        try:
-            now = run(tolerance, None)
-        except SolverFailure as failure:
-            if failure.cause in ("max_steps", "max_wall") or number == 2:
-                raise
-            # half the way to where it failed, while that is a smaller tolerance worth a run
-            tolerance = float(np.sqrt(tolerance * last.tolerance))
-            if tolerance > WORTH * last.tolerance:
-                return _achieved(relative, False, number, last.tolerance)
-            continue
-        step = float(np.log10(last.tolerance / now.tolerance))
-        apart, over = difference(last, now, target)
+    wanted = float(np.min(target, initial=1.0))
+    tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4)
+    last = _draft(run, tolerance, law.finest)
+    estimate, longest = _Estimate(law, target), LONGEST
+    tolerance = max(min(tolerance, RATIO * last.tolerance), law.finest)
+    number = 1
+    while number < RUNS:
+        number += 1
+        now = _finer(run, last, tolerance, longest, compared=number > 2)
+        if now is None:
+            break
+        apart = estimate.compare(last, now)
         if now.steps == last.steps and apart < ROUND_OFF:
             return _shifted(run, now, target, number)
-        if before is not None and before > 0.0 and 0.0 < over < before and last_step > 0.0:
-            power = float(np.clip(np.log10(before / over) / last_step, 0.3, 1.0))
-        shrink = _shrink(min(power, CREDIT), step)
-        if before is not None and over > before:
-            shrink = 1.0  # no convergence seen: no credit for the smaller tolerance
-        estimate, relative = over * shrink, apart * shrink
-        if estimate <= 1.0 and not (doubted and number == 2):
-            return _achieved(relative, True, number, now.tolerance)
-        if now.tolerance <= 1.01 * finest:
-            return _achieved(relative, False, number, now.tolerance)
-        before, last, last_step = over, now, step
-        # the tolerance at which the next run should do, with the estimate's own safety
-        drop = np.clip((1.0 / max(1.5 * estimate, 1e-300)) ** (1.0 / max(power, CREDIT)), 1e-3, 0.2)
-        tolerance = max(float(drop) * now.tolerance, finest)
-    return _achieved(relative, False, RUNS, last.tolerance)
+        if estimate.over <= 1.0 and not (doubted and number == 2):
+            return _achieved(estimate.apart, True, number, now.tolerance)
+        last, longest = now, longest / STRETCH
+        if now.tolerance <= 1.01 * law.finest:
+            break
+        tolerance = estimate.next_tolerance(now.tolerance)
+    return _achieved(estimate.apart, False, number, last.tolerance)
+
+
+def _finer(run: Run, last: Sampled, tolerance: float, longest: float, *, compared: bool) -> Sampled | None:
+    """A run with a smaller tolerance; where it fails half the way to it, while that is worth a run.
+
+    compared: there is an estimate without it; else its failure is raised.
+    """
+    while True:
+        try:
+            return run(tolerance, longest)
+        except SolverFailure as failure:
+            if _limited(failure) or not compared:
+                raise
+        tolerance = float(np.sqrt(tolerance * last.tolerance))
+        if tolerance > WORTH * last.tolerance:
+            return None

@@ -72,6 +72,7 @@ class Integration:
         self._light = light(system, jy, jyd)
         self._linear(jy, jyd)
         self.settler = self._settler("settled", self.roles.state[: system.form.written])
+        self.settler.core.contents.enough = request.settled_to
         stops = None if request.fixed_step else request.stops
         self.segments = segments(start.t, request.t_end, stops)
         self._stepper()

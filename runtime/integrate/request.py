@@ -28,7 +28,7 @@ class Request:
     (form 0); fixed_step [s]: no error test (bdf with max_order 1: the implicit Euler method); h_max [s]: longest step,
     None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the integration restarts
     (segments.py); least_norm: rows hold the least multipliers of redundant constraints; stiff_steps: dopri gives up
-    where stability holds it to more steps than these.
+    where stability holds it to more steps than these; settled_to: scaled residual of rows that will do, 0: round-off.
     """
 
     t_end: float
@@ -50,6 +50,7 @@ class Request:
     events: Plan | None = None
     begin: tuple[Floats, NDArray[np.bool_]] | None = None
     stiff_steps: float = 1e5
+    settled_to: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """The runs of one simulation, each of which writes a trace.
 
-The first run streams into the file itself; a finer run into a neighbour `.NAME.part` that takes its place when it is
-finished: whatever is killed, a readable trace stands at the path.
+The first run, a draft where the accuracy is controlled, streams into the file itself; a finer run into a neighbour
+`.NAME.part` that takes its place when it is finished: whatever is killed, a readable trace stands at the path.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import Sampled
+from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, drafted, joined, known
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
@@ -28,15 +29,37 @@ from sysdyn.runtime.trace.trace import Column, TraceWriter, columns_of
 from sysdyn.runtime.trace.trace_store import clear
 
 LONG = 1000
-"""Steps of the bdf after which method auto tries radau, and of a stiff dopri."""
+"""Steps of the bdf after which method auto tries radau."""
+HELD = 100
+"""Steps that a dopri which stability holds may still have to take before method auto tries another."""
 STIFF = 1e5
 """Steps that a stiff dopri which was asked for still takes."""
+
+ROUGH = 1e-3
+"""Of the tolerance: scaled residual of a draft's rows."""
+FORETOLD = 0.01
+"""Of the span: when a forecast is made."""
+BEHIND = 1.5
+"""Work of the run behind a draft over the draft's: a tenth of the tolerance at the orders of the methods."""
 
 METERS = {
     "audit.kinetic": 2, "audit.potential": 3, "audit.dissipated": 4, "audit.supplied": 5, "audit.energy": 6,
     "audit.constraints": 7,
 }  # fmt: skip
 """Places of the audit's members in a row."""
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A method on a form of the model; index: of the form as the error test takes it, name: as the trace names it;
+    reason: why method auto takes it.
+    """
+
+    method: str
+    system: System
+    index: int
+    name: str
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +81,13 @@ class Samples:
 class Runs:
     """The runs of one simulation: each writes a trace; the last finished one stands at the path."""
 
-    def __init__(self, system: System, start: ConsistentState, options: Options, index: int, method: str) -> None:
-        self.system, self.start, self.options, self.index, self.method = system, start, options, index, method
-        self.columns: tuple[Column, ...] = columns_of(system.description)
+    def __init__(self, start: ConsistentState, options: Options, way: Way) -> None:
+        self.start, self.options = start, options
+        self.take(way)
+        self.columns: tuple[Column, ...] = columns_of(self.system.description)
         # events write there: every run begins with these
-        self.begin = system.description.p.copy(), system.description.switches.active.copy()
-        self.names = _observed_names(system.description)
+        self.begin = self.system.description.p.copy(), self.system.description.switches.active.copy()
+        self.names = _observed_names(self.system.description)
         self.instants, self.kinds = instants(options)
         self.path = Path(options.output)
         self.target = self.path.resolve()
@@ -72,34 +96,46 @@ class Runs:
         self.statistics, self.last_statistics = Statistics(), Statistics()
         self.cpu = self.wall = 0.0
         self.number = 0
-        self.patience: int | None = None
         self.began = time.monotonic()
         self.writer: TraceWriter | None = None
         self.finished: Finished | None = None
         self.rows: list[Floats] = []
         self.samples: list[Floats] = []
         self.done: tuple[Finished, list[Floats], TraceWriter] | None = None
-        self.samplings: tuple[tuple[Floats, Sampled], ...] = ()
+        self.samplings: tuple[Sampled, ...] = ()
+        self.jumps: Floats | None = None
+        self.controlled = False
+        self.forecast: float | None = None
+        self.common = known(self.instants, options)
+
+    def take(self, way: Way) -> None:
+        """Goes on with another method and form."""
+        self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
+        self.patience: int | None = None
 
     def request(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Request:
         """One integration's request; longest: step, as part of the span."""
         options = self.options
+        instants, kinds = self.instants, self.kinds
+        if self.controlled and self.common is not None:
+            instants, kinds = (drafted if self.done is None else joined)(instants, kinds, self.common)
         left = None if options.max_wall is None else options.max_wall - (time.monotonic() - self.began)
         return Request(
             t_end=options.t_end,
-            instants=self.instants,
-            instant_kinds=self.kinds,
+            instants=instants,
+            instant_kinds=kinds,
             every_step=options.every is None,
             sample_steps=options.sample_steps,
             rtol=rtol,
             atol=atol,
             max_steps=self.most_steps,
             max_wall=left,
-            h_max=longest * (options.t_end - options.t_start),
+            h_max=min(longest * (options.t_end - options.t_start), longest / LONGEST * (options.longest or np.inf)),
             index=self.index,
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
-            stiff_steps=LONG if options.method == "auto" else STIFF,
+            stiff_steps=HELD if options.method == "auto" else STIFF,
+            settled_to=ROUGH * rtol if self.controlled and self.done is None else 0.0,
             events=options.events or None,
             begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
@@ -120,54 +156,77 @@ class Runs:
     def _write(self, rows: Floats) -> None:
         kind = rows[:, 1].astype(np.int32)
         traced = rows[(kind & TRACE) > 0]
+        self._compare(rows, kind)
         assert self.writer is not None
         self.writer.append(traced)
-        compared = rows[(kind & COMPARED) > 0]
-        if compared.size:
-            self.rows.append(compared)
         taken = rows[(kind & (TRACE | STEP)) > 0]
         if taken.size:
             kept = taken[self.watched(taken[:, 0], self._observed(taken))] if self.watched is not None else taken[:0]
             self.samples = [*self.samples[:-1], *([kept] if kept.size else []), taken[-1:]]
+
+    def _compare(self, rows: Floats, kind: Ints) -> None:
+        """Keeps what runs are compared by: the first one's own rows, thinned; later the rows at these instants."""
+        if self.common is None:
+            self.thinned.take(rows[(kind & TRACE) > 0])
+        elif (kind & COMPARED).any():
+            self.rows.append(rows[(kind & COMPARED) > 0])
 
     def _observed(self, rows: Floats) -> Floats:
         return rows[:, lib.ROW_HEAD : lib.ROW_HEAD + len(self.names)]
 
     def _progress(self, t: float) -> None:
         options = self.options
+        span = options.t_end - options.t_start
+        fraction = (t - options.t_start) / span if span > 0.0 else 1.0
+        left = self._left(fraction)
         if options.progress is not None:
-            span = options.t_end - options.t_start
-            fraction = (t - options.t_start) / span if span > 0.0 else 1.0
-            spent = time.monotonic() - self.run_began
-            options.progress(fraction, spent * (1.0 - fraction) / fraction if fraction > 0.01 else None)
+            options.progress(fraction, left)
+
+    def _left(self, fraction: float) -> float | None:
+        """Seconds to the end of the runs that are foreseen; None before a hundredth of the first."""
+        if not FORETOLD <= fraction < 1.0:
+            return None if fraction < 1.0 else 0.0
+        spent = time.monotonic() - self.run_began
+        whole = spent / fraction
+        left = whole - spent + (BEHIND * whole if self.controlled and self.done is None else 0.0)
+        if self.forecast is None:
+            self.forecast = time.monotonic() - self.began + left
+        return left
 
     def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
-        self.number += 1
         first = self.done is None
         target = self.target if first else self._part
         attributes: dict[str, str | float | int] = {
             **self.options.attributes,
             "method": self.method,
+            "index": self.way.name,
             "rtol": float(rtol),
             "atol": float(atol or 0.0),
         }
-        self.rows, self.samples = [], []
+        self.samples = []
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
-        self.run_began = wall = time.monotonic()
         self.writer = TraceWriter(target, self.columns, len(self.names), attributes, self.options.parameters)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest))
         try:
-            finished = integration.run(self._write, self._progress)
+            finished = self._integrate(integration)
         except BaseException:
-            self._account(integration, wall)
             self._leave(integration, first)
             raise
-        self._account(integration, wall)
         self.writer.flush()
         self._take(first)
         self.done, self.finished = (finished, self.samples, self.writer), finished
         return finished
+
+    def _integrate(self, integration: Integration) -> Finished:
+        """To its end, or SolverFailure; in both cases its work is accounted for."""
+        self.number += 1
+        self.rows, self.thinned = [], Thinned()
+        self.run_began = time.monotonic()
+        try:
+            return integration.run(self._write, self._progress)
+        finally:
+            self._account(integration, self.run_began)
 
     def _account(self, integration: Integration, wall: float) -> None:
         self.cpu += integration.cpu
@@ -231,27 +290,41 @@ class Runs:
         return {**asdict(self.statistics), "error_estimate": error_estimate}
 
     def timings(self) -> dict[str, float]:
-        """cpu_integrate_s, wall_integrate_s, cpu_compile_s, wall_total_s."""
+        """cpu_integrate_s, wall_integrate_s, cpu_compile_s, wall_total_s; forecast_s of a longer one."""
         began = self.options.wall_began
         total = time.monotonic() - (self.began if began is None else began)
+        foretold = {} if self.forecast is None else {"forecast_s": self.forecast}
         return {
+            **foretold,
             "cpu_integrate_s": self.cpu,
             "wall_integrate_s": self.wall,
             "cpu_compile_s": self.options.cpu_compile,
             "wall_total_s": total,
         }
 
-    def sampled(self, tolerance: float, longest: float | None) -> Sampled:
-        """One run of the accuracy control; longest: step, as part of the span (None: LONGEST)."""
-        finished = self.run(tolerance, None, LONGEST if longest is None else longest)
+    def sampled(self, tolerance: float, longest: float) -> Sampled:
+        """One run of the accuracy control; longest: step, as part of the span."""
+        self.controlled = True
+        finished = self.run(tolerance, None, longest)
+        if self.common is None:
+            self.common = common(self.thinned.time, self.options)
+            rows = self.thinned.rows(self.common)
+        else:
+            rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self._width))
         places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
-        rows = np.concatenate(self.rows) if self.rows else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
         sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
         noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(self.meters)))
-        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise)
-        self.samplings = (*self.samplings[-1:], (rows[:, 0], found))
+        jumps = np.unique([e.time for e in finished.events])
+        last, self.jumps = self.jumps, jumps
+        between = beside(self.common, jumps if last is None else last, jumps, self.options.t_end - self.options.t_start)
+        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise, between)
+        self.samplings = (*self.samplings[-1:], found)
         return found
+
+    @property
+    def _width(self) -> int:
+        return lib.ROW_HEAD + 2 * len(self.names)
 
     @property
     def meters(self) -> tuple[str, ...]:
@@ -276,18 +349,20 @@ class Runs:
         """
         asked = {name: float(wanted) for name, wanted in zip(self.compared, target, strict=True)}
         name = min(asked, key=lambda n: asked[n], default="")
-        if len(self.samplings) < 2 or self.samplings[0][1].values.shape != self.samplings[1][1].values.shape:
+        if len(self.samplings) < 2 or self.samplings[0].values.shape != self.samplings[1].values.shape:
             return name, asked.get(name, 0.0), None
-        (time, one), (_, two) = self.samplings
-        size = two.largest
+        one, two = self.samplings
+        assert self.common is not None
+        size = (one if one.tolerance < two.tolerance else two).largest
         with np.errstate(all="ignore"):
             ratio = np.abs(two.values - one.values) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
         ratio = np.where(one.values == two.values, 0.0, ratio)
+        ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
         name = self.compared[k]
-        return name, asked[name], float(time[beyond[0]]) if beyond.size else None
+        return name, asked[name], float(self.common[beyond[0]]) if beyond.size else None
 
     def collected(self) -> Samples:
         """Samples of the run that stands in the trace."""

@@ -79,7 +79,7 @@ def test_simulate(tmp_path, capsys):
     conforms(result["statistics"], STATISTICS)
     conforms(result["timings"], TIMINGS)
     assert result["trace"] == "model-swing.h5"
-    assert (result["final"], result["reached"], result["index"]) == (True, 1.0, "2")
+    assert (result["final"], result["reached"], result["index"]) == (True, 1.0, "0")
     (claim,) = result["expects"]
     conforms(claim, EXPECT)
     assert claim["ok"] is True

@@ -55,8 +55,8 @@ def test_trace_of_accepted_steps_holds_the_instants_asked_for(tmp_path):
     trace = Trace.open(tmp_path / "o.h5")
     assert {0.0, 0.4, 1.0, 4.0} <= set(trace.time.tolist())
     assert (np.diff(trace.time) > 0).all()
-    assert result.index == "2"
-    assert trace.time.size > 40
+    assert (result.method, result.index) == ("dopri", "0")
+    assert trace.time.size > 20
     # derivatives are those of the quantity
     assert np.allclose(trace["q1"].derivative, trace["f1"].values, atol=1e-14)
     with pytest.raises(WrongOption, match="outside"):
@@ -90,11 +90,11 @@ def test_accuracy_on_one_quantity(tmp_path):
 
 def test_failing_run_leaves_a_readable_trace(tmp_path):
     with pytest.raises(SolverFailure) as caught:
-        outcome(models.mass_spring(), tmp_path / "o.h5", 10.0, max_steps=40)
+        outcome(models.mass_spring(), tmp_path / "o.h5", 10.0, max_steps=12)
     trace = Trace.open(tmp_path / "o.h5")
     assert trace.attributes["final"] == 0
     assert not trace.final
-    assert trace.time.size > 10
+    assert trace.time.size == 13
     assert trace.time[-1] == pytest.approx(caught.value.partial.reached)
     assert caught.value.partial.final is False
     assert trace["q_x"].nominal >= np.abs(trace["q_x"].values).max() * 0.999

@@ -1,0 +1,171 @@
+"""Bounds of an expression of time over intervals of it: interval arithmetic on the expression's own nodes.
+
+An enclosure holds every value that the expression takes in the interval, and more where a variable occurs twice; it
+shrinks to the values as the interval does (Moore, Interval Analysis, 1966).  Rounding is not directed: what is looked
+for is larger by far.  Where nothing is known of an operation, or it has a pole inside, the bound is infinite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.dsl.model.expression import Node, topological_unbound, variables
+
+Array = NDArray[np.float64]
+Bounds = tuple[Array, Array]
+Values = Callable[[Sequence[Node]], list[Array]]
+"""Values of nodes that do not depend on time."""
+Outline = Callable[[Array, Array], Bounds]
+"""Bounds of a table of one argument over intervals of it."""
+
+_RISING: Mapping[str, Callable[[Array], Array]] = {
+    "exp": np.exp, "ln": np.log, "log10": np.log10, "atan": np.arctan, "tanh": np.tanh, "sinh": np.sinh,
+    "asinh": np.arcsinh, "acosh": np.arccosh, "asin": np.arcsin, "atanh": np.arctanh, "sign": np.sign,
+    "floor": np.floor, "ceil": np.ceil, "step": lambda x: np.where(x >= 0.0, 1.0, 0.0), "signal": lambda x: x,
+}  # fmt: skip
+
+
+def _ordered(*ends: Array) -> Bounds:
+    """The least and the largest of some values; no numbers are no bounds."""
+    every = np.stack(np.broadcast_arrays(*ends))
+    wrong = np.isnan(every).any(axis=0)
+    low, high = every.min(axis=0), every.max(axis=0)
+    return np.where(wrong, -np.inf, low), np.where(wrong, np.inf, high)
+
+
+def _product(a: Bounds, b: Bounds) -> Bounds:
+    with np.errstate(invalid="ignore"):
+        ends = [np.where((x == 0.0) | (y == 0.0), 0.0, x * y) for x in a for y in b]
+    return _ordered(*ends)
+
+
+def _power(a: Bounds, exponent: float) -> Bounds:
+    low, high = a
+    around = (low <= 0.0) & (high >= 0.0)
+    with np.errstate(all="ignore"):
+        if exponent == round(exponent):
+            found = _ordered(low**exponent, high**exponent)
+            if exponent > 0:
+                least = np.where(around & (exponent % 2 == 0), 0.0, found[0])
+                return least, found[1]
+            return np.where(around, -np.inf, found[0]), np.where(around, np.inf, found[1])
+        found = _ordered(np.maximum(low, 0.0) ** exponent, np.maximum(high, 0.0) ** exponent)
+    return found
+
+
+def _wave(a: Bounds, shift: float) -> Bounds:
+    """Bounds of cos(x - shift)."""
+    low, high = a[0] - shift, a[1] - shift
+    turn = 2.0 * np.pi
+    with np.errstate(invalid="ignore"):
+        top = np.floor(high / turn) >= np.ceil(low / turn)
+        bottom = np.floor((high - np.pi) / turn) >= np.ceil((low - np.pi) / turn)
+        found = _ordered(np.cos(low), np.cos(high))
+    return np.where(bottom, -1.0, found[0]), np.where(top, 1.0, found[1])
+
+
+def _called(name: str, args: list[Bounds]) -> Bounds:
+    a = args[0]
+    if name in _RISING:
+        with np.errstate(all="ignore"):
+            found = _RISING[name]
+            return _ordered(found(a[0]), found(a[1]))
+    if name in ("sin", "cos"):
+        return _wave(a, 0.5 * np.pi if name == "sin" else 0.0)
+    if name == "acos":
+        with np.errstate(all="ignore"):
+            return _ordered(np.arccos(a[0]), np.arccos(a[1]))
+    if name in ("abs", "cosh"):
+        size = np.maximum(np.abs(a[0]), np.abs(a[1]))
+        least = np.where((a[0] <= 0.0) & (a[1] >= 0.0), 0.0, np.minimum(np.abs(a[0]), np.abs(a[1])))
+        with np.errstate(over="ignore"):
+            return (least, size) if name == "abs" else (np.cosh(least), np.cosh(size))
+    if name in ("min", "max"):
+        pick = np.minimum if name == "min" else np.maximum
+        return pick(a[0], args[1][0]), pick(a[1], args[1][1])
+    if name == "mod":
+        b = args[1]
+        with np.errstate(all="ignore"):
+            turns = np.floor(a[0] / b[0])
+            one = (b[0] == b[1]) & (turns == np.floor(a[1] / b[0]))
+            low, high = a[0] - b[0] * turns, a[1] - b[0] * turns
+        return np.where(one, low, np.minimum(b[0], 0.0)), np.where(one, high, np.maximum(b[1], 0.0))
+    if name == "hypot":
+        squares = [_power(x, 2.0) for x in args]
+        return np.sqrt(squares[0][0] + squares[1][0]), np.sqrt(squares[0][1] + squares[1][1])
+    if name == "atan2":
+        return np.full_like(a[0], -np.pi), np.full_like(a[0], np.pi)
+    return np.full_like(a[0], -np.inf), np.full_like(a[0], np.inf)
+
+
+def _truth(node: Node, args: list[Bounds]) -> Bounds:
+    """Bounds of a condition: 0 false, 1 true."""
+    if node.op == "not":
+        return 1.0 - args[0][1], 1.0 - args[0][0]
+    if node.op in ("and", "or"):
+        pick = np.minimum if node.op == "and" else np.maximum
+        return pick.reduce([a[0] for a in args]), pick.reduce([a[1] for a in args])
+    (low, high), (left, right) = args
+    sure, never = {
+        "<": (high < left, low >= right),
+        "<=": (high <= left, low > right),
+        ">": (low > right, high <= left),
+        ">=": (low >= right, high < left),
+    }.get(node.data, (np.zeros_like(low, bool), (high < left) | (low > right)))
+    if node.data == "!=":
+        sure, never = never, sure
+    return np.where(sure, 1.0, 0.0), np.where(never, 0.0, 1.0)
+
+
+def _combined(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -> Bounds:
+    match node.op:
+        case "sum":
+            low = high = np.full_like(args[0][0], node.data[0])
+            for c, (a, b) in zip(node.data[1], args, strict=True):
+                low, high = (low + c * a, high + c * b) if c > 0.0 else (low + c * b, high + c * a)
+            return low, high
+        case "mul":
+            found = _power(args[0], node.data[0])
+            for e, bounds in zip(node.data[1:], args[1:], strict=True):
+                found = _product(found, _power(bounds, e))
+            return found
+        case "pow":
+            with np.errstate(all="ignore"):
+                return _ordered(*(np.power(np.maximum(x, 0.0), y) for x in args[0] for y in args[1]))
+        case "call":
+            return _called(node.data, args)
+        case "cond":
+            (never, sure), then, other = args
+            low = np.where(never == 1.0, then[0], np.where(sure == 0.0, other[0], np.minimum(then[0], other[0])))
+            high = np.where(never == 1.0, then[1], np.where(sure == 0.0, other[1], np.maximum(then[1], other[1])))
+            return low, high
+        case "cmp" | "and" | "or" | "not":
+            return _truth(node, args)
+        case "table" if len(args) == 1 and node.data[1] == 0 and node.data[0] in outlines:
+            return outlines[node.data[0]](*args[0])
+        case _:
+            return np.full_like(args[0][0], -np.inf), np.full_like(args[0][0], np.inf)
+
+
+def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mapping[str, Outline]) -> Bounds:
+    """Bounds of `root`, which depends on time alone, over the intervals low..high [s] [k]."""
+    order = topological_unbound([root])
+    if not variables(root):
+        value = np.broadcast_to(np.asarray(fixed([root])[0], dtype=float), low.shape)
+        return value, value
+    still = [n for n in order if not variables(n)]
+    points = dict(zip(still, fixed(still), strict=True))
+    found: dict[Node, Bounds] = {}
+    for node in order:
+        if node in points:
+            value = np.broadcast_to(np.asarray(points[node], dtype=float), low.shape)
+            found[node] = value, value
+        elif node.op == "time":
+            found[node] = low, high
+        else:
+            with np.errstate(all="ignore"):
+                bounds = _combined(node, [found[a] for a in node.args if a in found], outlines)
+            found[node] = _ordered(*bounds)
+    return found[root]

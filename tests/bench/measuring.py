@@ -1,0 +1,119 @@
+"""Runs of one model for measurements: prepared once, run with many options, compared with a reference of its own.
+
+Errors are those of every row that a run stored, against one finer run that stores rows at all these instants; relative
+to the trace's nominal magnitudes.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.running import Request, options_of, ready
+from sysdyn.cli.run.running import _stops as stops_of
+from sysdyn.cli.run.sizes import sizes
+from sysdyn.cli.run.starting import start
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
+from sysdyn.runtime.simulate import simulate
+from sysdyn.runtime.trace.trace import Trace
+
+MODELS = Path(__file__).resolve().parents[2] / "models"
+LONGEST_RUN = 20.0
+"""Seconds after which a run is given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One command's integration.  cpu: cpu_integrate_s, the least of all repetitions; estimate: None where none."""
+
+    cpu: float
+    estimate: float | None
+    met: bool
+    steps: int
+    method: str
+    time: np.ndarray
+    values: dict[str, np.ndarray]
+    nominal: dict[str, float]
+
+
+def names(*rooms: str) -> list[str]:
+    """room/NAME of every model of these rooms."""
+    return [f"{room}/{p.stem}" for room in rooms for p in sorted((MODELS / room).glob("*.sd"))]
+
+
+class Bench:
+    """A model under its scene `reference` and one formulation."""
+
+    def __init__(self, name: str, folder: Path, formulation: str | None = None) -> None:
+        path = MODELS / f"{name}.sd"
+        report = Report()
+        self.trace = folder / "trace.h5"
+        settings = sizes(str(path))[1]
+        request = Request(str(path), "reference", formulation=formulation, output=str(self.trace), settings=settings)
+        target = targets.one(targets.read(str(path), report), str(path), None, "reference", report)
+        assert target is not None, [d.message for d in report.diagnostics]
+        with ex.fresh():
+            prepared = ready(request, target, report)
+            if prepared is None:
+                raise NoSuchForm(f"{name}: {formulation}")
+            began = time.monotonic()
+            options = options_of(request, target, prepared, report, began, None)
+            assert options is not None
+            started = start(prepared, options.t_start, report, options.redundancy)
+            assert started is not None, [d.message for d in report.diagnostics]
+            options = replace(options, stops=stops_of(prepared, options, report), watch=None, sampled_at=())
+        self.prepared, self.started = prepared, started
+        self.options = replace(options, sample_steps=False, max_wall=LONGEST_RUN, accuracy_on=())
+
+    def run(self, repetitions: int = 1, **options: object) -> Measured | None:
+        """None where the run failed."""
+        cpu = np.inf
+        asked = replace(self.options, **options)  # type: ignore[arg-type]
+        for _ in range(repetitions):
+            try:
+                outcome = simulate(
+                    self.prepared.manifest,
+                    self.prepared.arrays,
+                    self.prepared.carrier,
+                    asked,
+                    start=self.started.state,
+                    facts=self.started.facts,
+                )
+            except (SolverFailure, NoSuchForm):
+                return None
+            cpu = min(cpu, outcome.timings["cpu_integrate_s"])
+        trace = Trace.open(self.trace)
+        instants = np.array(trace.time)
+        # an instant stands twice where the text jumps: the row before is left out
+        keep = np.append(np.diff(instants) > 0.0, True)
+        columns = {name: np.asarray(trace[name])[keep] for name in trace.names}
+        nominal = {name: float(trace[name].nominal) for name in trace.names}
+        steps = outcome.statistics["steps"]
+        return Measured(
+            cpu, outcome.error_estimate, outcome.met, steps, outcome.method, instants[keep], columns, nominal
+        )
+
+
+class Reference:
+    """A run at `rtol` with rows at all instants of the runs it is to judge."""
+
+    def __init__(self, bench: Bench, runs: list[Measured], rtol: float = 1e-15) -> None:
+        at = np.unique(np.concatenate([run.time for run in runs]))
+        found = bench.run(accuracy=None, rtol=rtol, method="radau", index="auto", at=tuple(at), max_wall=120.0)
+        assert found is not None
+        self.found = found
+
+    def error(self, run: Measured) -> float:
+        """Largest relative error of any traced quantity at any row."""
+        place = np.searchsorted(self.found.time, run.time)
+        worst = 0.0
+        for name, values in run.values.items():
+            size = self.found.nominal[name]
+            if size > 0.0:
+                worst = max(worst, float(np.abs(values - self.found.values[name][place]).max()) / size)
+        return worst

@@ -1,0 +1,124 @@
+"""What an accuracy asked for costs, and how honest it is: python tests/bench/price.py [--accuracy A,...] [NAME...]
+
+Price: cpu_integrate_s of a run with --accuracy over the cheapest single run of ours (any method, tolerances by half
+decades) whose error is no larger than the larger of the accuracy and the error that the run achieved.  Honesty: the
+error achieved over the accuracy asked, and the estimate over the error.  One row a model and accuracy, then a summary.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from measuring import Bench, Measured, Reference, names
+
+TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(2, 25))
+METHODS = ("bdf", "radau", "dopri")
+FLOOR = 1e-11
+"""Errors below are those of the reference."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One run with --accuracy.  steps: of all its runs; best: method of the cheapest single run."""
+
+    name: str
+    asked: float
+    achieved: float
+    estimate: float
+    price: float
+    steps: int
+    met: bool
+    method: str
+    best: str
+
+    def __str__(self) -> str:
+        believed = self.estimate / max(self.achieved, 1e-300)
+        numbers = f"{self.asked:8.0e} {self.achieved:9.1e} {self.achieved / self.asked:8.3f} {self.estimate:9.1e}"
+        verdict = "met" if self.met else "NOT"
+        methods = f"{self.method} ({self.best})"
+        return f"{self.name:34s} {numbers} {believed:9.2f} {self.price:7.2f} {self.steps:7d} {verdict} {methods}"
+
+
+HEAD = f"{'model':34s}    asked  achieved    ratio  estimate  believed   price   steps     method (cheapest)"
+
+
+def singles(bench: Bench, finest: float, seconds: float) -> list[Measured]:
+    """Single runs of every method from coarse tolerances to well below `finest`."""
+    found: list[Measured] = []
+    for method in METHODS:
+        for rtol in TOLERANCES:
+            if rtol < 0.9e-3 * finest:
+                break
+            run = bench.run(2, accuracy=None, rtol=rtol, method=method, max_steps=20_000, max_wall=seconds)
+            if run is not None:
+                found.append(run)
+            elif found and found[-1].method == method:
+                break  # a smaller tolerance takes longer
+    return found
+
+
+def rows(name: str, accuracies: list[float], formulation: str | None, seconds: float) -> list[Row]:
+    """One row an accuracy."""
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(name, Path(folder), formulation)
+        single = singles(bench, min(accuracies), seconds)
+        runs = [(a, run) for a in accuracies if (run := bench.run(3, accuracy=a)) is not None]
+        reference = Reference(bench, [*single, *(run for _, run in runs)])
+        errors = [(run.cpu, reference.error(run), run.method) for run in single]
+        found = []
+        for accuracy, run in runs:
+            achieved = reference.error(run)
+            enough = [(cpu, method) for cpu, error, method in errors if error <= max(accuracy, achieved)]
+            cpu, best = min(enough, default=(np.nan, ""))
+            estimate = np.nan if run.estimate is None else run.estimate
+            price = run.cpu / cpu
+            found.append(Row(name, accuracy, achieved, estimate, price, run.steps, run.met, run.method, best))
+        return found
+
+
+def summary(found: list[Row]) -> str:
+    """Shares over all rows."""
+    ratio = np.array([row.achieved / row.asked for row in found])
+    met = np.array([row.met for row in found])
+    price = np.array([row.price for row in found if np.isfinite(row.price)])
+    believed = np.array([row.estimate / row.achieved for row in found if row.met and row.achieved > FLOOR])
+    mean = np.exp(np.log(price).mean())
+    inside = (ratio >= 0.01) & (ratio <= 3.0)
+    lies = int((met & (ratio > 3.0)).sum())
+    return "\n".join(
+        [
+            f"{len(found)} runs, {int(met.sum())} met; over 3 times what was asked, yet met: {lies}",
+            f"price: geometric mean {mean:.2f}, median {np.median(price):.2f}, largest {price.max():.1f}",
+            f"achieved over asked in [0.01, 3]: {inside.mean():.2f}, below {(ratio < 0.01).mean():.2f}",
+            f"estimate below a third of the error: {(believed < 1 / 3).mean():.3f}; median {np.median(believed):.2f}",
+        ]
+    )
+
+
+def main() -> None:
+    """The table and its summary."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--accuracy", default="1e-2,1e-4,1e-6")
+    parser.add_argument("--formulation")
+    parser.add_argument("--seconds", type=float, default=5.0, help="after which a single run is given up")
+    parser.add_argument("name", nargs="*")
+    given = parser.parse_args()
+    accuracies = [float(a) for a in given.accuracy.split(",")]
+    found: list[Row] = []
+    print(HEAD)
+    for name in given.name or names("seed", "benchmark"):
+        for row in rows(name, accuracies, given.formulation, given.seconds):
+            found.append(row)
+            print(row, flush=True)
+    print(summary(found))
+
+
+if __name__ == "__main__":
+    main()
