@@ -31,6 +31,8 @@ def rows(name: str, formulation: str, accuracies: list[float]) -> list[Row]:
         except (NoSuchForm, ModelError):
             return []
         runs = [(a, run) for a in accuracies if (run := bench.run(accuracy=a)) is not None]
+        if not runs:
+            return []
         reference = Reference(bench, [run for _, run in runs])
         where = f"{name} {formulation}"
         return [row(where, a, reference.error(run), run) for a, run in runs]

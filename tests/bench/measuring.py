@@ -59,8 +59,8 @@ class Bench:
         assert target is not None, [d.message for d in report.diagnostics]
         with ex.fresh():
             prepared = ready(request, target, report)
-            if prepared is None:
-                raise NoSuchForm(f"{name}: {formulation}")
+            if prepared is None or prepared.network.events or prepared.network.switches:
+                raise NoSuchForm(f"{name}: {formulation}")  # values beside a jump are of instants, not of errors
             began = time.monotonic()
             options = options_of(request, target, prepared, report, began, None)
             assert options is not None
