@@ -25,7 +25,7 @@ EPS = 1e-13
 """Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
-GRANTED = 3e9
+GRANTED = 3.6e9
 """Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
 ITERATIONS = 40
 """Iterations that a search may take however large they are."""
@@ -34,7 +34,7 @@ EVALUATION = 1e6
 EACH = 40.0
 """Operations that an entry of the matrix takes in an evaluation."""
 _ITERATIONS = 60
-_FOLDS = 709
+FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number."""
 _HALVINGS = 12
 EMPTY = 1e-160
@@ -189,17 +189,20 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
     return found[:unknowns]
 
 
-def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
-    """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
+def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) -> Solution:
+    """From x towards the solution nearest to problem.guess; the best point met in so many iterations.
+
+    folds: iterations that are not counted while rows shrink as fast as their terms do.
+    """
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
-        return _solve(problem, x, most)
+        return _solve(problem, x, most, folds)
 
 
-def _solve(problem: Problem, x: Floats, most: int) -> Solution:
+def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
     stale, taken = 0, 0
-    for _ in range(most + _FOLDS):
+    for _ in range(most + folds):
         if taken == most:
             break
         taken += 1
