@@ -136,6 +136,7 @@ def _network(
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
+    _begin(elaborator, read_scene)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
         events.expanded(elaborator, known)
@@ -195,6 +196,15 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         switches=tuple(parts.switches),
         read=nodes_read(parts),
     )
+
+
+def _begin(elaborator: Elaborator, scene: Scene | None) -> None:
+    """Discrete variables that begin with a value of time begin with that of the scene's start."""
+    parameters = elaborator.parts.parameters
+    start = {ex.time(): ex.const(0.0) if scene is None or scene.start is None else scene.start}
+    for name in elaborator.parts.discretes:
+        p = parameters[name]
+        parameters[name] = replace(p, values=tuple(ex.substitute(v, start) for v in p.values))
 
 
 def _incomplete(report: Report) -> bool:

@@ -230,8 +230,8 @@ def _runs(runs: Runs, written: System, name: str, facts: Structure, warnings: tu
     ended = outcome(True, options.t_end, achieved, None)
     lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, ended.error_estimate))
     below = achieved is not None and achieved.below_round_off
-    said = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
-    return replace(ended, **said)
+    ended = replace(ended, below_round_off=below, cancelled=lost, events=finished.events)
+    return replace(ended, judgement=judgement)
 
 
 def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

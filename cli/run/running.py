@@ -225,7 +225,8 @@ def options_of(
 def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
     """Instants at which the text jumps or has kinks in time."""
     tables = prepared.network.tables
-    found = instants(prepared.compiled.form, prepared.binding, options.t_start, options.t_end, tables)
+    read = [o.expression for o in prepared.network.observations if not o.stored]
+    found = instants(prepared.compiled.form, prepared.binding, options.t_start, options.t_end, tables, read)
     if found.note:
         report.note("N608", found.note, prepared.network.place)
     return found.times

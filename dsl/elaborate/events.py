@@ -64,12 +64,12 @@ def discrete(frame: Frame, s: syntax.Discrete) -> None:
     if value.dimension is not None and value.dimension != unit.dimension:
         message = f"'{decl.name}' is declared {dim.show(unit.dimension)} but starts at {dim.show(value.dimension)}"
         raise resolver.fail("E207", message, s.value.span)
-    for inner in ex.variables(value.node):
+    for inner in ex.variables(value.node) - {ex.time()}:
         raise resolver.fail(
             "E807",
             f"the initial value of '{decl.name}' depends on '{inner}'",
             s.value.span,
-            help="parameters and constants only",
+            help="parameters, constants and t only",
         )
     family, place = frame.current.family(decl.name), frame.place(decl.span)
     frame.enter(ParameterSymbol(decl.name, family, unit.dimension, value.truth, place))

@@ -91,6 +91,8 @@ class Handler:
                 found += [Watched(k, -1, r.row, s) for s in ((int(side),) if side else (1, -1))]
         for k, c in enumerate(self.plan.contacts):
             sticks = bool(self.contacts.active[k])
+            if self.contacts.barred[k]:
+                continue
             if c.kind == "friction":
                 rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)
                 found += [Watched(-1, k, row, side) for row, side in rows]
@@ -150,6 +152,12 @@ class Handler:
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
+    def turned(self, t: float, y: Floats, yd: Floats) -> list[Watched]:
+        """The relations that an instant at which the text jumps leaves on another side."""
+        values = self.observer(t, y, yd)
+        found = [w for w in self.watched() if w.relation >= 0]
+        return [w for w in found if w.side * values[w.row] < -self.observer.zero(w.row)]
+
     def _rate(self, watched: Watched) -> int:
         """The row of the rate of what is watched, where there is one."""
         if watched.contact < 0:
@@ -185,7 +193,19 @@ class Handler:
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
         if not (changed or touched):
             return None
-        return self.settled(t, y, yd, said, touched)
+        return self._followed(t, self.settled(t, y, yd, said, touched))
+
+    def _followed(self, t: float, point: Point) -> Point:
+        """The point after the conditions that became true where the constraints were found anew."""
+        for _ in range(CASCADE):
+            fired = self._risen(())
+            if not fired:
+                return point
+            said = [self.contacts.word(k) for k in range(len(self.plan.contacts))]
+            y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
+            self._renew(t, y, point[1])
+            point = self.settled(t, y, point[1], said)
+        raise SolverFailure("chatter", t, 0.0, self._names())
 
     def settled(
         self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
