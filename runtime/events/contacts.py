@@ -52,6 +52,8 @@ class Contacts:
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
+        self.singular: Callable[[float, Floats, Floats], bool] | None = None
+        self._contradicts: set[tuple[bool, ...]] = set()
         self.fastest = np.zeros(len(contacts))
         self.time = 0.0
         places = self.switches.places
@@ -200,7 +202,7 @@ class Contacts:
             if state in seen:  # another order of pivots: from the other end
                 changed.reverse()
             seen.add(state)
-            found = settle(t, y, yd) or self._beside(t, y, yd, settle, seen)
+            found = self._settled_by(t, y, yd, settle) or self._beside(t, y, yd, settle, seen)
             if found is None:
                 break
             values = self.observer(t, found[0], found[1])
@@ -227,10 +229,20 @@ class Contacts:
             self.apply()
             if turned and self.state() not in seen:
                 seen.add(self.state())
-                found = settle(t, y, yd)
+                found = self._settled_by(t, y, yd, settle)
                 if found is not None:
                     return found
         return None
+
+    def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
+        """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
+        key = tuple(self.active.tolist())
+        if key in self._contradicts:
+            return None
+        found = settle(t, y, yd)
+        if found is None and self.singular is not None and self.singular(t, y, yd):
+            self._contradicts.add(key)
+        return found
 
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
