@@ -231,7 +231,8 @@ class Handler:
                     self.contacts.turn(k, values)
             self.contacts.apply()
             found = self.determined.fit(t, y, yd, restart.struck, touched)
-            if touched and self.contacts.state() == stood:
+            tied = any(self.contacts.contacts[k].kind != "phi" for k in touched)  # a gap may have bounced
+            if tied and self.contacts.state() == stood:
                 found = self._ahead(t, found, stood) or found
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
