@@ -241,8 +241,9 @@ class Handler:
         return found
 
     def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
-        """The point with the active set that fits a little later, where at t itself the old one fits as well as the new:
-        a multiplier that is zero and falls.  None where none differs.
+        """The point with the active set that fits a little later, None where none differs.
+
+        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.
         """
         assert self.restart is not None
         y, yd = point
