@@ -103,3 +103,40 @@ def test_a_half_wave_into_a_coil(formulation, tmp_path):
         wanted += np.where((s > 0.0) & (s < 0.0195) & (wave > 0.0), wave, 0.0)
     assert np.abs(trace["i"].values - wanted).max() < 1e-5
     assert len(trace.events) == 4
+
+
+BUCK = """from std.electrical import switch, diode, voltage, inductor, resistor, pwm
+model m {
+  node i, x, o: electrical
+  V: voltage(v = 24 V) i -> ground
+  P: pwm(period = 20 us, duty = 0.4)
+  S: switch(gate = P.gate) i -> x
+  D: diode.complementary() ground -> x
+  L: inductor(L = 100 uH) x -> o
+  R: resistor(R = 3 ohm) o -> ground
+  init L.f = 0 A
+}
+scene s of m {
+  time 0 s to 1 ms
+  trace L.f as i every 10 us
+}
+"""
+
+
+def test_a_buck_converter_against_its_exponentials(tmp_path):
+    file = tmp_path / "m.sd"
+    file.write_text(BUCK)
+    trace = simulate(file, output=tmp_path / "m.h5", method="radau", rtol=1e-9)
+    period, duty, tau = 20e-6, 0.4, 100e-6 / 3.0
+    begins = [0.0]
+    for _ in range(50):
+        on = 8.0 - (8.0 - begins[-1]) * np.exp(-duty * period / tau)
+        begins.append(on * np.exp(-(1.0 - duty) * period / tau))
+    for t, i in zip(trace.time, trace["i"].values, strict=True):
+        k = int(t / period + 1e-9)
+        s = t - k * period
+        rise = 8.0 - (8.0 - begins[k]) * np.exp(-min(s, duty * period) / tau)
+        assert abs(i - rise * np.exp(-max(s - duty * period, 0.0) / tau)) < 2e-9
+    off = np.array([e.time for e in trace.events if e.name.startswith("when on")])
+    assert len(off) == 50
+    assert np.abs(off / period - np.arange(50) - duty).max() < 1e-9
