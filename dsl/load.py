@@ -152,7 +152,8 @@ def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:
     """Whether a statement of the model, of a component in it, of the scene, or one that it needs could not be read."""
     bodies = [statement for _, body in elaborator.bodies for statement, _ in body]
     said = [*bodies, *(scene.body if scene else ())]
-    return elaborator.files.scope.missed or any(isinstance(s, syntax.Broken) for s in said)
+    within = (action for s in said if isinstance(s, (syntax.When, syntax.Every)) for action in s.actions)
+    return elaborator.files.scope.missed or any(isinstance(s, syntax.Broken) for s in (*said, *within))
 
 
 def _unused_levels(elaborator: Elaborator, report: Report) -> None:

@@ -138,6 +138,8 @@ def watch(frame: Frame, node: Node, dimension: Dimension | None, place: Place) -
 def _actions(frame: Frame, actions: tuple[syntax.Action, ...]) -> tuple[Action, ...]:
     found: list[Action] = []
     for action in actions:
+        if isinstance(action, syntax.Broken):  # its syntax was complained of
+            continue
         target, truth = _target(frame, action)
         value = frame.resolver.scalar_or_truth(action.value)
         if value.truth != truth or (

@@ -11,7 +11,7 @@ gap closes with speed v, Newton's law asks for value' = -restitution v first, by
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, combinations, islice
 
 import numpy as np
@@ -52,6 +52,8 @@ class Contacts:
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
+        self.singular: Callable[[float, Floats, Floats], bool] | None = None
+        self._contradicts: set[tuple[bool, ...]] = set()
         self.fastest = np.zeros(len(contacts))
         self.time = 0.0
         places = self.switches.places
@@ -200,7 +202,7 @@ class Contacts:
             if state in seen:  # another order of pivots: from the other end
                 changed.reverse()
             seen.add(state)
-            found = settle(t, y, yd) or self._beside(t, y, yd, settle, seen)
+            found = self._settled_by(t, y, yd, settle) or self._beside(t, y, yd, settle, seen)
             if found is None:
                 break
             values = self.observer(t, found[0], found[1])
@@ -215,22 +217,47 @@ class Contacts:
     def _beside(
         self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]
     ) -> tuple[Floats, Floats, Floats] | None:
-        """Where the active set contradicts itself (a source that two diodes short): the point of the nearest one, not
-        seen yet, that does not; the active set then is that.  All the inequalities together are tried first.
+        """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen
+        yet, that does not: the first that fits, else the first; the active set then is that.
         """
-        free = [k for k, c in enumerate(self.contacts) if c.kind in ("phi", "psi")]
-        before = self.active.copy()
-        nearest = (c for number in range(1, NEAR + 1) for c in combinations(free, number))
-        for turned in islice(chain([[k for k in free if not before[k]]], nearest), BESIDE):
+        before, first, singular = self.active.copy(), None, self.singular
+        for turned in self._near(before):
             self.active[:] = before
             self.active[list(turned)] = ~before[list(turned)]
             self.apply()
-            if turned and self.state() not in seen:
-                seen.add(self.state())
-                found = settle(t, y, yd)
-                if found is not None:
-                    return found
-        return None
+            open_ = singular is not None and len(turned) <= NEAR and singular(t, y, yd)
+            if open_ or self.state() in seen:
+                continue
+            found = self._settled_by(t, y, yd, settle)
+            if found is not None and self.wrong(self.observer(t, *found[:2]), found[2]) < 0:
+                return found
+            if found is not None and first is None:
+                first = found, self.active.copy()
+        if first is None:
+            return None
+        self.active[:] = first[1]
+        self.apply()
+        seen.add(self.state())
+        return first[0]
+
+    def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
+        """Which inequalities to turn, the fewest first; where none holds, all of them before."""
+        free = [k for k, c in enumerate(self.contacts) if c.kind in ("phi", "psi")]
+        nearest = (c for number in range(1, NEAR + 1) for c in combinations(free, number))
+        rest = [k for k in free if not before[k]]
+        if rest == free:
+            return islice(chain([rest], nearest), BESIDE)
+        return chain(islice(nearest, BESIDE), [rest] if rest else [])
+
+    def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
+        """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
+        key = tuple(self.active.tolist())
+        if key in self._contradicts:
+            return None
+        found = settle(t, y, yd)
+        if found is None and self.singular is not None and self.singular(t, y, yd):
+            self._contradicts.add(key)
+        return found
 
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""

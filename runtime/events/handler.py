@@ -31,6 +31,8 @@ CASCADE = 100
 STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
+AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
+"""Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
 
 Point = tuple[Floats, Floats]
 Standing = tuple[Floats, NDArray[np.bool_]]
@@ -221,6 +223,7 @@ class Handler:
             return found
         try:
             self._guards(t, y, yd)
+            stood = self.contacts.state()
             y = self.contacts.strike(t, y, yd, self._strike, self.plan.rest)
             values = self.observer(t, y, yd)
             for k in touched:
@@ -228,11 +231,35 @@ class Handler:
                     self.contacts.turn(k, values)
             self.contacts.apply()
             found = self.determined.fit(t, y, yd, restart.struck, touched)
+            tied = any(self.contacts.contacts[k].kind != "phi" for k in touched)  # a gap may have bounced
+            if tied and self.contacts.state() == stood:
+                found = self._ahead(t, found, stood) or found
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
         self._renew(t, *found)
         self._note(t, said, touched)
         return found
+
+    def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
+        """The point with the active set that fits a little later, None where none differs.
+
+        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.
+        """
+        assert self.restart is not None
+        y, yd = point
+        kept = self.contacts.active.copy(), self.p.copy()
+        for later in AHEAD:
+            time = later * self.contacts.time
+            try:
+                self.determined.fit(t + time, y + time * yd, yd, self.restart.struck)
+            except NoActiveSetError:
+                continue
+            found = self.restart.struck(t, y, yd) if self.contacts.state() != stood else None
+            if found is not None:
+                return found[0], found[1]
+            self.contacts.active[:], self.p[:] = kept
+            self.contacts.apply()
+        return None
 
     def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
         assert self.restart is not None

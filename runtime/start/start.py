@@ -17,7 +17,16 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
-from sysdyn.runtime.numerics.least_change import DENSE, FOLDS, Problem, Solution, Work, least_residual, solve, where_light
+from sysdyn.runtime.numerics.least_change import (
+    DENSE,
+    FOLDS,
+    Problem,
+    Solution,
+    Work,
+    least_residual,
+    solve,
+    where_light,
+)
 from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of, row_scale
 
