@@ -37,6 +37,8 @@ _ITERATIONS = 60
 FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number."""
 _HALVINGS = 12
+_LOST = 3
+"""Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
 EMPTY = 1e-160
 """Coefficients whose squares underflow say nothing: a row of them is empty (slopes of diodes far from conduction)."""
 _ROUND_OFF = 2e-15
@@ -201,9 +203,9 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) 
 def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
-    stale, taken = 0, 0
+    stale, taken, lost = 0, 0, 0
     for _ in range(most + folds):
-        if taken == most:
+        if taken == most or lost == _LOST:
             break
         taken += 1
         linear = _Linear(problem, x)
@@ -238,8 +240,11 @@ def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
             tried[problem.free] += step * (target - u) * linear.unit[problem.free]
             now = float(np.linalg.norm(measure(tried)[1]))
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
+                lost = 0
                 break
             step *= 0.5
+        else:
+            lost += 1
         if best.residual >= 1e-12 and now <= 0.5 * norm:
             stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
         if not np.isfinite(problem.residual(tried)[problem.use]).all():

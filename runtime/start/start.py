@@ -211,7 +211,9 @@ def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask
         if not np.isfinite(found.residual) or (found.x == x).all():
             break
         x = found.x
-    return x
+    # what round-off left is no magnitude; rates follow from the rest by linear rows
+    x = starter.without_noise(x, starter.scale(t, x))
+    return np.where(starter.moving == "rate", guess, x)
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -295,8 +297,9 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     best, holds = _rescaled(starter, t, x, guess, free)
     if not holds:
         own, starter.work = starter.work, Work(WALKED)
-        found, holds = _rescaled(starter, t, _as_written(starter, t, x, guess, free), guess, free)
+        down = _as_written(starter, t, x, guess, free)
         starter.work = own
+        found, holds = _rescaled(starter, t, down, guess, free)
         best = found if holds or found.residual < best.residual else best
     for shaken in _shaken(x, free, starter.scale(t, x)):
         if holds or starter.work.done:
