@@ -136,6 +136,7 @@ def _network(
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
+    _begin(elaborator, read_scene)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
         events.expanded(elaborator, known)
@@ -151,7 +152,8 @@ def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:
     """Whether a statement of the model, of a component in it, of the scene, or one that it needs could not be read."""
     bodies = [statement for _, body in elaborator.bodies for statement, _ in body]
     said = [*bodies, *(scene.body if scene else ())]
-    return elaborator.files.scope.missed or any(isinstance(s, syntax.Broken) for s in said)
+    within = (action for s in said if isinstance(s, (syntax.When, syntax.Every)) for action in s.actions)
+    return elaborator.files.scope.missed or any(isinstance(s, syntax.Broken) for s in (*said, *within))
 
 
 def _unused_levels(elaborator: Elaborator, report: Report) -> None:
@@ -195,6 +197,15 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         switches=tuple(parts.switches),
         read=nodes_read(parts),
     )
+
+
+def _begin(elaborator: Elaborator, scene: Scene | None) -> None:
+    """Discrete variables that begin with a value of time begin with that of the scene's start."""
+    parameters = elaborator.parts.parameters
+    start = {ex.time(): ex.const(0.0) if scene is None or scene.start is None else scene.start}
+    for name in elaborator.parts.discretes:
+        p = parameters[name]
+        parameters[name] = replace(p, values=tuple(ex.substitute(v, start) for v in p.values))
 
 
 def _incomplete(report: Report) -> bool:

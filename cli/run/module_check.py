@@ -13,7 +13,7 @@ from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.starting import Started
 from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
 from sysdyn.compiler.forms.descriptor import Block
-from sysdyn.runtime.model.scales import magnitudes
+from sysdyn.runtime.model.scales import group_maximum, magnitudes
 from sysdyn.runtime.model.system import System
 
 Array = NDArray[np.float64]
@@ -22,6 +22,9 @@ ROUNDING = 1e-9
 """Difference allowed, of the terms of a row: sums are ordered apart, and functions differ in their last digits."""
 NEARBY = (1e-2, 0.3)
 """Distances of the points from the start, of the unknowns' magnitudes."""
+
+LEAST = 1e-3
+"""Least magnitude, of the largest of its kind and unit."""
 
 
 class ModuleFault(Exception):  # noqa: N818 (a fault in sysdyn, exit 4)
@@ -71,6 +74,8 @@ def _points(system: System, started: Started, oracle: SampledRows, until: float)
     t0 = started.state.t
     y, yd = started.state.for_form(system)
     scale, time = magnitudes(system, t0, until, y, yd)
+    # the magnitude of what begins at zero is a guess: one far too small would hide its terms behind rounding
+    scale = np.maximum(scale, LEAST * group_maximum(system, scale))
     random = np.random.default_rng(20260220)
     order = _order(system, oracle)
     number = 1 + len(NEARBY)

@@ -231,7 +231,7 @@ def options_of(
 def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
     """Instants at which the text jumps or has kinks in time, and those of pulses that steps would pass over."""
     text = prepared.compiled.form, prepared.binding, options.t_start, options.t_end, prepared.network.tables
-    found = instants(*text)
+    found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
     if found.note:
         report.note("N608", found.note, prepared.network.place)
     return np.union1d(found.times, pulses(*text))

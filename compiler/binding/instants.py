@@ -66,11 +66,20 @@ class _TooManyError(Exception):
     """More instants than MOST."""
 
 
-def instants(form: DescriptorForm, binding: Binding, t0: float, t1: float, tables: Sequence[Table] = ()) -> Instants:
-    """All instants in (t0, t1); tables: of the network.  None of them, with a note, where they are more than MOST."""
+def instants(
+    form: DescriptorForm,
+    binding: Binding,
+    t0: float,
+    t1: float,
+    tables: Sequence[Table] = (),
+    read: Sequence[Node] = (),
+) -> Instants:
+    """All instants in (t0, t1); tables: of the network; read: what events read.  None of them, with a note, where they
+    are more than MOST.
+    """
     search = _Search(binding, t0, t1)
     try:
-        for watched in _watched(form, {t.name: t for t in tables}):
+        for watched in _watched(form, {t.name: t for t in tables}, read):
             search.add(watched)
         times = search.times()
     except _TooManyError:
@@ -79,9 +88,9 @@ def instants(form: DescriptorForm, binding: Binding, t0: float, t1: float, table
     return Instants(times, search.note)
 
 
-def _watched(form: DescriptorForm, tables: dict[str, Table]) -> Iterator[Watched]:
-    """Operations of all rows that are integrated, those inside others first."""
-    stack: list[tuple[Node, Nest]] = []
+def _watched(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:
+    """Operations of all rows that are integrated, and of what events read, those inside others first."""
+    stack: list[tuple[Node, Nest]] = [(node, ()) for node in read]
     for block in form.blocks:
         if block.name not in WITHOUT_ENTRIES and block.name != "initial":
             stack += [(row.expression, kernel.nest) for kernel in block.kernels for row in kernel.rows]

@@ -64,12 +64,12 @@ def discrete(frame: Frame, s: syntax.Discrete) -> None:
     if value.dimension is not None and value.dimension != unit.dimension:
         message = f"'{decl.name}' is declared {dim.show(unit.dimension)} but starts at {dim.show(value.dimension)}"
         raise resolver.fail("E207", message, s.value.span)
-    for inner in ex.variables(value.node):
+    for inner in ex.variables(value.node) - {ex.time()}:
         raise resolver.fail(
             "E807",
             f"the initial value of '{decl.name}' depends on '{inner}'",
             s.value.span,
-            help="parameters and constants only",
+            help="parameters, constants and t only",
         )
     family, place = frame.current.family(decl.name), frame.place(decl.span)
     frame.enter(ParameterSymbol(decl.name, family, unit.dimension, value.truth, place))
@@ -138,6 +138,8 @@ def watch(frame: Frame, node: Node, dimension: Dimension | None, place: Place) -
 def _actions(frame: Frame, actions: tuple[syntax.Action, ...]) -> tuple[Action, ...]:
     found: list[Action] = []
     for action in actions:
+        if isinstance(action, syntax.Broken):  # its syntax was complained of
+            continue
         target, truth = _target(frame, action)
         value = frame.resolver.scalar_or_truth(action.value)
         if value.truth != truth or (
@@ -227,7 +229,11 @@ def sticking(frame: Frame, root: Node, label: str, at: tuple[Node, ...], loops: 
         name = f"{label} sticking" + (f" {k + 1}" if k else "")
         sense = _sense(frame, f"{name} sense", at, loops, place)
         inner = node.args[0]
-        bound = ex.derivative(ex.substitute(root, {node: ex.var("#sign", "s")}), ex.var("#sign", "s"))
+        mark = ex.var("#sign", "s")
+        bound = ex.derivative(ex.substitute(root, {node: mark}), mark)
+        if mark in ex.variables(bound):
+            frame.report.error("E705", "setsign enters this law in another way than c*setsign(f)", place)
+            return ex.substitute(root, {node: ex.const(0.0)})
         _stick(frame, name, (at, loops), (inner, bound, sense), place, label)
         root = ex.substitute(root, {node: sense})
     return root
@@ -241,9 +247,12 @@ def set_valued(frame: Frame, root: Node, loops: tuple[Loop, ...], place: Place) 
             continue
         if any(n.op == "reduce" and node in ex.topological([n.args[2]]) for n in ex.topological([root])):
             continue
+        mark = ex.var("#abs", "s")
+        bound = ex.substitute(ex.derivative(ex.substitute(root, {node: mark}), mark), {mark: ex.const(0.0)})
+        if bound.op == "const" and (bound.data == 0.0 or not math.isfinite(bound.data)):
+            continue  # no corner at rest: abs(f)^3 is smooth
         name = f"content of line {place.start[0]}" + (f" ({len(frame.parts.drafts)})" if frame.parts.drafts else "")
-        sense, mark = _sense(frame, f"{name} sense", at, loops, place), ex.var("#abs", "s")
-        bound = ex.derivative(ex.substitute(root, {node: mark}), mark)
+        sense = _sense(frame, f"{name} sense", at, loops, place)
         if node.data == "abs":
             _stick(frame, name, (at, loops), (node.args[0], bound, sense), place)
             root = ex.substitute(root, {node: ex.mul(sense, node.args[0])})

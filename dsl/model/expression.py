@@ -174,12 +174,19 @@ def _whole(value: float) -> bool:
     return value == int(value) if abs(value) < 2**53 else True
 
 
+WIDE = 24
+"""Factors of a product that stays one factor of another: derivatives of n nested calls would take n^2 otherwise."""
+
+
 def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
     """Constant * prod(node^exponent), canonical."""
     total = constant
     found: dict[Node, float] = {}
     for exponent, node in factors:
         inner, parts = _factors(node)
+        if exponent == 1.0 and len(parts) > WIDE:
+            found[node] = found.get(node, 0.0) + exponent  # the derivative of a chain of calls: shared, not copied
+            continue
         # (x^2)^(1/2) is |x| and (x y)^(1/2) may be real where x^(1/2) is not: roots are taken of the whole
         if not _whole(exponent) and parts and (inner != 1.0 or len(parts) > 1 or parts[0][0] != 1.0):
             found[node] = found.get(node, 0.0) + exponent

@@ -11,7 +11,8 @@ gap closes with speed v, Newton's law asks for value' = -restitution v first, by
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ from sysdyn.runtime.model.system import System
 
 FAINT = 1e-3
 """Of the magnitude of an unknown."""
+NEAR, BESIDE = 3, 60
+"""Members that change at once, and trials, where an active set contradicts itself."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
 
@@ -48,6 +51,9 @@ class Contacts:
         self.contacts, self.system, self.observer, self.p = contacts, system, observer, p
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
+        self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
+        self.singular: Callable[[float, Floats, Floats], bool] | None = None
+        self._contradicts: set[tuple[bool, ...]] = set()
         self.fastest = np.zeros(len(contacts))
         self.time = 0.0
         places = self.switches.places
@@ -138,9 +144,18 @@ class Contacts:
             if contact.kind == "guarded":
                 if bool(values[contact.guard]) != bool(self.active[k]):
                     return k
+            elif self.bar(k, values):
+                if self.active[k]:
+                    return k
             elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
                 return k
         return -1
+
+    def bar(self, k: int, values: Floats) -> bool:
+        """Whether the guard of an inequality says that it is not there."""
+        guard = self.contacts[k].guard
+        self.barred[k] = guard >= 0 and self.contacts[k].kind != "guarded" and not values[guard]
+        return bool(self.barred[k])
 
     def _unilateral(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero = self.observer.zero
@@ -181,25 +196,68 @@ class Contacts:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
         seen: set[tuple[float, ...]] = set()
         changed: list[int] = []
-        k = 0
         for _ in range(TRIALS * (1 + len(self.contacts))):
             self.apply()
             state = self.state()
             if state in seen:  # another order of pivots: from the other end
                 changed.reverse()
             seen.add(state)
-            found = settle(t, y, yd)
+            found = self._settled_by(t, y, yd, settle) or self._beside(t, y, yd, settle, seen)
             if found is None:
-                values, k = self.observer(t, y, yd), (k + 1) % max(len(self.contacts), 1)
-            else:
-                values = self.observer(t, found[0], found[1])
-                k = self.wrong(values, found[2])
-                if k < 0:
-                    return found[0], found[1]
+                break
+            values = self.observer(t, found[0], found[1])
+            k = self.wrong(values, found[2])
+            if k < 0:
+                return found[0], found[1]
             changed.append(k)
             self.turn(k, values)
-        names = dict.fromkeys(self.contacts[k].name for k in changed[-6:])
+        names = dict.fromkeys(self.contacts[k].name for k in changed[-6:] or range(min(len(self.contacts), 6)))
         raise NoActiveSetError(tuple(names))
+
+    def _beside(
+        self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]
+    ) -> tuple[Floats, Floats, Floats] | None:
+        """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen
+        yet, that does not: the first that fits, else the first; the active set then is that.
+        """
+        before, first, singular = self.active.copy(), None, self.singular
+        for turned in self._near(before):
+            self.active[:] = before
+            self.active[list(turned)] = ~before[list(turned)]
+            self.apply()
+            open_ = singular is not None and len(turned) <= NEAR and singular(t, y, yd)
+            if open_ or self.state() in seen:
+                continue
+            found = self._settled_by(t, y, yd, settle)
+            if found is not None and self.wrong(self.observer(t, *found[:2]), found[2]) < 0:
+                return found
+            if found is not None and first is None:
+                first = found, self.active.copy()
+        if first is None:
+            return None
+        self.active[:] = first[1]
+        self.apply()
+        seen.add(self.state())
+        return first[0]
+
+    def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
+        """Which inequalities to turn, the fewest first; where none holds, all of them before."""
+        free = [k for k, c in enumerate(self.contacts) if c.kind in ("phi", "psi")]
+        nearest = (c for number in range(1, NEAR + 1) for c in combinations(free, number))
+        rest = [k for k in free if not before[k]]
+        if rest == free:
+            return islice(chain([rest], nearest), BESIDE)
+        return chain(islice(nearest, BESIDE), [rest] if rest else [])
+
+    def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
+        """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
+        key = tuple(self.active.tolist())
+        if key in self._contradicts:
+            return None
+        found = settle(t, y, yd)
+        if found is None and self.singular is not None and self.singular(t, y, yd):
+            self._contradicts.add(key)
+        return found
 
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
@@ -220,7 +278,11 @@ class Contacts:
     def strike(self, t: float, y: Floats, yd: Floats, strike: Strike, rest: float) -> Floats:
         """Y after the impacts of the gaps that close; rest: see plan.Plan."""
         values = self.observer(t, y, yd)
-        near = [k for k, c in enumerate(self.contacts) if c.kind == "phi" and self._touches(k, c, values)]
+        near = [
+            k
+            for k, c in enumerate(self.contacts)
+            if c.kind == "phi" and not self.bar(k, values) and self._touches(k, c, values)
+        ]
         speed = {k: float(values[self.contacts[k].rate]) for k in near}
         closing = [k for k in near if speed[k] < -self.observer.zero(self.contacts[k].rate)]
         if not closing:

@@ -31,11 +31,15 @@ class Determined:
 
     def __init__(self, contacts: Contacts) -> None:
         self.contacts = contacts
+        contacts.singular = self._singular
         self._regular: dict[tuple[bool, ...], int] = {}
 
     @cached_property
     def _system(self) -> System:
         return self.contacts.system.another("3")
+
+    def _singular(self, t: float, y: Floats, yd: Floats) -> bool:
+        return self._system.unknowns <= DENSE and self.nullity(t, y, yd) > 0
 
     def nullity(self, t: float, y: Floats, yd: Floats) -> int:
         """How many directions the equations with the present active set leave open."""

@@ -31,6 +31,8 @@ CASCADE = 100
 STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
+AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
+"""Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
 
 Point = tuple[Floats, Floats]
 Standing = tuple[Floats, NDArray[np.bool_]]
@@ -91,6 +93,8 @@ class Handler:
                 found += [Watched(k, -1, r.row, s) for s in ((int(side),) if side else (1, -1))]
         for k, c in enumerate(self.plan.contacts):
             sticks = bool(self.contacts.active[k])
+            if self.contacts.barred[k]:
+                continue
             if c.kind == "friction":
                 rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)
                 found += [Watched(-1, k, row, side) for row, side in rows]
@@ -150,6 +154,12 @@ class Handler:
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
+    def turned(self, t: float, y: Floats, yd: Floats) -> list[Watched]:
+        """The relations that an instant at which the text jumps leaves on another side."""
+        values = self.observer(t, y, yd)
+        found = [w for w in self.watched() if w.relation >= 0]
+        return [w for w in found if w.side * values[w.row] < -self.observer.zero(w.row)]
+
     def _rate(self, watched: Watched) -> int:
         """The row of the rate of what is watched, where there is one."""
         if watched.contact < 0:
@@ -185,7 +195,19 @@ class Handler:
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
         if not (changed or touched):
             return None
-        return self.settled(t, y, yd, said, touched)
+        return self._followed(t, self.settled(t, y, yd, said, touched))
+
+    def _followed(self, t: float, point: Point) -> Point:
+        """The point after the conditions that became true where the constraints were found anew."""
+        for _ in range(CASCADE):
+            fired = self._risen(())
+            if not fired:
+                return point
+            said = [self.contacts.word(k) for k in range(len(self.plan.contacts))]
+            y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
+            self._renew(t, y, point[1])
+            point = self.settled(t, y, point[1], said)
+        raise SolverFailure("chatter", t, 0.0, self._names())
 
     def settled(
         self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
@@ -201,6 +223,7 @@ class Handler:
             return found
         try:
             self._guards(t, y, yd)
+            stood = self.contacts.state()
             y = self.contacts.strike(t, y, yd, self._strike, self.plan.rest)
             values = self.observer(t, y, yd)
             for k in touched:
@@ -208,11 +231,35 @@ class Handler:
                     self.contacts.turn(k, values)
             self.contacts.apply()
             found = self.determined.fit(t, y, yd, restart.struck, touched)
+            tied = any(self.contacts.contacts[k].kind != "phi" for k in touched)  # a gap may have bounced
+            if tied and self.contacts.state() == stood:
+                found = self._ahead(t, found, stood) or found
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
         self._renew(t, *found)
         self._note(t, said, touched)
         return found
+
+    def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
+        """The point with the active set that fits a little later, None where none differs.
+
+        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.
+        """
+        assert self.restart is not None
+        y, yd = point
+        kept = self.contacts.active.copy(), self.p.copy()
+        for later in AHEAD:
+            time = later * self.contacts.time
+            try:
+                self.determined.fit(t + time, y + time * yd, yd, self.restart.struck)
+            except NoActiveSetError:
+                continue
+            found = self.restart.struck(t, y, yd) if self.contacts.state() != stood else None
+            if found is not None:
+                return found[0], found[1]
+            self.contacts.active[:], self.p[:] = kept
+            self.contacts.apply()
+        return None
 
     def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
         assert self.restart is not None

@@ -27,11 +27,20 @@ def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -
     low, before = begin, dense(begin)
     for high in grid:
         values = dense(high)
-        hit = [k for k, (row, side, small, _) in enumerate(watches) if side * values[row] < -small]
+        hit = [k for k, watch in enumerate(watches) if _falls(watch, before, values)]
         if hit:
             return _first(dense, watches, hit, (low, before), (high, values))
         low, before = high, values
     return None
+
+
+def _falls(watch: Watch, low: Floats, high: Floats) -> bool:
+    """Whether a watch changes between two points; what leaves zero upwards, and still does, has not: the interpolant of
+    a first step of order 1 may pull it below.
+    """
+    row, side, small, rate = watch
+    rises = rate >= 0 and side * low[row] <= 0.0 and side * low[rate] > 0.0 and side * high[rate] >= 0.0
+    return bool(side * high[row] < -small and not rises)
 
 
 def _first(
@@ -59,6 +68,8 @@ def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[
         ends = ((at, side * float(values[rate])) for at, values in (low, high))
         begin = _root(dense, rate, side, *ends)
         value = side * float(dense(begin)[row])
+        if value <= 0.0:
+            return high[0]
     return _root(dense, row, side, (begin, value), (high[0], side * float(high[1][row])))
 
 

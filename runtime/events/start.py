@@ -38,8 +38,6 @@ def eventful_start(system: System, t0: float, plan: Plan) -> ConsistentState:
         try:
             found.append(consistent_start(system, t))
         except InconsistentStart as error:
-            if not found:
-                raise
             errors.append(error)
             return None
         y, yd = found[-1].y, found[-1].yd

@@ -25,7 +25,7 @@ EPS = 1e-13
 """Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
-GRANTED = 3e9
+GRANTED = 3.6e9
 """Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
 ITERATIONS = 40
 """Iterations that a search may take however large they are."""
@@ -34,9 +34,11 @@ EVALUATION = 1e6
 EACH = 40.0
 """Operations that an entry of the matrix takes in an evaluation."""
 _ITERATIONS = 60
-_FOLDS = 709
+FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number."""
 _HALVINGS = 12
+_LOST = 3
+"""Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
 EMPTY = 1e-160
 """Coefficients whose squares underflow say nothing: a row of them is empty (slopes of diodes far from conduction)."""
 _ROUND_OFF = 2e-15
@@ -189,18 +191,21 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
     return found[:unknowns]
 
 
-def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
-    """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
+def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) -> Solution:
+    """From x towards the solution nearest to problem.guess; the best point met in so many iterations.
+
+    folds: iterations that are not counted while rows shrink as fast as their terms do.
+    """
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
-        return _solve(problem, x, most)
+        return _solve(problem, x, most, folds)
 
 
-def _solve(problem: Problem, x: Floats, most: int) -> Solution:
+def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
-    stale, taken = 0, 0
-    for _ in range(most + _FOLDS):
-        if taken == most:
+    stale, taken, lost = 0, 0, 0
+    for _ in range(most + folds):
+        if taken == most or lost == _LOST:
             break
         taken += 1
         linear = _Linear(problem, x)
@@ -235,8 +240,11 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             tried[problem.free] += step * (target - u) * linear.unit[problem.free]
             now = float(np.linalg.norm(measure(tried)[1]))
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
+                lost = 0
                 break
             step *= 0.5
+        else:
+            lost += 1
         if best.residual >= 1e-12 and now <= 0.5 * norm:
             stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
         if not np.isfinite(problem.residual(tried)[problem.use]).all():

@@ -17,7 +17,16 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
-from sysdyn.runtime.numerics.least_change import DENSE, Problem, Solution, Work, least_residual, solve, where_light
+from sysdyn.runtime.numerics.least_change import (
+    DENSE,
+    FOLDS,
+    Problem,
+    Solution,
+    Work,
+    least_residual,
+    solve,
+    where_light,
+)
 from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of, row_scale
 
@@ -42,9 +51,9 @@ YIELDS, BACK = 1e-5, 1e-9
 """Scaled changes of a guess that are tried without: none is wanted, the weights are small but not zero."""
 EVEN = 1.05
 """Growth of the whole change for which a guess stays as written: what it yields is small to second order."""
-WALKED = 0.1
+WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
-EXPLAINED = 0.3
+EXPLAINED = 0.1
 """Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
 
 
@@ -198,11 +207,13 @@ def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask
     """X on the rows as written: far from a solution the derivative of an exponential hides what itself is after."""
     rows = starter.every & ~starter.groups(*HIDDEN)
     for _ in range(_RESCALINGS):
-        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
         if not np.isfinite(found.residual) or (found.x == x).all():
             break
         x = found.x
-    return x
+    # what round-off left is no magnitude; rates follow from the rest by linear rows
+    x = starter.without_noise(x, starter.scale(t, x))
+    return np.where(starter.moving == "rate", guess, x)
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -286,8 +297,9 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     best, holds = _rescaled(starter, t, x, guess, free)
     if not holds:
         own, starter.work = starter.work, Work(WALKED)
-        found, holds = _rescaled(starter, t, _as_written(starter, t, x, guess, free), guess, free)
+        down = _as_written(starter, t, x, guess, free)
         starter.work = own
+        found, holds = _rescaled(starter, t, down, guess, free)
         best = found if holds or found.residual < best.residual else best
     for shaken in _shaken(x, free, starter.scale(t, x)):
         if holds or starter.work.done:

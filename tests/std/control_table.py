@@ -1,6 +1,6 @@
 """Control laws of known response."""
 
-from numpy import cos, exp, floor, maximum, minimum, sin, sqrt
+from numpy import cos, exp, floor, maximum, minimum, pi, sin, sqrt, where
 from runs import Row
 
 CLOSED = (1 + 4.0) / (2 * 0.5)
@@ -15,6 +15,12 @@ def sampled(t):
 def held_back(t):
     """The integral of an error that changes its sign at 4 s, stopped at both limits of the output."""
     return maximum(0.5 * minimum(t, 2.0) - 0.5 * maximum(t - 4.0, 0.0), -1 / 6)
+
+
+def sampled_pid(t):
+    """Of an error that falls along a line; a sample reads the integral before it assigns it."""
+    k = floor(t / 0.1 + 1e-9)
+    return 0.8 * (1.5 - 0.05 * k) + 0.2 * (1.5 * k - 0.05 * k * (k - 1) / 2) - 0.05 * (k > 0)
 
 
 ROWS = (
@@ -112,5 +118,47 @@ ROWS = (
 """,
         1.25,
         {"C.u": sampled},
+    ),
+    Row(
+        "relay",
+        """
+  C: relay(band = 1 V, lo = -3 A, hi = 2 A) u = 2 V*sin(1 rad/s*t)
+""",
+        8.0,
+        {"C.y": lambda t: where(sin(t) > 0.5, 2, where(sin(t) < -0.5, -3, 0))},
+    ),
+    Row(
+        "hysteresis",
+        """
+  C: hysteresis(on_at = 1 V, off_at = -1 V, lo = 0 A, hi = 4 A) u = 2 V*sin(1 rad/s*t)
+""",
+        8.0,
+        {"C.y": lambda t: 4.0 * (((t > pi / 6) & (t < 7 * pi / 6)) | (t > 13 * pi / 6))},
+    ),
+    Row(
+        "sample_hold",
+        """
+  C: sample_hold(Ts = 0.1 s) u = 2 V*sin(1 rad/s*t)
+""",
+        1.25,
+        {"C.y": lambda t: 2 * sin(0.1 * floor(t / 0.1 + 1e-9))},
+    ),
+    Row(
+        "quantiser",
+        """
+  C: quantiser(q = 0.25 V, Ts = 0.1 s) u = 2 V*sin(1 rad/s*t)
+""",
+        1.25,
+        {"C.y": lambda t: 0.25 * floor(2 * sin(0.1 * floor(t / 0.1 + 1e-9)) / 0.25 + 0.5)},
+    ),
+    Row(
+        "sampled_pid",
+        """
+  C: sampled_pid(
+    kp = 0.8 V/K, ki = 2 V/K/s, kd = 0.1 V.s/K, Ts = 0.1 s, lo = -4 V, hi = 4 V
+  ) r = 302 K, y = 300.5 K + 0.5 K/s*t
+""",
+        1.25,
+        {"C.u": sampled_pid},
     ),
 )

@@ -1,6 +1,6 @@
 """Circuits of known response."""
 
-from numpy import cos, exp, log, maximum, minimum, pi, sin, sqrt
+from numpy import clip, cos, exp, interp, log, maximum, minimum, pi, sin, sqrt
 from runs import PRIMAL, Row
 
 
@@ -201,6 +201,122 @@ ROWS = (
         {
             "c.e": lambda t: 64e3 / TRANSFORMED + (1 - 64e3 / TRANSFORMED) * exp(-TRANSFORMED * t),
             "R1.f": lambda t: (24 - 4 * (64e3 / TRANSFORMED + (1 - 64e3 / TRANSFORMED) * exp(-TRANSFORMED * t))) / 50,
+        },
+    ),
+    Row(
+        "switch",
+        """
+  node a, b, c: electrical
+  V: voltage(v = 10 V) a -> ground
+  S: switch(gate = if t < 2 ms then 1 else 0) a -> b
+  D: diode.complementary ground -> b
+  L: inductor(L = 1 mH) b -> c
+  R: resistor(R = 1 ohm) c -> ground
+  init L.f = 0 A
+""",
+        5e-3,
+        {
+            "L.f": lambda t: 10 * (1 - exp(-1e3 * minimum(t, 2e-3))) * exp(-1e3 * maximum(t - 2e-3, 0)),
+            "b.e": lambda t: 10.0 * (t < 2e-3),
+        },
+        PRIMAL,
+    ),
+    Row(
+        "thyristor",
+        """
+  node a, b: electrical
+  V: voltage(v = 10 V*sin(2*pi*50 Hz*t)) a -> ground
+  S: thyristor(gate = if t > 3 ms and t < 4 ms then 1 else 0) a -> b
+  R: resistor(R = 5 ohm) b -> ground
+""",
+        0.028,
+        {
+            "b.e": lambda t: 10 * sin(100 * pi * t) * (t > 3e-3) * (t < 1e-2),
+        },
+        PRIMAL,
+    ),
+    Row(
+        "mosfet",
+        """
+  node a, b: electrical
+  V: voltage(v = 10 V*sin(2*pi*1 Hz*t)) a -> ground
+  R: resistor(R = 4 ohm) a -> b
+  Q: mosfet(Ron = 1 ohm, gate = if t < 1 s then 1 else 0) d = b, s = ground
+""",
+        2.1,
+        {
+            "b.e": lambda t: maximum(10 * sin(2 * pi * t) * (1 - 0.8 * (t < 1.0)), -0.7),
+        },
+        PRIMAL,
+    ),
+    Row(
+        "pulse",
+        """
+  node a: electrical
+  P: pulse(lo = -1 V, hi = 5 V, delay = 1 s, rise = 0.5 s, fall = 0.2 s, width = 0.5 s, period = 2 s) a -> ground
+  R: resistor(R = 2 ohm) a -> ground
+""",
+        5.0,
+        {
+            "a.e": lambda t: -1 + (t > 1) * 6 * clip(minimum((t - 1) % 2 / 0.5, (1.2 - (t - 1) % 2) / 0.2), 0, 1),
+            "R.f": lambda t: -0.5 + (t > 1) * 3 * clip(minimum((t - 1) % 2 / 0.5, (1.2 - (t - 1) % 2) / 0.2), 0, 1),
+        },
+    ),
+    Row(
+        "piecewise_voltage",
+        """
+  node a: electrical
+  P: piecewise_voltage(n = 3, at = [1 s, 2 s, 4 s], v = [1 V, 3 V, -2 V]) a -> ground
+  R: resistor(R = 2 ohm) a -> ground
+""",
+        5.0,
+        {
+            "R.f": lambda t: 0.5 * interp(t, [1, 2, 4], [1, 3, -2]),
+        },
+    ),
+    Row(
+        "three_phase",
+        """
+  node a, b, c, n: electrical
+  S: three_phase(V = 325 V) a = a, b = b, c = c, n = ground
+  Ra: resistor(R = 2 ohm) a -> n
+  Rb: resistor(R = 2 ohm) b -> n
+  Rc: resistor(R = 4 ohm) c -> n
+""",
+        0.04,
+        {
+            "b.e": lambda t: 325 * sin(100 * pi * t - 2 * pi / 3),
+            "n.e": lambda t: -65 * sin(100 * pi * t + 2 * pi / 3),
+        },
+    ),
+    Row(
+        "coupled_inductors",
+        """
+  node a, b: electrical
+  V: voltage(v = 3 V) a -> ground
+  L: coupled_inductors(L1 = 2 H, L2 = 0.5 H, k = 0.6) one = a -> ground, two = b -> ground
+  R: resistor(R = 1.5 ohm) b -> ground
+  init L.one.f = 0 A
+  init L.two.f = 0 A
+""",
+        1.0,
+        {
+            "R.f": lambda t: 0.6 * (1 - exp(-1.5 / 0.32 * t)),
+            "L.one.f": lambda t: 1.5 * t + 0.18 * (1 - exp(-1.5 / 0.32 * t)),
+        },
+        PRIMAL,
+    ),
+    Row(
+        "pwm",
+        """
+  node a: electrical
+  P: pwm(period = 0.1 s, duty = 0.3)
+  V: voltage(v = 2 V*P.gate) a -> ground
+  R: resistor(R = 4 ohm) a -> ground
+""",
+        1.25,
+        {
+            "R.f": lambda t: 0.5 * ((t % 0.1) < 0.03),
         },
     ),
 )

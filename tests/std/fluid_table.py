@@ -1,7 +1,7 @@
 """Flows of known response."""
 
-from numpy import arctan, cos, exp, log, sin, sqrt, vectorize
-from runs import Row
+from numpy import arctan, cos, exp, log, maximum, minimum, sin, sqrt, vectorize, where
+from runs import PRIMAL, Row
 from scipy.optimize import brentq
 
 DRAIN = sqrt(900 * 9.8 / (0.5 * 4e7))
@@ -191,5 +191,34 @@ ROWS = (
             "o.e": lambda t: 6e4 * (90 - 70 * exp(-9 * t)),
             "S.f": lambda t: -3e-6 * (90 - 70 * exp(-9 * t)),
         },
+    ),
+    Row(
+        "check_valve",
+        """
+  node i, o: hydraulic
+  S: effort(e = 2 bar*sin(3 rad/s*t)) i -> ground
+  V: check_valve() i -> o
+  R: dissipator(e = 2e9 Pa.s/m^3*f) o -> ground
+""",
+        4.0,
+        {
+            "o.e": lambda t: 2e5 * maximum(sin(3 * t), 0),
+            "V.e": lambda t: 2e5 * minimum(sin(3 * t), 0),
+        },
+        PRIMAL,
+    ),
+    Row(
+        "relief_valve",
+        """
+  node a: hydraulic
+  S: flow(f = 1e-4 m^3/s^2*t) ground -> a
+  R: dissipator(e = 1e10 Pa.s/m^3*f) a -> ground
+  V: relief_valve(opens = 10 bar, R = 1e9 Pa.s/m^3) a = a, b = ground
+""",
+        4.0,
+        {
+            "a.e": lambda t: where(t < 1, 1e6 * t, (1e-4 * t + 1e-3) / 1.1e-9),
+        },
+        PRIMAL,
     ),
 )

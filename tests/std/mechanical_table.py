@@ -1,6 +1,6 @@
 """Motions along a line, about an axis and in the plane, of known response."""
 
-from numpy import arcsin, arcsinh, arctan2, cos, exp, maximum, pi, sin, sinh, sqrt, tanh
+from numpy import arcsin, arcsinh, arctan2, cos, exp, maximum, pi, sin, sinh, sqrt, tanh, where
 from runs import PRIMAL, Row
 from scipy.special import ellipj, ellipk
 
@@ -409,6 +409,61 @@ ROWS = (
             "b.th.q": lambda t: -pi / 2 - arctan2(4, 3) + 2.5 * t,
             "H.px.on(a.x.q)": lambda t: -7.5 * sin(2.5 * t),
         },
+        PRIMAL,
+    ),
+    Row(
+        "stops",
+        """
+  node x: translation
+  M: mass(m = 2 kg) x
+  S: stops(lo = 0 m, hi = 1 m, bounce = 0.5) x -> ground
+  init x.q = 0.2 m
+  init x.f = 2 m/s
+""",
+        3.0,
+        {
+            "x.q": lambda t: where(t < 0.4, 0.2 + 2 * t, where(t < 1.4, 1.4 - t, 0.5 * (t - 1.4))),
+            "x.f": lambda t: where(t < 0.4, 2.0, where(t < 1.4, -1.0, 0.5)),
+        },
+        PRIMAL,
+    ),
+    Row(
+        "ratchet",
+        """
+  node a: rotation
+  J: inertia(J = 2 kg.m^2) a
+  M: torque(M = 2 N.m*cos(1 rad/s*t)) ground -> a
+  R: ratchet() a -> ground
+  init a.f = 0 rad/s
+""",
+        6.0,
+        {
+            "a.f": lambda t: where(t < pi, sin(t), where(t < 1.5 * pi, 0, 1 + sin(t))),
+        },
+        PRIMAL,
+    ),
+    Row(
+        "coulomb_joint",
+        """
+  node a: rotation
+  J: inertia(J = 2 kg.m^2) a
+  C: coulomb_joint(Mc = 3 N.m) a -> ground
+  init a.f = -4 rad/s
+""",
+        5.0,
+        {"a.f": lambda t: -maximum(4 - 1.5 * t, 0)},
+        PRIMAL,
+    ),
+    Row(
+        "brake",
+        """
+  node a: rotation
+  J: inertia(J = 2 kg.m^2) a
+  B: brake(clamp = 100 N, r = 0.1 m) a -> ground
+  init a.f = 10 rad/s
+""",
+        4.0,
+        {"a.f": lambda t: maximum(10 - 4 * t, 0)},
         PRIMAL,
     ),
 )

@@ -1,0 +1,142 @@
+"""Rectifiers of ideal diodes against closed forms: values, instants of commutation, and no event too many."""
+
+import numpy as np
+import pytest
+from sysdyn.api import simulate
+
+W = 100.0 * np.pi
+PHASE = 0.3
+
+
+def run(text, tmp_path, formulation, **options):
+    file = tmp_path / "m.sd"
+    file.write_text(text)
+    return simulate(file, output=tmp_path / "m.h5", formulation=formulation, accuracy=1e-6, **options)
+
+
+def bridge(phases):
+    """Phases against ground, two diodes each, a resistor between both rails."""
+    rows = "\n".join(
+        f"  node a{k}: electrical\n"
+        f"  V{k}: voltage(v = 10 V*sin(100*pi*t/(1 s) + {PHASE} - 2*pi*{k}/{phases})) a{k} -> ground\n"
+        f"  P{k}: diode.complementary() a{k} -> p\n"
+        f"  N{k}: diode.complementary() n -> a{k}"
+        for k in range(phases)
+    )
+    return f"""from std.electrical import voltage, diode, resistor
+model m {{
+  node p, n: electrical
+{rows}
+  R: resistor(R = 5 ohm) p -> n
+}}
+scene s of m {{
+  time 0 s to 20 ms
+  trace p.e - n.e as v every 0.1 ms
+}}
+"""
+
+
+@pytest.mark.parametrize(("phases", "formulation"), [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian")])
+def test_a_bridge_commutates_and_does_nothing_else(phases, formulation, tmp_path):
+    trace = run(bridge(phases), tmp_path, formulation)
+    waves = [10.0 * np.sin(W * trace.time + PHASE - 2.0 * np.pi * k / phases) for k in range(phases)]
+    assert np.abs(trace["v"].values - (np.max(waves, axis=0) - np.min(waves, axis=0))).max() < 1e-9
+    # each diode conducts once in a period; two phases that are opposite commutate on both rails at once
+    assert len(trace.events) == 4 * phases
+
+
+LOADS = {
+    "r": "  R: resistor(R = 5 ohm) p -> ground",
+    "rl": "  node c: electrical\n  L: inductor(L = 10 mH) p -> c\n  R: resistor(R = 5 ohm) c -> ground\n"
+    "  init L.f = 0 A",
+    "rc": "  C: capacitor(C = 1 mF) p -> ground\n  R: resistor(R = 50 ohm) p -> ground\n  init C.e = 1 V",
+}
+
+
+def half_wave(load):
+    return f"""from std.electrical import voltage, diode, resistor, inductor, capacitor
+model m {{
+  node a, p: electrical
+  V: voltage(v = 10 V*sin(100*pi*t/(1 s))) a -> ground
+  D: diode.complementary() a -> p
+{LOADS[load]}
+}}
+scene s of m {{
+  time 0.1 ms to 50 ms
+  trace D.f as i, p.e as v every 0.1 ms
+}}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_half_wave_into_a_resistor(formulation, tmp_path):
+    trace = run(half_wave("r"), tmp_path, formulation)
+    assert np.abs(trace["i"].values - 2.0 * np.maximum(np.sin(W * trace.time), 0.0)).max() < 1e-9
+    assert [e.name for e in trace.events] == ["D.one_way"] * 4
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_half_wave_into_a_capacitor(formulation, tmp_path):
+    """The capacitor follows the source until its current turns, then discharges alone until the source is above it."""
+    trace = run(half_wave("rc"), tmp_path, formulation)
+    tau, end = 0.05, np.pi - np.arctan(W * 0.05)  # C v' + v/R = 0
+    for t, i, v in zip(trace.time, trace["i"].values, trace["v"].values, strict=True):
+        turn = end / W
+        cycles = [turn + 0.02 * k for k in range(3) if turn + 0.02 * k <= t]
+        if cycles:
+            alone = 10.0 * np.sin(end) * np.exp(-(t - cycles[-1]) / tau)
+            wave = 10.0 * np.sin(W * t)
+            late = t - cycles[-1] > 0.008
+            assert abs(v - max(alone, wave if late else alone)) < 2e-5
+        assert i > -1e-5
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_half_wave_into_a_coil(formulation, tmp_path):
+    """The coil carries the current on beyond the half wave, until it ends; then nothing flows up to the next."""
+    trace = run(half_wave("rl"), tmp_path, formulation)
+    size, lag = 10.0 / np.hypot(5.0, W * 0.01), np.arctan2(W * 0.01, 5.0)
+    wanted = np.zeros_like(trace.time)
+    for begin in (1e-4, 0.02, 0.04):
+        s = trace.time - begin
+        wave = size * (np.sin(W * trace.time - lag) - np.sin(W * begin - lag) * np.exp(-s * 500.0))
+        wanted += np.where((s > 0.0) & (s < 0.0195) & (wave > 0.0), wave, 0.0)
+    assert np.abs(trace["i"].values - wanted).max() < 1e-5
+    assert len(trace.events) == 4
+
+
+BUCK = """from std.electrical import switch, diode, voltage, inductor, resistor, pwm
+model m {
+  node i, x, o: electrical
+  V: voltage(v = 24 V) i -> ground
+  P: pwm(period = 20 us, duty = 0.4)
+  S: switch(gate = P.gate) i -> x
+  D: diode.complementary() ground -> x
+  L: inductor(L = 100 uH) x -> o
+  R: resistor(R = 3 ohm) o -> ground
+  init L.f = 0 A
+}
+scene s of m {
+  time 0 s to 1 ms
+  trace L.f as i every 10 us
+}
+"""
+
+
+def test_a_buck_converter_against_its_exponentials(tmp_path):
+    file = tmp_path / "m.sd"
+    file.write_text(BUCK)
+    trace = simulate(file, output=tmp_path / "m.h5", method="radau", rtol=1e-9)
+    period, duty, tau = 20e-6, 0.4, 100e-6 / 3.0
+    begins = [0.0]
+    for _ in range(50):
+        on = 8.0 - (8.0 - begins[-1]) * np.exp(-duty * period / tau)
+        begins.append(on * np.exp(-(1.0 - duty) * period / tau))
+    for t, i in zip(trace.time, trace["i"].values, strict=True):
+        k = int(t / period + 1e-9)
+        s = t - k * period
+        rise = 8.0 - (8.0 - begins[k]) * np.exp(-min(s, duty * period) / tau)
+        assert abs(i - rise * np.exp(-max(s - duty * period, 0.0) / tau)) < 2e-9
+    off = np.array([e.time for e in trace.events if e.name.startswith("when on")])
+    assert len(off) == 50
+    assert np.abs(off / period - np.arange(50) - duty).max() < 1e-9

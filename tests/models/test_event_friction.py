@@ -1,0 +1,39 @@
+"""Stiction on many bodies: complementarity over all of them at once, no chatter, rest that is a balance of forces."""
+
+import numpy as np
+import pytest
+from sysdyn.api import simulate
+
+CHAIN = """
+model chain {
+  param n = 20
+  param m = 0.1 kg
+  param k = 50 N/m
+  param Fc = 0.05 N
+  coord x[1..n]: translation = 0 m
+  energy T* = sum(i in 1..n: 1/2*m*x[i]'^2)
+  energy V = 1/2*k*x[1]^2 + sum(i in 2..n: 1/2*k*(x[i] - x[i-1])^2)
+  for i in 1..n { content D = Fc*abs(x[i]') }
+  for i in 1..n-1 { init x[i]' = 0 m/s }
+  init x[n]' = 1 m/s
+}
+scene s of chain {
+  time 0 s to 5 s
+  trace TRACED, audit.energy every 50 ms
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_chain_of_twenty_comes_to_rest(formulation, tmp_path):
+    file = tmp_path / "m.sd"
+    traced = ", ".join(f"x[{i}] as x{i}, x[{i}]' as v{i}" for i in range(1, 21))
+    file.write_text(CHAIN.replace("TRACED", traced))
+    trace = simulate(file, output=tmp_path / "m.h5", formulation=formulation)
+    speeds = [trace[f"v{i}"].values[-1] for i in range(1, 21)]
+    assert np.abs(speeds).max() < 1e-9
+    x = np.array([0.0, *(trace[f"x{i}"].values[-1] for i in range(1, 21))])
+    pull = np.append(np.diff(x), 0.0)
+    assert np.abs(50.0 * np.diff(pull)).max() <= 0.05 * (1.0 + 1e-3)  # what the springs leave, friction holds
+    assert np.abs(trace["audit.energy"].values).max() < 1e-4 * 0.05
+    assert len(trace.events) < 400

@@ -1,0 +1,31 @@
+"""Models of the gallery with events, against what is known in closed form."""
+
+from math import asin, cos, pi, sin, sqrt
+from pathlib import Path
+
+import pytest
+from sysdyn.api import simulate
+
+GALLERY = Path(__file__).parents[2] / "models" / "gallery"
+G0 = 9.80665
+
+
+def test_the_last_ball_of_the_cradle_leaves_with_what_came_in(tmp_path):
+    """Two impacts one after another, each an exchange of speeds between equal masses."""
+    swing, gap, w = 0.02, 1e-4, sqrt(G0 / 0.3)
+    first = (pi / 2 + asin(gap / swing)) / w
+    speed = swing * w * sin(w * first)
+    turn = asin(gap * w / speed)
+    second, left = first + turn / w, speed * cos(turn)
+    run = simulate(GALLERY / "newtons_cradle.sd", at=["0.4"], o=tmp_path / "x.h5")
+    k = abs(run.time - 0.4).argmin()
+    assert run["x3"][k] / 1e3 == pytest.approx(left / w * sin(w * (0.4 - second)), rel=0, abs=1e-6 * swing)
+
+
+def test_the_clutch_locks_alike_by_friction_and_by_events(tmp_path):
+    """One speed behind the lock, from two texts of one clutch."""
+    ends = [
+        simulate(GALLERY / "clutch_launch.sd", scene=scene, accuracy=1e-6, o=tmp_path / f"{scene}.h5")["engine"][-1]
+        for scene in ("launch", "modes")
+    ]
+    assert ends[0] == pytest.approx(ends[1], rel=2e-6)
