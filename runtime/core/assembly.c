@@ -51,14 +51,20 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
     system->jacobian_evaluations++;
 }
 
-int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
-                       const double *g, const double *scale, double *s)
+/* s := magnitudes of the terms of steep rows, zero in others */
+static void steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s)
 {
     memset(s, 0, (size_t)system->rows * sizeof *s);
     for (int32_t c = 0; c < system->scales; c++)
         system->scale[c].rows(&system->scale[c].frame, t, y, rate, s);
     for (int32_t i = 0; i < system->held; i++)
         s[system->held_row[i]] = 0.0;
+}
+
+int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
+                       const double *g, const double *scale, double *s)
+{
+    steep_terms(system, t, y, rate, s);
     for (int32_t i = 0; i < system->rows && g; i++)
         s[i] = -s[i]; /* what is known already is not added to */
     for (int32_t j = 0; j < system->unknowns && g; j++)
@@ -69,6 +75,21 @@ int32_t sd_first_unmet(sd_system *system, double t, const double *y, const doubl
         s[i] = fabs(s[i]);
     for (int32_t i = 0; i < system->rows; i++)
         if (s[i] != 0.0 && !(fabs(r[i]) <= limit * s[i])) /* 0: not steep, or every term is zero */
+            return i;
+    return -1;
+}
+
+int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r,
+                        const double *jy, const double *magnitude, double *s)
+{
+    steep_terms(system, t, y, rate, s);
+    for (int32_t i = 0; i < system->rows; i++)
+        s[i] = s[i] != 0.0 ? fabs(r[i]) : 0.0;
+    for (int32_t j = 0; j < system->unknowns; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            s[system->row[e]] -= fabs(jy[e]) * magnitude[j];
+    for (int32_t i = 0; i < system->rows; i++)
+        if (!(s[i] <= 0.0))
             return i;
     return -1;
 }

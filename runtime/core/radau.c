@@ -25,6 +25,7 @@
 #define LAX 100.0          /* a steep row may be off by as many times Newton's tolerance times the method's */
 #define NULL_PIVOT 1e-10   /* part of its column below which a pivot determines no better than Newton's test asks */
 #define LEAST_PIVOT 1e-290 /* the same where every pivot but zero counts */
+#define ASTRAY 16.0 /* error of a step that passes over what a steep law does: half of it is tried */
 #define LEAST_PART 1e-7    /* of a correction that is still tried */
 #define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
 #define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
@@ -601,6 +602,8 @@ int sd_radau_step(sd_radau *radau)
         }
         if (cause == SD_FINE && !(radau->fixed_h > 0.0)) {
             cause = estimate_error(radau, &error);
+            if (cause == SD_FINE && error < 1.0 && radau->system->scales > 0 && sd_radau_astray(radau))
+                error = ASTRAY;
             if (cause == SD_FINE && !(error < 1.0))
                 cause = SD_ERROR_TEST;
         }

@@ -67,6 +67,9 @@ int sd_radau_step(sd_radau *radau);
 void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd);
 /* settled derivatives at the points that sd_radau_dense uses */
 void sd_radau_refine(sd_radau *radau, sd_settle *settle);
+/* 1: between the nodes of the step at hand, whose stages are z, a steep law is beyond all magnitudes: the step passes
+ * over something that happens.  Works in y, rate, d[0] and terms. */
+int sd_radau_astray(sd_radau *radau);
 /* z [stages] of a step of size h from the last step's polynomial */
 void sd_radau_extrapolate(sd_radau *radau, double h);
 

@@ -7,6 +7,9 @@
 
 static const double node[SD_STAGES + 1] = {0.0, 0.15505102572168219018, 0.64494897427831780982, 1.0};
 
+/* in the middle of the wider gaps between the nodes */
+static const double between[2] = {0.4, 0.82247448713915890491};
+
 /* Lagrange weights of the nodes 0, c1, c2, 1 at s, and their derivatives by s */
 static void cubic(double s, double *value, double *slope)
 {
@@ -94,6 +97,24 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
                     radau->slope[k][i] = radau->point_d[i];
         radau->refined[k] = 1;
     }
+}
+
+int sd_radau_astray(sd_radau *radau)
+{
+    for (int k = 0; k < 2; k++) {
+        double v[SD_STAGES + 1], d[SD_STAGES + 1], at = radau->t + between[k] * radau->h;
+        cubic(between[k], v, d);
+        for (int32_t i = 0; i < radau->n; i++) {
+            const double z1 = radau->z[0][i], z2 = radau->z[1][i], z3 = radau->z[2][i];
+            radau->y[i] = radau->phi[i] + v[1] * z1 + v[2] * z2 + v[3] * z3;
+            radau->rate[i] = (d[1] * z1 + d[2] * z2 + d[3] * z3) / radau->h;
+        }
+        sd_residual(radau->system, at, radau->y, radau->rate, radau->d[0]);
+        if (sd_first_astray(radau->system, at, radau->y, radau->rate, radau->d[0], radau->jy, radau->magnitude,
+                            radau->terms) >= 0)
+            return 1;
+    }
+    return 0;
 }
 
 void sd_radau_extrapolate(sd_radau *radau, double h)

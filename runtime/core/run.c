@@ -129,6 +129,14 @@ static void integrate(sd_run *run, double to)
     weigh(run, half / 6.0);
 }
 
+/* How far the unknowns of a row within a step lie beyond those of the steps. */
+static void note_beyond(sd_run *run)
+{
+    for (int32_t j = 0; j < run->stepper->n; j++)
+        if (fabs(run->point[j]) > run->beyond * run->magnitude[j] && run->magnitude[j] > 0.0)
+            run->beyond = fabs(run->point[j]) / run->magnitude[j];
+}
+
 /* one output row at an instant of the last step, written as of `label` */
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
@@ -149,6 +157,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         sd_settle_point(run->settle, t, run->point, run->point_d);
     if (run->least_norm)
         sd_least_norm_apply(run->least_norm, t, run->point, run->point_d);
+    if (run->magnitude && !at_step)
+        note_beyond(run);
     dissipated = at_step ? run->dissipated : run->step_dissipated + dissipated;
     supplied = at_step ? run->supplied : run->step_supplied + supplied;
     audit(run, t, run->point, run->point_d, out);

@@ -59,6 +59,8 @@ typedef struct sd_run {
     int32_t watches, end_kind;        /* end_kind: kind of the row where a step meets t_end, beside those asked for */
     int32_t start_kind;               /* the same of the row of a restart */
     double t_to;                      /* end of what counts of the last step */
+    const double *magnitude;          /* [n] of the unknowns at steps; NULL: not looked at */
+    double beyond;                    /* largest |unknown| of a row within a step, in these magnitudes */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,

@@ -183,6 +183,8 @@ class Integration:
         run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps = int(request.sample_steps)
+        if self.underlying is None:
+            run.magnitude = lib.pointer(self.magnitude)
         run.row, run.room = lib.pointer(self._rows), self._rows.shape[0]
 
     def drain(self, sink: Sink) -> None:
@@ -348,6 +350,7 @@ class Integration:
             self.settler.core.contents.failures,
             self.ledgers.balances(),
             self.happened(),
+            self.run_.contents.beyond,
         )
 
     def __del__(self) -> None:

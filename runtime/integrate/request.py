@@ -73,7 +73,8 @@ class Finished:
     """An integration that reached its end.
 
     magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
-    their expressions; cpu [s]; balances: of the ledgers.
+    their expressions; cpu [s]; balances: of the ledgers; beyond: the largest unknown of a row within a step, in magnitudes
+    that it has at steps.
     """
 
     reached: float
@@ -84,3 +85,4 @@ class Finished:
     unsettled: int
     balances: tuple[Balance, ...] = ()
     events: tuple[Happened, ...] = ()
+    beyond: float = 0.0

@@ -42,6 +42,9 @@ FORETOLD = 0.01
 BEHIND = 1.5
 """Work of the run behind a draft over the draft's: a tenth of the tolerance at the orders of the methods."""
 
+BEYOND = 100.0
+"""Times its magnitude at steps: an unknown that is more within a step shows that the step passed over something."""
+
 METERS = {
     "audit.kinetic": 2, "audit.potential": 3, "audit.dissipated": 4, "audit.supplied": 5, "audit.energy": 6,
     "audit.constraints": 7,
@@ -318,6 +321,8 @@ class Runs:
         jumps = np.unique([e.time for e in finished.events])
         last, self.jumps = self.jumps, jumps
         between = beside(self.common, jumps if last is None else last, jumps, self.options.t_end - self.options.t_start)
+        if finished.beyond > BEYOND:
+            rows = np.full_like(rows, np.nan)
         found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise, between)
         self.samplings = (*self.samplings[-1:], found)
         return found

@@ -374,4 +374,6 @@ class Run(c.Structure):
         ("end_kind", _I),
         ("start_kind", _I),
         ("t_to", _D),
+        ("magnitude", _P),
+        ("beyond", _D),
     ]
