@@ -73,8 +73,8 @@ class Finished:
     """An integration that reached its end.
 
     magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
-    their expressions; cpu [s]; balances: of the ledgers; beyond: the largest unknown of a row within a step, in magnitudes
-    that it has at steps.
+    their expressions; cpu [s]; balances: of the ledgers; beyond: the largest unknown of a row within a step, in
+    magnitudes that it has at steps.
     """
 
     reached: float
