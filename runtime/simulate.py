@@ -15,6 +15,7 @@ from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.accuracy import LAWS, Achieved, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
 from sysdyn.runtime.integrate.runs import LONG, Runs, Samples, Way
+from sysdyn.runtime.integrate.second_opinion import confirmed
 from sysdyn.runtime.integrate.underlying import obstacle
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
 from sysdyn.runtime.model.carrier import Carrier
@@ -99,7 +100,8 @@ def _controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achiev
     if own_tolerances(options):
         runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol)
         return None
-    return _chosen(runs, options, others) if options.method == "auto" else _achieved(runs, options)
+    achieved = _chosen(runs, options, others) if options.method == "auto" else _achieved(runs, options)
+    return confirmed(runs, achieved, _targets(runs, options)) if options.accuracy_check else achieved
 
 
 def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Estimate, ...]:

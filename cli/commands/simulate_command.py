@@ -25,6 +25,7 @@ from sysdyn.cli.run.starting import described, shortened
 @click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
 @click.option("--at", metavar="T1,T2,...", help="Instants that the trace holds too.")
 @click.option("-o", "output", metavar="TRACE.h5", help="Default: <stem>-<scene>.h5 here.")
+@click.option("--accuracy-check", is_flag=True, help="A second run by another method must agree.")
 @click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
 def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
     """Simulate a scene of FILE and write its trace."""

@@ -59,6 +59,7 @@ class Request:
     index: str | None = None
     redundancy: str | None = None
     accuracy: float | None = None
+    accuracy_check: bool = False
     rtol: float | None = None
     atol: float | None = None
     until: str | None = None
@@ -112,6 +113,8 @@ def check_tolerances(request: Request) -> None:
     """UsageError where --accuracy, --rtol, --atol make no sense."""
     if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
         raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
+    if request.accuracy_check and (request.rtol is not None or request.atol is not None):
+        raise UsageError("--accuracy-check with --rtol or --atol: there is no estimate to be checked")
     if request.rtol is not None and not FINEST_RTOL <= request.rtol < 1.0:
         raise UsageError(f"--rtol {request.rtol:g}: from {FINEST_RTOL:g} to less than 1, what double precision allows")
     if request.accuracy is not None and not FINEST_ACCURACY <= request.accuracy < 1.0:
@@ -208,6 +211,7 @@ def options_of(
         sampled_at=tuple(t for t in claims if t0 <= t <= t1),
         accuracy=accuracy,
         accuracy_on=on,
+        accuracy_check=request.accuracy_check,
         rtol=request.rtol,
         atol=request.atol,
         method=method,

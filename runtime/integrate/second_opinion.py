@@ -1,0 +1,48 @@
+"""A second, independent run beside the one that is handed back: another method at other tolerances.
+
+Two runs of one method may share what they do not see; its own estimate rests on them alone.  The second run takes a tenth
+of the tolerance that should do, is compared at the same instants, and its trace is thrown away.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from sysdyn.runtime.integrate.accuracy import LAWS, RATIO, Achieved, difference
+from sysdyn.runtime.integrate.request import LONGEST
+from sysdyn.runtime.integrate.runs import Runs, Way
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import SolverFailure
+
+OTHER = {"bdf": "radau", "radau": "bdf", "dopri": "radau"}
+
+
+def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
+    """`achieved` of these runs as a second one by another method leaves it: the larger of both estimates, not met where
+    they are further apart than target [quantities] or the second run fails.
+    """
+    way: Way = replace(runs.way, method=OTHER[runs.method])
+    law, wanted = LAWS[way.method], float(np.min(target, initial=1.0))
+    tolerance = max(RATIO * law.tolerance(wanted if wanted < 1.0 else 1e-4), law.finest)
+    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        options = replace(runs.options, output=Path(folder) / "second.h5", watch=None)
+        second = Runs(runs.start, options, way)
+        second.columns, second.common, second.jumps, second.begin = runs.columns, runs.common, runs.jumps, runs.begin
+        try:
+            apart, over = difference(runs.samplings[-1], second.sampled(tolerance, LONGEST), target)
+        except SolverFailure as failure:
+            if failure.cause == "max_wall":
+                raise
+            return replace(achieved, error_estimate=None, met=False)
+        finally:
+            runs.statistics, runs.cpu = runs.statistics + second.statistics, runs.cpu + second.cpu
+            runs.wall += second.wall
+            if second.writer is not None:
+                second.writer.discard()
+    estimate = max(achieved.error_estimate or 0.0, apart)
+    if not np.isfinite(estimate):
+        return replace(achieved, error_estimate=None, met=False)
+    return replace(achieved, error_estimate=estimate, met=achieved.met and over <= 1.0, runs=achieved.runs + 1)
