@@ -11,6 +11,7 @@
 #define DAMPED 15          /* with corrections shortened */
 #define WALK 45            /* with whole ones: back down an exponential of all digits, one 1/a each, and a few more */
 #define SAFETY 0.9
+#define FIRST 1e-2         /* of the span: the first step at most */
 #define GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
 #define SHRINK 0.2
 #define SLOW 0.99          /* contraction above which Newton gives up */
@@ -183,7 +184,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     set_weights(radau);
     double span = radau->t_end - t, change = tested_norm(radau, yd) * radau->tolerance;
     if (!(h > 0.0)) { /* local error (h y'/y)^4 within tolerance, with y' / y for the rate of all derivatives */
-        h = 1e-2 * span;
+        h = FIRST * span * fmin(1.0, pow(1e3 * radau->tolerance, 0.25)); /* runs that are compared begin apart */
         if (isfinite(change) && change > 0.0)
             h = fmin(h, 0.1 * pow(radau->tolerance, 0.25) / change);
         h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));

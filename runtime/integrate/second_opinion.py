@@ -1,7 +1,7 @@
 """A second, independent run beside the one that is handed back: another method at other tolerances.
 
-Two runs of one method may share what they do not see; its own estimate rests on them alone.  The second run takes a tenth
-of the tolerance that should do, is compared at the same instants, and its trace is thrown away.
+Two runs of one method may share what they do not see, and its estimate rests on them alone. The second run takes a
+tenth of the tolerance that should do, is compared at the same instants, and its trace is thrown away.
 """
 
 from __future__ import annotations
