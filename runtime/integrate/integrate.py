@@ -119,6 +119,7 @@ class Integration:
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._met = np.zeros(self.system.unknowns)
+        self._unnamed = np.isin(self.system.kinds, ("q", "f", "p", "s")) & (self.system.nominal == 0.0)
         self._smooth = self.roles.smooth.astype(np.int32)
         method = self.method.contents
         self._idle = self.roles.idle.astype(np.int32)
@@ -290,8 +291,16 @@ class Integration:
         self.y[:], self._start_rate[:] = 0.0, 0.0
         self.y[:n], self._start_rate[:n] = point
         self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
+        self.begin_to_move(t)
         pointers = (lib.pointer(item) for item in (self.y, self.yd, *before))
         lib.core.sd_run_restart(self.run_, t, label, *pointers)
+
+    def begin_to_move(self, t: float) -> None:
+        """Unknowns that stood at zero so far, and whose rates say only now how large they will be, are sized anew."""
+        begin = (self._met <= ROUND_OFF * self.magnitude) & (self._start_rate != 0.0) & self._unnamed
+        if begin.any():
+            found, _ = magnitudes(self.system, t, self.request.t_end, self.y, self._start_rate)
+            self.magnitude[begin] = np.maximum(found, self._least)[begin]
 
     def _advance(self, sink: Sink, progress: Progress | None, began: float, segment_end: float) -> None:
         """To the end of a segment."""

@@ -46,6 +46,7 @@ class Pieces:
         run, n = self.run, self.run.system.form.written
         run.y[:n], run._start_rate[:n] = point
         run.yd = np.where(run.roles.differential, run._start_rate, 0.0)
+        run.begin_to_move(run.start.t)
         run.method.start(run.start.t, run.y, run.yd)
 
     def _watch(self) -> None:
