@@ -14,7 +14,7 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
     for (int32_t c = 0; c < system->calls; c++)
         system->call[c].rows(&system->call[c].frame, t, y, yd, r);
     for (int32_t i = 0; i < system->held; i++)
-        r[system->held_row[i]] = y[system->held_unknown[i]];
+        r[system->held_row[i]] = (system->held_rate[i] ? yd : y)[system->held_unknown[i]];
     system->residual_evaluations++;
 }
 
@@ -45,8 +45,8 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
     for (int32_t i = 0; i < system->clear; i++)
         jy[system->cleared[i]] = jyd[system->cleared[i]] = 0.0;
     for (int32_t i = 0; i < system->held; i++) {
-        jy[system->held_slot[i]] = 1.0;
-        jyd[system->held_slot[i]] = 0.0;
+        jy[system->held_slot[i]] = system->held_rate[i] ? 0.0 : 1.0;
+        jyd[system->held_slot[i]] = system->held_rate[i] ? 1.0 : 0.0;
     }
     system->jacobian_evaluations++;
 }

@@ -12,6 +12,7 @@
  *   k_scale [kinematics]               factors of these rows: beside Phi_q^T nu they are the inverse metric of q
  *   held_row, held_unknown, held_slot [held]   rows that read "unknown = 0" in the place of their equation (the
  *                                      multiplier of a redundant constraint), with their entry
+ *   held_rate [held]                   1: the row reads "derivative of the unknown = 0"
  *   cleared [clear]                    the other entries of these rows
  *   scale [scales]                     calls of the scale blocks of steep rows (none: no row is steep)
  * All arrays belong to the caller.
@@ -37,7 +38,7 @@ typedef struct sd_system {
     const int32_t *k_row, *k_q, *k_f, *k_slot_q, *k_slot_f;
     const double *k_scale;
     int32_t held, clear;
-    const int32_t *held_row, *held_unknown, *held_slot, *cleared;
+    const int32_t *held_row, *held_unknown, *held_slot, *held_rate, *cleared;
     int32_t scales;
     const sd_call *scale;
     double *v;

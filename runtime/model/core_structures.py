@@ -62,7 +62,7 @@ class System(c.Structure):
         ("k_scale", _P),
         ("held", _I),
         ("clear", _I),
-        *[(name, _P) for name in ["held_row", "held_unknown", "held_slot", "cleared"]],
+        *[(name, _P) for name in ["held_row", "held_unknown", "held_slot", "held_rate", "cleared"]],
         ("scales", _I),
         ("scale", _P),
         ("v", _P),

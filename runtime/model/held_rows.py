@@ -72,18 +72,23 @@ _HELD["settled"] = _HELD["start"] = (
     *_HELD["constraints"], ("phi_acceleration", "kappa"), ("psi_rate", "mu"),
 )  # fmt: skip
 """Form -> groups of rows of a constraint, and the unknown that each reads where the constraint does not hold."""
+_RATES = {"start": {"kappa": "phi_acceleration", "mu": "psi_rate"}}
+"""Form -> multiplier -> group whose rows read its derivative: a force that is zero stays it, and what balances without
+inertia follows from that.  Only where the derivatives of balances stand among the rows.
+"""
 
 
-def switch_rows(description: Description, form: Form) -> tuple[Longs, Longs, Longs]:
-    """Rows, the unknowns that vanish there, and the numbers of their switches."""
+def switch_rows(description: Description, form: Form) -> tuple[Longs, Longs, Longs, Longs]:
+    """Rows, the unknowns that vanish there, the numbers of their switches, and 1 where it is the derivative that does."""
     first = {(group, family): row for group, family, row in form.groups}
-    found: list[tuple[int, int, int]] = []
+    found: list[tuple[int, int, int, int]] = []
+    rates = _RATES.get(form.name, {}) if "dynamics_rate" in description.blocks else {}
     for k, (family, position) in enumerate(description.switches.places):
         item = description.families[family]
         row = multiplier_row(description, family)
         for group, kind in _HELD[form.name]:
             place = nu_place(description, form, family) if kind == "nu" else int(form.at[family])
             if item.kind == ("kappa" if kind == "nu" else kind) and place >= 0 and (group, row) in first:
-                found.append((first[group, row] + position, place + position, k))
-    table = np.asarray(found, dtype=np.int64).reshape(-1, 3)
-    return table[:, 0], table[:, 1], table[:, 2]
+                found.append((first[group, row] + position, place + position, k, int(rates.get(kind) == group)))
+    table = np.asarray(found, dtype=np.int64).reshape(-1, 4)
+    return table[:, 0], table[:, 1], table[:, 2], table[:, 3]

@@ -111,6 +111,7 @@ class System:
         self._scratch = np.zeros(entries)
         self._keep += [calls, slots]
         number = np.concatenate([np.full(held[0].size, -1), times[2]])
+        self._reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
         at_times = parts[-1].row.astype(np.int32), parts[-1].column.astype(np.int32)
         self._may_hold: tuple[Ints, Ints, Ints, NDArray[np.int64]] = (*at_times, slots[-1], number)
         self.core = lib.System(
@@ -142,10 +143,11 @@ class System:
         now = (number < 0) | ~np.append(self.description.switches.active, True)[number]
         self.held = row, unknown = rows[now], unknowns[now]
         cleared = np.flatnonzero(np.isin(self.pattern.row, row)).astype(np.int32)
-        self._held = row, unknown, slots[now].copy(), cleared
+        self._held = row, unknown, slots[now].copy(), self._reads_rate[now], cleared
         core = self.core
         core.held, core.clear = row.size, cleared.size
-        core.held_row, core.held_unknown, core.held_slot, core.cleared = map(lib.pointer, self._held)
+        arrays = map(lib.pointer, self._held)
+        core.held_row, core.held_unknown, core.held_slot, core.held_rate, core.cleared = arrays
 
     def idle_multipliers(self) -> Ints:
         """Places of the multipliers of constraints that do not hold now."""
@@ -189,6 +191,7 @@ class System:
             in_y[self._slots[2 * k + 2]] = True
             in_rate[self._slots[2 * k + 3]] = True
         in_y[self._slots[-1]] = True
+        in_rate[self._slots[-1][self._reads_rate != 0]] = True
         return in_y, in_rate
 
     def observer(self, block: str) -> lib.Call | None:
