@@ -110,8 +110,8 @@ int sd_radau_astray(sd_radau *radau)
             radau->rate[i] = (d[1] * z1 + d[2] * z2 + d[3] * z3) / radau->h;
         }
         sd_residual(radau->system, at, radau->y, radau->rate, radau->d[0]);
-        if (sd_first_astray(radau->system, at, radau->y, radau->rate, radau->d[0], radau->jy, radau->magnitude,
-                            radau->terms) >= 0)
+        if (sd_first_astray(radau->system, at, radau->y, radau->rate, radau->d[0], radau->jy, radau->jyd, radau->h,
+                            radau->magnitude, radau->terms) >= 0)
             return 1;
     }
     return 0;

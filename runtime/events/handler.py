@@ -31,6 +31,8 @@ CASCADE = 100
 STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
+FALLEN = 1e-4
+"""Of what else counts as zero: a gap that an impact opened closes again below it."""
 AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
 """Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
 
@@ -63,6 +65,7 @@ class Handler:
         self.determined = Determined(self.contacts)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
+        self.level: dict[int, float] = {}
         self.happened: list[Happened] = []
         self.samples = 0
         self._next = [0] * len(plan.sampled)
@@ -109,7 +112,7 @@ class Handler:
         found = self.watched()
         array = (lib.Watch * max(len(found), 1))()
         for k, w in enumerate(found):
-            array[k] = lib.Watch(w.row, w.side, self.observer.zero(w.row))
+            array[k] = lib.Watch(w.row, w.side, self._least(w) - self.level.get(w.row, 0.0))
         return array
 
     # -- the start -----------------------------------------------------------------------------------------------
@@ -150,7 +153,7 @@ class Handler:
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        rows = [(w.row, w.side, self.observer.zero(w.row), self._rate(w)) for w in watched]
+        rows = [(w.row, w.side, self._least(w), self._rate(w), self.level.get(w.row, 0.0)) for w in watched]
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
@@ -159,6 +162,10 @@ class Handler:
         values = self.observer(t, y, yd)
         found = [w for w in self.watched() if w.relation >= 0]
         return [w for w in found if w.side * values[w.row] < -self.observer.zero(w.row)]
+
+    def _least(self, watched: Watched) -> float:
+        """What a watched value may fall by unseen: behind an impact nearly nothing, for bounces become small."""
+        return (FALLEN if watched.row in self.level else 1.0) * self.observer.zero(watched.row)
 
     def _rate(self, watched: Watched) -> int:
         """The row of the rate of what is watched, where there is one."""
@@ -237,8 +244,18 @@ class Handler:
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
         self._renew(t, *found)
+        self._level(t, *found)
         self._note(t, said, touched)
         return found
+
+    def _level(self, t: float, y: Floats, yd: Floats) -> None:
+        """The values at which gaps that an impact opened begin."""
+        values = self.observer(t, y, yd)
+        for k, contact in enumerate(self.plan.contacts):
+            if contact.kind == "phi":
+                self.level.pop(contact.value, None)
+                if not self.contacts.active[k] and abs(values[contact.value]) <= self.observer.zero(contact.value):
+                    self.level[contact.value] = min(float(values[contact.value]), 0.0)
 
     def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
         """The point with the active set that fits a little later, None where none differs.

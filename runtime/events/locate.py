@@ -17,8 +17,11 @@ ITERATIONS = 60
 
 Dense = Callable[[float], Floats]
 """t (s) -> values [observed] there."""
-Watch = tuple[int, int, float, int]
-"""(row, side, tolerance, row of its rate or -1): it changes where side*value falls below -tolerance."""
+Watch = tuple[int, int, float, int, float]
+"""(row, side, tolerance, row of its rate or -1, level <= 0): it changes where side*value - level falls below -tolerance.
+A bounce begins at the value that the impact before it left, which is zero but for round-off: that is its level, else the
+round-off of many bounces adds up to a fall.
+"""
 
 
 def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -> tuple[float, list[int]] | None:
@@ -38,9 +41,9 @@ def _falls(watch: Watch, low: Floats, high: Floats) -> bool:
     """Whether a watch changes between two points; what leaves zero upwards, and still does, has not: the interpolant of
     a first step of order 1 may pull it below.
     """
-    row, side, small, rate = watch
-    rises = rate >= 0 and side * low[row] <= 0.0 and side * low[rate] > 0.0 and side * high[rate] >= 0.0
-    return bool(side * high[row] < -small and not rises)
+    row, side, small, rate, level = watch
+    rises = rate >= 0 and side * low[row] <= level and side * low[rate] > 0.0 and side * high[rate] >= 0.0
+    return bool(side * high[row] - level < -small and not rises)
 
 
 def _first(
@@ -62,19 +65,21 @@ def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[
     """Where a watch falls through zero; what begins at zero and rises (a bounce lower than the tolerance) falls from
     its crest.
     """
-    row, side, _, rate = watch
-    begin, value = low[0], side * float(low[1][row])
+    row, side, _, rate, level = watch
+    begin, value = low[0], side * float(low[1][row]) - level
     if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
         ends = ((at, side * float(values[rate])) for at, values in (low, high))
         begin = _root(dense, rate, side, *ends)
-        value = side * float(dense(begin)[row])
+        value = side * float(dense(begin)[row]) - level
         if value <= 0.0:
             return high[0]
-    return _root(dense, row, side, (begin, value), (high[0], side * float(high[1][row])))
+    return _root(dense, row, side, (begin, value), (high[0], side * float(high[1][row]) - level), level)
 
 
-def _root(dense: Dense, row: int, side: int, low: tuple[float, float], high: tuple[float, float]) -> float:
-    """Where side*value falls through zero; low where it is not above zero there already."""
+def _root(
+    dense: Dense, row: int, side: int, low: tuple[float, float], high: tuple[float, float], level: float = 0.0
+) -> float:
+    """Where side*value - level falls through zero; low where it is not above zero there already."""
     (a, fa), (b, fb) = low, high
     if fa <= 0.0:
         return a
@@ -82,7 +87,7 @@ def _root(dense: Dense, row: int, side: int, low: tuple[float, float], high: tup
         middle = 0.5 * (a + b)
         if not a < middle < b:
             break
-        fm = side * float(dense(middle)[row])
+        fm = side * float(dense(middle)[row]) - level
         root = math.sqrt(fm * fm - fa * fb)
         t = middle + (middle - a) * fm / root if root else middle
         if fm > 0.0:
@@ -90,7 +95,7 @@ def _root(dense: Dense, row: int, side: int, low: tuple[float, float], high: tup
         else:
             b, fb = middle, fm
         if a < t < b:
-            ft = side * float(dense(t)[row])
+            ft = side * float(dense(t)[row]) - level
             if ft > 0.0:
                 a, fa = t, ft
             else:

@@ -27,6 +27,8 @@ SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
 RATIO = 0.1
 """Of the tolerances of the first two runs."""
+RETRIED = (1.0, 0.1, 1e-2)
+"""Of the tolerance of a first run: the next ones where it fails."""
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
 SHORT, SHORT_CREDIT = 60, 0.75
@@ -35,6 +37,8 @@ FIRST_DROP = 1e-2
 STRETCH = 1.5
 """Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
 differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
+TIMING = 1e-9
+"""Of the span: the time tolerance of comparisons, as that of `diff`."""
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 
@@ -70,7 +74,8 @@ LAWS = {
 class Sampled:
     """What a run hands to the comparison.  values [instants, quantities]; largest [quantities] against
     which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it is zero to round-off;
-    between [instants]: between an event of this run and the same one of the run before it.
+    between [instants]: between an event of this run and the same one of the run before it; late [instants, quantities]:
+    what each value moves by within the time tolerance (TIMING): on a steep front no more is asked.
     """
 
     tolerance: float
@@ -79,6 +84,7 @@ class Sampled:
     steps: int
     noise: Floats | float = 0.0
     between: NDArray[np.bool_] | None = None
+    late: Floats | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +104,12 @@ Run = Callable[[float, float], Sampled]
 """Integrates with a tolerance and a longest step as part of the span."""
 
 
+def apart(coarse: Sampled, fine: Sampled) -> Floats:
+    """How far two runs' values are from each other [instants, quantities], within the time tolerance."""
+    late = np.maximum(np.nan_to_num(coarse.late), np.nan_to_num(fine.late))
+    return np.asarray(np.fmax(np.abs(fine.values - coarse.values) - late, 0.0 * fine.values * coarse.values))
+
+
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
     """(largest relative difference, the same over the accuracy wanted) of two runs, in the finer one's sizes."""
     size = fine.largest
@@ -112,7 +124,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
         return 0.0, 0.0
     there = ... if fine.between is None else ~fine.between
     with np.errstate(all="ignore"):
-        relative = np.abs(fine.values - coarse.values)[there][:, use].max(axis=0, initial=0.0) / size[use]
+        relative = apart(coarse, fine)[there][:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative), relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
 
@@ -147,14 +159,15 @@ def _limited(failure: SolverFailure) -> bool:
 
 
 def _draft(run: Run, tolerance: float, finest: float) -> Sampled:
-    """The first run; once more with a smaller tolerance where it fails."""
+    """The first run; where it fails, once more with smaller tolerances."""
     longest = STRETCH * LONGEST
-    try:
-        return run(min(tolerance / RATIO, LOOSEST), longest)
-    except SolverFailure as failure:
-        if _limited(failure) or failure.cause == "stiff":
-            raise
-        return run(max(1e-2 * tolerance, finest) / RATIO, longest)
+    for smaller in RETRIED[:-1]:
+        try:
+            return run(min(max(smaller * tolerance, finest) / RATIO, LOOSEST), longest)
+        except SolverFailure as failure:
+            if _limited(failure) or failure.cause == "stiff":
+                raise
+    return run(max(RETRIED[-1] * tolerance, finest) / RATIO, longest)
 
 
 class _Estimate:
@@ -230,12 +243,17 @@ def _finer(run: Run, last: Sampled, tolerance: float, longest: float, *, compare
 
     compared: there is an estimate without it; else its failure is raised.
     """
+    tried = 0
     while True:
         try:
             return run(tolerance, longest)
         except SolverFailure as failure:
-            if _limited(failure) or not compared:
+            tried += 1
+            if _limited(failure) or (not compared and tried == len(RETRIED)):
                 raise
+        if not compared:  # there is nothing to hand back yet: a little finer, where luck is another
+            tolerance *= WORTH
+            continue
         tolerance = float(np.sqrt(tolerance * last.tolerance))
         if tolerance > WORTH * last.tolerance:
             return None

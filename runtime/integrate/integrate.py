@@ -184,7 +184,7 @@ class Integration:
         run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps = int(request.sample_steps)
-        if self.underlying is None:
+        if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
         run.row, run.room = lib.pointer(self._rows), self._rows.shape[0]
 

@@ -323,9 +323,16 @@ class Runs:
         between = beside(self.common, jumps if last is None else last, jumps, self.options.t_end - self.options.t_start)
         if finished.beyond > BEYOND:
             rows = np.full_like(rows, np.nan)
-        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise, between)
+        late = self._late(rows)
+        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise, between, late)
         self.samplings = (*self.samplings[-1:], found)
         return found
+
+    def _late(self, rows: Floats) -> Floats:
+        """What the compared quantities move by within the time tolerance at these rows [k, quantities]."""
+        rates = [lib.ROW_HEAD + len(self.names) + column.place for column in self.columns]
+        tau = accuracy.TIMING * (self.options.t_end - self.options.t_start)
+        return np.hstack([tau * np.abs(rows[:, rates]), np.zeros((len(rows), len(self.meters)))])
 
     @property
     def _width(self) -> int:
@@ -360,7 +367,7 @@ class Runs:
         assert self.common is not None
         size = (one if one.tolerance < two.tolerance else two).largest
         with np.errstate(all="ignore"):
-            ratio = np.abs(two.values - one.values) / (size * target)
+            ratio = accuracy.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
         ratio = np.where(one.values == two.values, 0.0, ratio)
         ratio[two.between] = 0.0

@@ -33,8 +33,12 @@ def rows(name: str, formulation: str, accuracies: list[float]) -> list[Row]:
         runs = [(a, run) for a in accuracies if (run := bench.run(accuracy=a)) is not None]
         if not runs:
             return []
-        reference = Reference(bench, [run for _, run in runs])
         where = f"{name} {formulation}"
+        try:
+            reference = Reference(bench, [run for _, run in runs])
+        except NoSuchForm as error:
+            print(f"{where}: {error}", flush=True)
+            return []
         return [row(where, a, reference.error(run), run) for a, run in runs]
 
 

@@ -81,7 +81,7 @@ def test_a_page_of_coordinates(tmp_path):
     assert "asked for by phi rod" in page.words
     assert "1 guesses were moved" in page.words
     assert "phi rod" in page.words
-    assert "2 (stabilised)" in page.words
+    assert "dopri" in page.words
     assert "expect" in page.words
 
 
