@@ -114,7 +114,7 @@ def test_all_is_well(project, capsys):
 
 
 def test_other_methods_and_backends_are_no_alarm(project):
-    assert run(["golden", "check", "-q", "--method", "bdf", "--method", "radau"]) == 0
+    assert run(["golden", "check", "--method", "bdf", "--method", "radau"]) == 0
     assert run(["golden", "check", "-q", "spring", "--backend", "c", "--backend", "numpy"]) == 0
 
 
