@@ -18,9 +18,9 @@ ITERATIONS = 60
 Dense = Callable[[float], Floats]
 """t (s) -> values [observed] there."""
 Watch = tuple[int, int, float, int, float]
-"""(row, side, tolerance, row of its rate or -1, level <= 0): it changes where side*value - level falls below -tolerance.
-A bounce begins at the value that the impact before it left, which is zero but for round-off: that is its level, else the
-round-off of many bounces adds up to a fall.
+"""(row, side, tolerance, row of its rate or -1, level <= 0): it changes where side*value - level falls below
+-tolerance. A bounce begins at the value that the impact before it left, which is zero but for round-off: that is its
+level, else the round-off of many bounces adds up to a fall.
 """
 
 

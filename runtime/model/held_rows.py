@@ -79,7 +79,7 @@ inertia follows from that.  Only where the derivatives of balances stand among t
 
 
 def switch_rows(description: Description, form: Form) -> tuple[Longs, Longs, Longs, Longs]:
-    """Rows, the unknowns that vanish there, the numbers of their switches, and 1 where it is the derivative that does."""
+    """Rows, the unknowns that vanish there, the numbers of their switches; 1 where their derivative does."""
     first = {(group, family): row for group, family, row in form.groups}
     found: list[tuple[int, int, int, int]] = []
     rates = _RATES.get(form.name, {}) if "dynamics_rate" in description.blocks else {}

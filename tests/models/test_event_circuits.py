@@ -141,3 +141,29 @@ def test_a_buck_converter_against_its_exponentials(method, formulation, tmp_path
     off = np.array([e.time for e in trace.events if e.name.startswith("when on")])
     assert len(off) == 50
     assert np.abs(off / period - np.arange(50) - duty).max() < 1e-9
+
+
+VALVES = """from std.fluid import check_valve
+model m {
+  node chamber, line: hydraulic
+  piston: flow(f = 0.1 l/s*sin(10 rad/s*t)) ground -> chamber
+  oil: potential(e = 1e11 Pa/m^3*q) chamber -> ground
+  suction: check_valve() ground -> chamber
+  pressure: check_valve() chamber -> line
+  vessel: potential(e = 1e9 Pa/m^3*q) line -> ground
+  load: dissipator(e = 5e9 Pa.s/m^3*f) line -> ground
+  init oil.e = 1 bar
+  init vessel.e = 1 bar
+}
+scene s of m {
+  time 0 s to 0.1 s
+  trace pressure.f as p, suction.f as s every 1 ms
+}
+"""
+
+
+def test_valves_in_series_begin_with_the_flow_that_keeps_both_pressures_alike(tmp_path):
+    """An open valve joins both vessels: 0.02 l/s that leak divide as the stiffnesses do."""
+    trace = run(VALVES, tmp_path, "lagrangian")
+    assert trace["p"].values[0] == pytest.approx(1e5 / 5e9 / 101.0, rel=1e-9)
+    assert abs(trace["s"].values[0]) < 1e-15
