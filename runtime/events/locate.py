@@ -68,8 +68,8 @@ def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[
     row, side, _, rate, level = watch
     begin, value = low[0], side * float(low[1][row]) - level
     if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
-        ends = ((at, side * float(values[rate])) for at, values in (low, high))
-        begin = _root(dense, rate, side, *ends)
+        lower, upper = ((at, side * float(values[rate])) for at, values in (low, high))
+        begin = _root(dense, rate, side, lower, upper)
         value = side * float(dense(begin)[row]) - level
         if value <= 0.0:
             return high[0]
