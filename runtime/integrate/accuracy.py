@@ -37,8 +37,8 @@ FIRST_DROP = 1e-2
 STRETCH = 1.5
 """Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
 differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
-TIMING = 1e-9
-"""Of the span: the time tolerance of comparisons, as that of `diff`."""
+TIMING, SHARE = 1e-9, 1e-3
+"""Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 

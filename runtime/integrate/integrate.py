@@ -26,7 +26,7 @@ from sysdyn.runtime.integrate.unknown_roles import Roles, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
-from sysdyn.runtime.model.scales import ROUND_OFF, confirmed, magnitudes, unresolved
+from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, unresolved
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.start.restart import Restart
@@ -296,10 +296,11 @@ class Integration:
         lib.core.sd_run_restart(self.run_, t, label, *pointers)
 
     def begin_to_move(self, t: float) -> None:
-        """Unknowns that stood at zero so far, and whose rates say only now how large they will be, are sized anew."""
-        begin = (self._met <= ROUND_OFF * self.magnitude) & (self._start_rate != 0.0) & self._unnamed
+        """Unknowns that stood at zero so far, of unknown size, and whose rates say only now how large they will be."""
+        begin = (self._met <= ROUND_OFF) & (self.magnitude == UNKNOWN) & (self._start_rate != 0.0) & self._unnamed
         if begin.any():
-            found, _ = magnitudes(self.system, t, self.request.t_end, self.y, self._start_rate)
+            with np.errstate(over="ignore"):
+                found, _ = magnitudes(self.system, t, self.request.t_end, self.y, self._start_rate)
             self.magnitude[begin] = np.maximum(found, self._least)[begin]
 
     def _advance(self, sink: Sink, progress: Progress | None, began: float, segment_end: float) -> None:

@@ -331,7 +331,9 @@ class Runs:
     def _late(self, rows: Floats) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]."""
         rates = [lib.ROW_HEAD + len(self.names) + column.place for column in self.columns]
-        tau = accuracy.TIMING * (self.options.t_end - self.options.t_start)
+        options = self.options
+        asked = min((a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None), default=0.0)
+        tau = min(accuracy.TIMING, accuracy.SHARE * asked) * (options.t_end - options.t_start)
         return np.hstack([tau * np.abs(rows[:, rates]), np.zeros((len(rows), len(self.meters)))])
 
     @property

@@ -21,6 +21,8 @@ NOTHING = 1e-14
 """Of the largest of the same kind and unit: less is what arithmetic leaves of a zero."""
 FRESH = 1e-9
 """Of what a rate makes of a quantity in the time scale known so far: a start below this part of it is round-off."""
+UNKNOWN = 1.0
+"""Magnitude of what is zero with all that could size it."""
 GROUP = 1e-3
 SPAN = 1e-2
 NOISE = 1e-6
@@ -237,7 +239,7 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     found = np.where(found == 0.0, group_maximum(system, found), found)
     found[form.k_q] = np.where(found[form.k_q] == 0.0, tau * found[form.k_f], found[form.k_q])
     tiny = np.finfo(np.float64).tiny * 1e30
-    return np.where(found > tiny, found, 1.0), tau
+    return np.where(found > tiny, found, UNKNOWN), tau
 
 
 def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Floats:
