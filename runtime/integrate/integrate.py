@@ -192,8 +192,9 @@ class Integration:
         """Rows so far go to the sink."""
         run = self.run_.contents
         if run.rows:
-            sink(self._rows[: run.rows].copy())
-            run.rows = 0
+            rows = self._rows[: run.rows].copy()
+            run.rows = 0  # first: an interruption in between must not hand them over twice
+            sink(rows)
 
     def _placed(self, failure: SolverFailure) -> SolverFailure:
         """The failure with the last good point."""
