@@ -110,6 +110,7 @@ class Runs:
         self.controlled = False
         self.forecast: float | None = None
         self.common = known(self.instants, options)
+        self.compared_at: Floats | None = None
 
     def take(self, way: Way) -> None:
         """Goes on with another method and form."""
@@ -168,10 +169,10 @@ class Runs:
             self.samples = [*self.samples[:-1], *([kept] if kept.size else []), taken[-1:]]
 
     def _compare(self, rows: Floats, kind: Ints) -> None:
-        """Keeps what runs are compared by: the first one's own rows, thinned; later the rows at these instants."""
-        if self.common is None:
+        """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
+        if self.options.every is None:
             self.thinned.take(rows[(kind & TRACE) > 0])
-        elif (kind & COMPARED).any():
+        if (kind & COMPARED).any():
             self.rows.append(rows[(kind & COMPARED) > 0])
 
     def _observed(self, rows: Floats) -> Floats:
@@ -309,24 +310,32 @@ class Runs:
         """One run of the accuracy control; longest: step, as part of the span."""
         self.controlled = True
         finished = self.run(tolerance, None, longest)
-        if self.common is None:
+        rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self._width))
+        instants, there = self.common, None
+        if self.options.every is None:
             self.common = common(self.thinned.time, self.options)
-            rows = self.thinned.rows(self.common)
-        else:
-            rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self._width))
-        places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
+            there = self._sampled(self.thinned.rows(self.common), finished)
+        self.compared_at = instants if instants is not None else self.common
+        values, late = there if there is not None and instants is None else self._sampled(rows, finished)
         sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
         noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(self.meters)))
         jumps = np.unique([e.time for e in finished.events])
         last, self.jumps = self.jumps, jumps
-        between = beside(self.common, jumps if last is None else last, jumps, self.options.t_end - self.options.t_start)
-        if finished.beyond > BEYOND:
-            rows = np.full_like(rows, np.nan)
-        late = self._late(rows)
-        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise, between, late)
+        span = self.options.t_end - self.options.t_start
+        assert self.compared_at is not None
+        between = beside(self.compared_at, jumps if last is None else last, jumps, span)
+        steps = finished.statistics.steps
+        found = Sampled(tolerance, values, np.array(sizes), steps, noise, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
+
+    def _sampled(self, rows: Floats, finished: Finished) -> tuple[Floats, Floats]:
+        """The compared quantities [k, quantities] at rows, and what they move by within the time tolerance."""
+        if finished.beyond > BEYOND:
+            rows = np.full_like(rows, np.nan)
+        places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
+        return rows[:, places], self._late(rows)
 
     def _late(self, rows: Floats) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]."""
@@ -363,20 +372,20 @@ class Runs:
         """
         asked = {name: float(wanted) for name, wanted in zip(self.compared, target, strict=True)}
         name = min(asked, key=lambda n: asked[n], default="")
-        if len(self.samplings) < 2 or self.samplings[0].values.shape != self.samplings[1].values.shape:
+        if len(self.samplings) < 2 or self.samplings[0].own[0].shape != self.samplings[1].values.shape:
             return name, asked.get(name, 0.0), None
         one, two = self.samplings
-        assert self.common is not None
+        assert self.compared_at is not None
         size = (one if one.tolerance < two.tolerance else two).largest
         with np.errstate(all="ignore"):
             ratio = accuracy.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
-        ratio = np.where(one.values == two.values, 0.0, ratio)
+        ratio = np.where(one.own[0] == two.values, 0.0, ratio)
         ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
         name = self.compared[k]
-        return name, asked[name], float(self.common[beyond[0]]) if beyond.size else None
+        return name, asked[name], float(self.compared_at[beyond[0]]) if beyond.size else None
 
     def collected(self) -> Samples:
         """Samples of the run that stands in the trace."""
