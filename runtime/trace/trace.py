@@ -317,3 +317,8 @@ class Trace:
     def statistics(self) -> dict[str, Any]:
         """Counters of the run."""
         return dict(json.loads(self.attributes.get("statistics", "{}")))
+
+    @property
+    def timings(self) -> dict[str, float]:
+        """CPU and wall seconds of the run; empty where they were not asked for."""
+        return dict(json.loads(self.attributes.get("timings", "{}")))
