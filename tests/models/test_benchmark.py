@@ -1,4 +1,4 @@
-"""Public benchmark problems at accuracy 1e-6: published end values, exact solutions, or SciPy on the expert's equations.
+"""Public benchmark problems at accuracy 1e-6: published end values, exact solutions, or SciPy on an expert's equations.
 
 The stiff families that take longer stand in tests/extremes/test_stiff.py.
 """
