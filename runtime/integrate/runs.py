@@ -1,16 +1,13 @@
 """The runs of one simulation, each of which writes a trace.
 
-The first run, a draft where the accuracy is controlled, streams into the file itself; a finer run into a neighbour
-`.NAME.part` that takes its place when it is finished: whatever is killed, a readable trace stands at the path.
+The first is a draft where the accuracy is controlled; the last that finished is kept (trace/keeping.py).
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
 import time
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,8 +22,8 @@ from sysdyn.runtime.model.description import Description, Floats, Ints, element
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.trace.trace import Column, TraceWriter, columns_of
-from sysdyn.runtime.trace.trace_store import clear
+from sysdyn.runtime.trace.keeping import Held, Writer, keeping
+from sysdyn.runtime.trace.trace import Column, Layout, Trace, columns_of
 
 LONG = 1000
 """Steps of the bdf after which method auto tries radau."""
@@ -82,7 +79,7 @@ class Samples:
 
 
 class Runs:
-    """The runs of one simulation: each writes a trace; the last finished one stands at the path."""
+    """The runs of one simulation: each writes a trace; the last finished one is kept."""
 
     def __init__(self, start: ConsistentState, options: Options, way: Way) -> None:
         self.start, self.options = start, options
@@ -92,19 +89,16 @@ class Runs:
         self.begin = self.system.description.p.copy(), self.system.description.switches.active.copy()
         self.names = _observed_names(self.system.description)
         self.instants, self.kinds = instants(options)
-        self.path = Path(options.output)
-        self.target = self.path.resolve()
-        for place in (self.target, self._part):
-            clear(place)
+        self.keeping = keeping(options.output)
         self.statistics, self.last_statistics = Statistics(), Statistics()
         self.cpu = self.wall = 0.0
         self.number = 0
         self.began = time.monotonic()
-        self.writer: TraceWriter | None = None
+        self.writer: Writer | None = None
         self.finished: Finished | None = None
         self.rows: list[Floats] = []
         self.samples: list[Floats] = []
-        self.done: tuple[Finished, list[Floats], TraceWriter] | None = None
+        self.done: tuple[Finished, list[Floats], Writer] | None = None
         self.samplings: tuple[Sampled, ...] = ()
         self.jumps: Floats | None = None
         self.controlled = False
@@ -146,11 +140,6 @@ class Runs:
             max_order=1 if self.method == "euler" else lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
-
-    @property
-    def _part(self) -> Path:
-        """Where a finer run writes before it takes the trace's place."""
-        return self.target.with_name(f".{self.target.name}.part")
 
     @property
     def most_steps(self) -> int | None:
@@ -200,7 +189,6 @@ class Runs:
     def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
         first = self.done is None
-        target = self.target if first else self._part
         attributes: dict[str, str | float | int] = {
             **self.options.attributes,
             "method": self.method,
@@ -210,7 +198,8 @@ class Runs:
         }
         self.samples = []
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
-        self.writer = TraceWriter(target, self.columns, len(self.names), attributes, self.options.parameters)
+        layout = Layout(self.columns, len(self.names), attributes, self.options.parameters)
+        self.writer = self.keeping.writer(layout, first)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest))
         try:
             finished = self._integrate(integration)
@@ -218,7 +207,8 @@ class Runs:
             self._leave(integration, first)
             raise
         self.writer.flush()
-        self._take(first)
+        if self.done is not None:
+            self.keeping.take(self.writer, self.done[2])
         self.done, self.finished = (finished, self.samples, self.writer), finished
         return finished
 
@@ -246,18 +236,7 @@ class Runs:
             attributes: dict[str, str | float | int] = {**self.last_attributes(None), "met": 0, "judged": ""}
             self.writer.finish(nominal, attributes, final=False, events=integration.happened())
             return
-        self.writer.discard()
-        with contextlib.suppress(OSError):
-            self.writer.path.unlink()
-
-    def _take(self, first: bool) -> None:
-        """The finished run's file takes the path (the writer keeps writing its last attributes to it)."""
-        assert self.writer is not None
-        if not first:
-            assert self.done is not None
-            self.done[2].discard()
-            self.writer.path.replace(self.target)
-            self.writer.path = self.target
+        self.keeping.drop(self.writer)
 
     def sizes(self, largest: Floats, magnitude: Floats) -> Floats:
         """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
@@ -281,6 +260,12 @@ class Runs:
         """Nominal magnitude of each stored quantity."""
         sizes = self.sizes(largest, magnitude)
         return {column.name: float(size) for column, size in zip(self.columns, sizes, strict=True)}
+
+    @property
+    def held(self) -> Trace | None:
+        """The trace of a run that is kept in memory, once it is closed."""
+        writer = self.writer if self.done is None else self.done[2]
+        return writer.trace if isinstance(writer, Held) else None
 
     def last_attributes(self, error_estimate: float | None) -> dict[str, str]:
         """Statistics and timings as JSON."""
