@@ -19,9 +19,11 @@ COMMANDS = {
     "explain": "Say what a diagnostic code means.",
     "fmt": "Bring model texts into the canonical layout.",
     "golden": "Golden traces of a project: record, check, accept, list.",
+    "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
     "plot": "Draw quantities of a trace.",
     "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
+    "std": "Show the standard library, or a component of it.",
     "verify": "Compare the formulations and methods of a scene.",
 }
 
