@@ -19,6 +19,7 @@ COMMANDS = {
     "explain": "Say what a diagnostic code means.",
     "fmt": "Bring model texts into the canonical layout.",
     "golden": "Golden traces of a project: record, check, accept, list.",
+    "help": "Explain a topic of the language: units, tables, scenes, events, ...",
     "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
     "plot": "Draw quantities of a trace.",
     "report": "Write one page about a model and its run.",

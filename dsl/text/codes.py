@@ -15,6 +15,18 @@ from pathlib import Path
 from types import MappingProxyType
 
 _SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
+CLASSES = {
+    "1": "names and text",
+    "2": "units and dimensions",
+    "3": "laws and state functions: Paynter's diagram",
+    "4": "elements and networks",
+    "5": "coordinates and constraints",
+    "6": "formulations and what the compiler makes of laws",
+    "7": "events",
+    "8": "components, levels and arrays",
+    "9": "scenes and runs",
+}
+"""What the first digit of a code says."""
 _MOST_LINES, _MOST_COLUMNS = 40, 100
 
 
@@ -53,6 +65,15 @@ def explain(code: str) -> str:
     if page.bad is not None and page.good is not None:
         parts += ["Wrong:", _shown(page.bad), "Right:", _shown(page.good)]
     return "\n\n".join(parts) + "\n"
+
+
+def index() -> str:
+    """One line a code, by class."""
+    parts = []
+    for digit, said in CLASSES.items():
+        pages = sorted((c for c in codes().values() if c.code[1] == digit), key=lambda c: (c.code[1:], c.code[0]))
+        parts.append("\n".join([f"{digit}xx: {said}", *(f"  {c.code}  {c.title}" for c in pages)]))
+    return "\n\n".join(parts) + "\n\nE error, W warning, N note; sysdyn explain CODE shows one.\n"
 
 
 def _generated() -> dict[str, tuple[str, str]]:
