@@ -10,7 +10,7 @@ from sysdyn.cli.failures import UsageError
 @with_console("help")
 @click.argument("topic", required=False)
 def command(console: Console, topic: str | None) -> int:
-    """Explain TOPIC, a page of the language; a command and a code of a finding are topics too. Without one: the index."""
+    """Explain TOPIC, a page of the language; a command or a code of a finding too. Without TOPIC: the index."""
     from sysdyn.cli.manual import topics
 
     if topic is None:

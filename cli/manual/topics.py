@@ -1,4 +1,4 @@
-"""The pages of the language (`dsl/language/*.md`), each once: read here for `sysdyn help`, and by people as they are."""
+"""The pages of the language (`dsl/language/*.md`), written once: `sysdyn help` prints them, people read them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,29 @@ import sysdyn.dsl.load
 from sysdyn.cli.page.columns import aligned
 
 FOLDER = Path(sysdyn.dsl.load.__file__).parent / "language"
-FIRST = (
-    "overview text units expressions parameters tables coordinates constraints elements domains components levels arrays "
-    "signals start scenes traces expectations events formulations habits"
-).split()
+FIRST = [
+    "overview",
+    "text",
+    "units",
+    "expressions",
+    "parameters",
+    "tables",
+    "coordinates",
+    "constraints",
+    "elements",
+    "domains",
+    "components",
+    "levels",
+    "arrays",
+    "signals",
+    "start",
+    "scenes",
+    "traces",
+    "expectations",
+    "events",
+    "formulations",
+    "habits",
+]
 """The order in which the pages are read."""
 
 
