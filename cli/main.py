@@ -16,12 +16,17 @@ COMMANDS = {
     "check": "Check models: everything that needs no time integration.",
     "compile": "Write the residual module and its manifest.",
     "diff": "Compare two traces.",
+    "doctor": "Look at the machine: compiler, cache, versions, a small run.",
     "explain": "Say what a diagnostic code means.",
     "fmt": "Bring model texts into the canonical layout.",
     "golden": "Golden traces of a project: record, check, accept, list.",
+    "help": "Explain a topic of the language: units, tables, scenes, events, ...",
+    "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
+    "new": "Begin a project: model, scenes, golden trace, CI file.",
     "plot": "Draw quantities of a trace.",
     "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
+    "std": "Show the standard library, or a component of it.",
     "verify": "Compare the formulations and methods of a scene.",
 }
 

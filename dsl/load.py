@@ -12,11 +12,12 @@ from pathlib import Path
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
+from sysdyn.dsl.elaborate.listing import Instance, Readable, instances, readable
 from sysdyn.dsl.elaborate.scenes import SceneReader
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Network, Scene, nodes_read
+from sysdyn.dsl.model.network import Network, Parameter, Scene, nodes_read
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.context import Failed
@@ -37,6 +38,17 @@ class Document:
     file: syntax.File
     models: dict[str, syntax.Model]
     scenes: dict[str, syntax.Scene]
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """What a model offers to those who run it: parameters (inputs that hold constants too) and names to read."""
+
+    parameters: dict[str, Parameter]
+    inputs: tuple[str, ...]
+    known: Values
+    readable: tuple[Readable, ...]
+    instances: tuple[Instance, ...]
 
 
 def read(path: str | Path, report: Report, name: str | None = None) -> Document:
@@ -109,6 +121,36 @@ def _network(
     *,
     required: bool,
 ) -> Network | None:
+    elaborator, reader = _elaborated(document, model, scene, report, settings, levels)
+    read_scene: Scene | None = None
+    if scene is not None:
+        read_scene = reader.read(scene, Place(document.file.source, scene.name.span))
+    if _unread(elaborator, scene):
+        return None  # what is missing would be found missing again, in other words
+    elaborator.quadratures()
+    checks.run(elaborator, report, required=required)
+    checks.set_valued_results(elaborator, reader.observations, report)
+    _begin(elaborator, read_scene)
+    known = Values(elaborator.parts.parameters, reader.elements)
+    if not report.failed and not _incomplete(report):
+        events.expanded(elaborator, known)
+    checks.values(elaborator, known, report)
+    if not report.failed and not _incomplete(report):
+        graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
+    found = _result(elaborator, reader, read_scene)
+    laws.run(found, known, report)
+    return None if report.failed or _incomplete(report) else found
+
+
+def _elaborated(
+    document: Document,
+    model: syntax.Model,
+    scene: syntax.Scene | None,
+    report: Report,
+    settings: Sequence[tuple[str, str]],
+    levels: Sequence[tuple[str, str]],
+) -> tuple[Elaborator, SceneReader]:
+    """The model with the levels and settings asked for: its names, elements and statements."""
     files = FileScope(document.file, report)
     elaborator = Elaborator(files, model, report)
     elaborator.names()
@@ -128,24 +170,30 @@ def _network(
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_parameter)
     elaborator.statements()
-    read_scene: Scene | None = None
-    if scene is not None:
-        read_scene = reader.read(scene, Place(document.file.source, scene.name.span))
-    if _unread(elaborator, scene):
-        return None  # what is missing would be found missing again, in other words
-    elaborator.quadratures()
-    checks.run(elaborator, report, required=required)
-    checks.set_valued_results(elaborator, reader.observations, report)
-    _begin(elaborator, read_scene)
-    known = Values(elaborator.parts.parameters, reader.elements)
-    if not report.failed and not _incomplete(report):
-        events.expanded(elaborator, known)
-    checks.values(elaborator, known, report)
-    if not report.failed and not _incomplete(report):
-        graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
-    found = _result(elaborator, reader, read_scene)
-    laws.run(found, known, report)
-    return None if report.failed or _incomplete(report) else found
+    return elaborator, reader
+
+
+def listing(
+    document: Document,
+    model: syntax.Model,
+    scene: syntax.Scene | None,
+    report: Report,
+    levels: Sequence[tuple[str, str]] = (),
+) -> Listing | None:
+    """What a model offers: parameters with values, names that can be read, components; None where it has errors."""
+    with _deep(), budget.drawn():
+        try:
+            elaborator, reader = _elaborated(document, model, scene, report, (), levels)
+            if report.failed:
+                return None
+            parameters = elaborator.parts.parameters
+            known = Values(parameters, reader.elements)
+            kept = {n: p for n, p in parameters.items() if n not in elaborator.parts.discretes}
+            inputs = dict.fromkeys(elaborator.parts.inputs)
+            return Listing(kept, tuple(inputs), known, readable(elaborator, known), instances(elaborator))
+        except budget.SpentError as spent:
+            report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
+            return None
 
 
 def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:

@@ -22,8 +22,8 @@ def test_every_package_is_listed():
     for room in ROOMS:
         for init in sorted((ROOT / room).rglob("__init__.py")):
             folder = init.parent.relative_to(ROOT).as_posix()
-            name = "sysdyn.api" if folder == "cli/api" else "sysdyn." + folder.replace("/", ".")
-            found[name] = folder
+            named = {"cli/api": "sysdyn.api", "cli/sysdyn": "sysdyn"}
+            found[named.get(folder, "sysdyn." + folder.replace("/", "."))] = folder
     assert SETUP["package-dir"] == found
     assert sorted(SETUP["packages"]) == sorted(found)
 
@@ -65,7 +65,8 @@ def test_wheel_holds_all_data(built):
         in_source = {name.partition("/")[2] for name in archive.getnames()}
     with zipfile.ZipFile(wheel) as archive:
         in_wheel = set(archive.namelist())
-    data = [p for room in ROOMS for p in (ROOT / room).rglob("*") if p.suffix in (".lark", ".sd", ".toml", ".h", ".c")]
+    data = [p for room in ROOMS for p in (ROOT / room).rglob("*") if p.suffix in (".lark", ".sd", ".toml", ".h", ".c", ".yml")]
+    data += (ROOT / "dsl" / "language").glob("*.md")
     assert data
     for path in data:
         name = path.relative_to(ROOT).as_posix()
@@ -114,3 +115,7 @@ def test_wheel_works_outside_the_repository(built, tmp_path):
     assert sysdyn("plot", "pendulum-swing.h5").returncode == 0
     assert (tmp_path / "pendulum-swing.png").read_bytes().startswith(b"\x89PNG")
     assert sysdyn("check", "--strict", "pendulum.sd").returncode == 0
+    made = sysdyn("new", "swing")
+    assert made.returncode == 0, made.stderr
+    assert sysdyn("help", "units").stdout.startswith("units: ")
+    assert sysdyn("std", "resistor").stdout.startswith("resistor: ")

@@ -11,9 +11,13 @@ from sysdyn.dsl.text import codes
 
 
 @with_console("explain")
-@click.argument("code")
-def command(console: Console, code: str) -> int:
-    """Explain CODE: the rule, its reason, a text that breaks it and one that keeps it."""
+@click.argument("code", required=False)
+def command(console: Console, code: str | None) -> int:
+    """Explain CODE: the rule, its reason, a text that breaks it and one that keeps it. Without CODE: the index."""
+    if code is None:
+        console.result = {"codes": [{"code": c.code, "title": c.title} for c in codes.codes().values()]}
+        console.data(codes.index())
+        return console.finish()
     name = code.strip().upper()
     known = list(codes.codes())
     if name not in known:

@@ -32,16 +32,29 @@ def folder() -> Path:
 
     Where it cannot be made, or others could put a library into it, a folder for this process takes its place.
     """
-    own = os.environ.get("SYSDYN_CACHE")
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path("~").expanduser() / ".cache")
-    wanted = Path(own) if own else Path(base) / "sysdyn"
+    asked = wanted()
     try:
-        wanted.mkdir(mode=0o700, parents=True, exist_ok=True)
-        real = wanted.resolve(strict=True)
+        asked.mkdir(mode=0o700, parents=True, exist_ok=True)
+        real = asked.resolve(strict=True)
         private = _mine(real.stat()) and _trusted(real.parent.stat())
     except OSError:
         return _folder_of_process()
-    return wanted if private and os.access(wanted, os.W_OK) else _folder_of_process()
+    return asked if private and os.access(asked, os.W_OK) else _folder_of_process()
+
+
+def wanted() -> Path:
+    """The folder that the environment asks for."""
+    own = os.environ.get("SYSDYN_CACHE")
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path("~").expanduser() / ".cache")
+    return Path(own) if own else Path(base) / "sysdyn"
+
+
+def limit() -> int:
+    """Bytes that all entries may take."""
+    try:
+        return int(os.environ.get("SYSDYN_CACHE_LIMIT", ""))
+    except ValueError:
+        return LIMIT
 
 
 def _mine(found: os.stat_result) -> bool:
@@ -114,10 +127,7 @@ def _digest(key: str, content: bytes) -> bytes:
 
 def _make_room(newest: Path) -> None:
     """Removes the entries used longest ago until the rest is within LIMIT; what other processes removed is gone too."""
-    try:
-        limit = int(os.environ.get("SYSDYN_CACHE_LIMIT", ""))
-    except ValueError:
-        limit = LIMIT
+    most = limit()
     entries = []
     for path in newest.parent.glob("model-*.so"):
         with contextlib.suppress(OSError):
@@ -125,7 +135,7 @@ def _make_room(newest: Path) -> None:
             entries.append((found.st_mtime, found.st_size, path))
     total, now = sum(size for _, size, _ in entries), time.time()
     for used, size, path in sorted(entries):
-        if total <= limit:
+        if total <= most:
             return
         if path != newest and now - used > KEPT:
             with contextlib.suppress(OSError):

@@ -34,6 +34,10 @@ class Values:
         """The value of a condition."""
         return bool(ex.evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
 
+    def element(self, name: str, *at: int) -> float:
+        """The value of a parameter, or of one element of an array."""
+        return self._element(name, at)
+
     def _lookup(self, node: Node, bound: Mapping[Node, float]) -> float:
         if node in bound:
             return bound[node]

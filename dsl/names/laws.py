@@ -109,7 +109,7 @@ def _source(
 def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> Failed:
     pair = frozenset((side, other))
     if pair == frozenset("pq"):
-        help_ = "write it as a dissipator: e = M(q)*f with M = dp/dq"
+        help_ = "write it as a dissipator e = M(s)*f with M = dp/dq, and s the state of dynamic s' = label.f"
         return context.fail("E302", "p-q is the diagonal of the diagram: a memristive law", span, help=help_)
     requirement = "p' = e" if pair == frozenset("pe") else "q' = f"
     message = (

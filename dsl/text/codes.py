@@ -1,8 +1,8 @@
 """Every code that a diagnostic can have, with its page: `sysdyn explain CODE`.
 
-The pages are data (`codes.toml`): a title, the reason, and where a file can show it, a bad and a
-good one. A test proves that each bad file raises its code and no other, and that the good one does
-not. A code that is twice in the file is an error of TOML, so codes are unique.
+The pages are data (`codes.toml`): a title, the reason, a bad and a good file, and the command that
+finds it where that is not `check`. A test proves that each bad file raises its code and no other
+error, and that the good one is free of it. A code that is twice in the file is an error of TOML, so codes are unique.
 """
 
 from __future__ import annotations
@@ -15,18 +15,32 @@ from pathlib import Path
 from types import MappingProxyType
 
 _SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
+CHECK = "sysdyn check FILE"
+CLASSES = {
+    "1": "names and text",
+    "2": "units and dimensions",
+    "3": "laws and state functions: Paynter's diagram",
+    "4": "elements and networks",
+    "5": "coordinates and constraints",
+    "6": "formulations and what the compiler makes of laws",
+    "7": "events",
+    "8": "components, levels and arrays",
+    "9": "scenes and runs",
+}
+"""What the first digit of a code says."""
 _MOST_LINES, _MOST_COLUMNS = 40, 100
 
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """A code's page; `bad` and `good` are whole files, None where no single file shows it."""
+    """A code's page; `bad` and `good` are whole files; by: the command that finds it in the bad one."""
 
     code: str
     title: str
     why: str
-    bad: str | None
-    good: str | None
+    bad: str
+    good: str
+    by: str = CHECK
 
     @property
     def severity(self) -> str:
@@ -41,8 +55,8 @@ def codes() -> Mapping[str, Code]:
     generated = _generated()
     found = {}
     for code, page in tomllib.loads(text).items():
-        bad, good = generated.get(code, (page.get("bad"), page.get("good")))
-        found[code] = Code(code, page["title"], page["why"], bad, good)
+        bad, good = generated[code] if code in generated else (page["bad"], page["good"])
+        found[code] = Code(code, page["title"], page["why"], bad, good, page.get("by", CHECK))
     return MappingProxyType(found)
 
 
@@ -50,16 +64,29 @@ def explain(code: str) -> str:
     """The page of a code as text; raises KeyError where there is no such code."""
     page = codes()[code.upper()]
     parts = [f"{page.severity} {page.code}: {page.title}", _wrapped(page.why)]
-    if page.bad is not None and page.good is not None:
-        parts += ["Wrong:", _shown(page.bad), "Right:", _shown(page.good)]
+    wrong = "Wrong:" if page.by == CHECK else f"Wrong, as '{page.by}' finds:"
+    parts += [wrong, _shown(page.bad), "Right:", _shown(page.good)]
     return "\n\n".join(parts) + "\n"
 
 
+def index() -> str:
+    """One line a code, by class."""
+    parts = []
+    for digit, said in CLASSES.items():
+        pages = sorted((c for c in codes().values() if c.code[1] == digit), key=lambda c: (c.code[1:], c.code[0]))
+        parts.append("\n".join([f"{digit}xx: {said}", *(f"  {c.code}  {c.title}" for c in pages)]))
+    return "\n\n".join(parts) + "\n\nE error, W warning, N note; sysdyn explain CODE shows one.\n"
+
+
 def _generated() -> dict[str, tuple[str, str]]:
-    """Examples of the limits, too long to be kept."""
+    """Examples too long to be kept."""
     return {
         "E116": (f"# {'a long line ' * 1000}\n", "# a short line\n"),
         "E117": (f"const a = {'(' * 201}1{')' * 201}\n", "const a = ((1))\n"),
+        "N101": (
+            "model m {\n" + "".join(f"  let y{k} = x{k}\n" for k in range(201)) + "}\n",
+            "model m {\n  let y = 1\n}\n",
+        ),
         "E118": ("const a = 0" + " +\n  1" * 50_000 + "\n", "const a = sum(i in 1..50000: 1)\n"),
     }
 

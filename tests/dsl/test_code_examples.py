@@ -1,21 +1,20 @@
 """Each code's page in `explain` tells the truth: its bad text raises the code, its good text does not."""
 
+import json
+
 import pytest
 from sysdyn.cli.commands.check_command import _target
 from sysdyn.cli.console import Console
+from sysdyn.cli.main import run
 from sysdyn.cli.run.targets import all_targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text import codes
 from sysdyn.dsl.text.diagnostics import ModelError, SourceText
 
-ELSEWHERE = {
-    "E901": "a scene that is not there is named on the command line",
-    "E907": "found when simulating",
-    "E909": "found when simulating, but for static claims",
-    **dict.fromkeys(("E608", "W920", "E931", "E932", "E933", "E934"), "found when simulating"),
-}
-EXAMPLES = {code: page for code, page in codes.codes().items() if page.bad}
+PAGES = codes.codes()
+CHECKED = sorted(c for c, page in PAGES.items() if page.by == codes.CHECK)
+RUN = sorted(set(PAGES) - set(CHECKED))
 
 
 def found(text: str) -> list[str]:
@@ -30,15 +29,46 @@ def found(text: str) -> list[str]:
     return [d.code for d in console.report]
 
 
-@pytest.mark.parametrize("code", sorted(set(EXAMPLES) - set(ELSEWHERE)))
+@pytest.mark.parametrize("code", [c for c in CHECKED if c != "N101"])
 def test_bad_example_raises_its_code_alone(code):
-    raised = found(EXAMPLES[code].bad)
+    raised = found(PAGES[code].bad)
     assert code in raised
     assert {c for c in raised if c[0] == "E"} <= {code}
 
 
-@pytest.mark.parametrize("code", sorted(c for c in EXAMPLES if EXAMPLES[c].good))
+@pytest.mark.parametrize("code", sorted(PAGES))
 def test_good_example_is_free_of_it(code):
-    raised = found(EXAMPLES[code].good)
+    raised = found(PAGES[code].good)
+    assert code not in raised
+    assert not [c for c in raised if c[0] == "E"]
+
+
+def said_by(command, text, folder, monkeypatch, capsys):
+    """Codes and messages that a command of a page finds; its settings of the environment come first."""
+    monkeypatch.chdir(folder)
+    (folder / "example.sd").write_text(text)
+    settings, _, arguments = command.partition("sysdyn ")
+    if settings:
+        monkeypatch.setenv("SYSDYN_CACHE", str(folder / "cache"))
+    for name, value in (pair.split("=") for pair in settings.split()):
+        monkeypatch.setenv(name, value)
+    run([*("example.sd" if word == "FILE" else word for word in arguments.split()), "--json"])
+    return [(d["code"], d["message"]) for d in json.loads(capsys.readouterr().out)["diagnostics"]]
+
+
+@pytest.mark.parametrize("code", [*RUN, "N101"])
+def test_bad_example_of_a_run_raises_its_code_alone(code, tmp_path, monkeypatch, capsys):
+    raised = said_by(PAGES[code].by, PAGES[code].bad, tmp_path, monkeypatch, capsys)
+    if code == "E901":  # a finding without a place
+        assert raised[0][1].startswith("E901: ")
+        return
+    assert code in [c for c, _ in raised]
+    assert {c for c, _ in raised if c[0] == "E"} <= ({"E101"} if code == "N101" else {code})
+
+
+@pytest.mark.parametrize("code", RUN)
+def test_good_example_of_a_run_runs(code, tmp_path, monkeypatch, capsys):
+    command = f"sysdyn {PAGES[code].by.partition('sysdyn ')[2].split()[0]} FILE"
+    raised = [c for c, _ in said_by(command, PAGES[code].good, tmp_path, monkeypatch, capsys)]
     assert code not in raised
     assert not [c for c in raised if c[0] == "E"]

@@ -1,0 +1,43 @@
+"""`sysdyn new`: a project that runs."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import FAULT
+
+
+@with_console("new")
+@click.argument("name", type=click.Path(path_type=Path))
+def command(console: Console, name: Path) -> int:
+    """Begin a project in the folder NAME: a model with scenes, a golden trace, a file for CI. It passes as it is."""
+    from sysdyn.cli.project import skeleton
+
+    folder = name.resolve()
+    written = skeleton.write(folder)
+    model = skeleton.named(folder)
+    said = _recorded(folder, f"{model}.sd")
+    kept = sorted(p for p in (folder / "golden").rglob("*") if p.is_file()) if said is None else []
+    console.result = {"folder": str(name), "files": [str(p.relative_to(folder)) for p in (*written, *kept)]}
+    if said is not None:
+        console.complain(f"{name}: no golden trace could be recorded: {said}", FAULT)
+        return console.finish(FAULT)
+    if not console.quiet:
+        console.data("\n".join(str(name / p.relative_to(folder)) for p in (*written, *kept)))
+    console.say(f"next: cd {name}; sysdyn simulate {model}.sd --scene {skeleton.GOLDEN_SCENE}")
+    return console.finish()
+
+
+def _recorded(folder: Path, file: str) -> str | None:
+    """Record the golden trace of a new project; what went wrong, None where nothing did."""
+    from sysdyn.cli.main import run
+    from sysdyn.cli.project.skeleton import GOLDEN_SCENE
+
+    said, out = io.StringIO(), io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stderr(said), contextlib.redirect_stdout(out):
+        code = run(["golden", "record", file, "--scene", GOLDEN_SCENE, "--quiet"])
+    return None if code == 0 else said.getvalue().strip() or f"exit {code}"

@@ -1,0 +1,5 @@
+"""`python -m sysdyn`."""
+
+from sysdyn.cli.main import main
+
+main()

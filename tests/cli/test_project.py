@@ -1,0 +1,107 @@
+"""`new` writes what passes as it is, `doctor` finds what is wrong with the machine, the package says its version."""
+
+import importlib.metadata
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+import sysdyn
+from sysdyn.cli.main import run
+from sysdyn.cli.project import health, skeleton
+
+
+def commands(text):
+    """The commands of sysdyn in a CI file or a README, comments left out."""
+    found = re.findall(r"(?:^\s*- run: |^)sysdyn (.*?)\s*(?:#.*)?$", text, re.M)
+    return [line.split() for line in found]
+
+
+def test_a_new_project_passes_as_it_is(tmp_path, monkeypatch, capsys):
+    assert run(["new", "quarter-car", "--json"]) == 0
+    made = json.loads(capsys.readouterr().out)["result"]["files"]
+    folder = tmp_path / "quarter-car"
+    assert {"quarter_car.sd", ".github/workflows/models.yml", "README.md", ".gitignore"} <= set(made)
+    assert "golden/quarter_car/golden.toml" in made
+    assert all((folder / name).is_file() for name in made)
+    assert not any("NAME" in (folder / name).read_text() for name in made[:4])
+    monkeypatch.chdir(folder)
+    ci = commands((folder / ".github/workflows/models.yml").read_text())
+    shown = commands((folder / "README.md").read_text())
+    assert [c[0] for c in ci] == ["fmt", "check", "golden"]
+    assert [c[0] for c in shown] == ["list", "check", "simulate", "plot", "report", "golden"]
+    for command in (*ci, *shown):
+        assert run(command) == 0, (command, capsys.readouterr().err)
+    ignored = (folder / ".gitignore").read_text().split()
+    assert "golden.html" in ignored
+    assert (folder / "golden.html").is_file()
+
+
+def test_a_change_of_the_model_fails_its_ci(tmp_path, monkeypatch, capsys):
+    assert run(["new", str(tmp_path / "swing"), "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+    monkeypatch.chdir(tmp_path / "swing")
+    model = tmp_path / "swing" / "swing.sd"
+    model.write_text(model.read_text().replace("k = 50 N/m", "k = 50.5 N/m"))
+    assert run(["golden", "check"]) == 1
+
+
+@pytest.mark.parametrize("name", ["2nd", "if", "a+b", "ground"])
+def test_a_name_that_no_model_can_have(name, tmp_path, capsys):
+    code = run(["new", name])
+    if name == "ground":  # a model may be called so
+        assert code == 0
+    else:
+        assert code == 2
+        assert "cannot be the name of a model" in capsys.readouterr().err
+        assert not (tmp_path / name).exists()
+
+
+def test_what_is_there_is_never_overwritten(tmp_path, capsys):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes").write_text("keep")
+    assert run(["new", "mine"]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["notes"]
+
+
+def test_the_template_is_laid_out():
+    from sysdyn.dsl.format.format import format_text
+
+    text = (skeleton.TEMPLATE / "model.sd").read_text()
+    assert format_text(text) == text
+
+
+def test_doctor_on_this_machine(capsys):
+    assert run(["doctor"]) == 0
+    out = capsys.readouterr().out
+    for name in ("sysdyn", "python", "packages", "core", "compiler", "cache", "trace files", "run (c)", "run (numpy)"):
+        assert re.search(rf"^ok +{re.escape(name)} ", out, re.M), out
+    assert importlib.metadata.version("numpy") in out
+
+
+def test_doctor_without_compiler_and_cache(capsys, monkeypatch, tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    monkeypatch.setenv("CC", "/nonexistent/cc")
+    monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "taken"))
+    assert run(["doctor", "--json"]) == 0
+    found = {f["name"]: f for f in reversed(json.loads(capsys.readouterr().out)["result"]["findings"])}
+    assert found["compiler"]["state"] == found["cache"]["state"] == found["run (c)"]["state"] == "warning"
+    assert "gcc" in found["compiler"]["help"]
+    assert found["run (numpy)"]["state"] == "ok"
+
+
+def test_doctor_tells_a_machine_that_computes_something_else(capsys, monkeypatch):
+    monkeypatch.setattr(health.math, "cos", lambda x: 0.9)
+    assert run(["doctor"]) == 1
+    assert re.search(r"^error +run \(c\)", capsys.readouterr().out, re.M)
+
+
+def test_the_package_says_its_version_and_is_the_command():
+    assert sysdyn.__version__ == importlib.metadata.version("sysdyn")
+    with pytest.raises(AttributeError):
+        _ = sysdyn.nothing
+    command = [sys.executable, "-m", "sysdyn", "--version"]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert ran.stdout.strip() == f"sysdyn, version {sysdyn.__version__}"
