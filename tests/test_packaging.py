@@ -65,7 +65,8 @@ def test_wheel_holds_all_data(built):
         in_source = {name.partition("/")[2] for name in archive.getnames()}
     with zipfile.ZipFile(wheel) as archive:
         in_wheel = set(archive.namelist())
-    data = [p for room in ROOMS for p in (ROOT / room).rglob("*") if p.suffix in (".lark", ".sd", ".toml", ".h", ".c", ".yml")]
+    kinds = (".lark", ".sd", ".toml", ".h", ".c", ".yml")
+    data = [p for room in ROOMS for p in (ROOT / room).rglob("*") if p.suffix in kinds]
     data += (ROOT / "dsl" / "language").glob("*.md")
     assert data
     for path in data:
