@@ -6,7 +6,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 import click
@@ -29,6 +29,8 @@ class Console:
         self.color = color == "always" or (color == "auto" and not plain)
         self.report = Report()
         self.explain = False
+        self.format: Callable[[Sequence[Diagnostic], Sequence[dict[str, object]]], str] | None = None
+        """Another form of the findings (those of texts, those without a place), for standard output."""
         self.result: dict[str, Any] = {}
         self._plain: list[dict[str, object]] = []
 
@@ -40,12 +42,12 @@ class Console:
     def complain(self, message: str, code: int) -> None:
         """A finding that has no place in a text, with the exit code that it leads to; --quiet does not silence it."""
         self._plain.append(plain(message, code))
-        if not self.as_json:
+        if not (self.as_json or self.format):
             print(shown(f"sysdyn: {message}"), file=sys.stderr)
 
     def data(self, text: str, *, verbatim: bool = False) -> None:
         """Data that was asked for; verbatim: the user's own text, which may go to a file."""
-        if not self.as_json:
+        if not self.as_json and text:
             text = text if verbatim and not sys.stdout.isatty() else shown(text)
             sys.stdout.write(text if text.endswith("\n") else text + "\n")
 
@@ -57,6 +59,9 @@ class Console:
         if self.as_json:
             diagnostics = [*(d.to_json() for d in found), *self._plain]
             print(json.dumps(finite(envelope(self.command, code, diagnostics, self.result)), allow_nan=False))
+        elif self.format is not None:
+            kept = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
+            self.data(self.format(kept, self._plain), verbatim=True)
         else:
             self._render(found)
         return code

@@ -42,7 +42,7 @@ def _say(error: BaseException, code: int, message: str, arguments: Sequence[str]
     if type(error).__name__ == "NoArgsIsHelpError":  # `sysdyn` alone: the message is the help
         print(message, file=sys.stderr)
         return
-    if "--json" in arguments:
+    if "--json" in arguments or _asks_for_json(arguments):
         command = next((a for a in arguments if not a.startswith("-")), None)
         print(json.dumps(envelope(command, code, [plain(message, code)], {})))
     elif code == INTERRUPTED:
@@ -53,6 +53,12 @@ def _say(error: BaseException, code: int, message: str, arguments: Sequence[str]
             print(f"try '{error.ctx.command_path} --help'", file=sys.stderr)
     if code == FAULT and os.environ.get("SYSDYN_DEBUG"):
         traceback.print_exception(error)
+
+
+def _asks_for_json(arguments: Sequence[str]) -> bool:
+    """`--output-format json`, however it is spelled."""
+    joined = "\0".join(arguments)
+    return "--output-format\0json" in joined or "--output-format=json" in joined
 
 
 def classify(error: BaseException) -> tuple[int, str]:

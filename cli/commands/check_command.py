@@ -9,13 +9,24 @@ from sysdyn.cli.run import targets
 from sysdyn.cli.run.checking import checked
 from sysdyn.dsl.model import expression as ex
 
+FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
+
 
 @with_console("check")
 @click.argument("files", nargs=-1, required=True)
 @click.option("--strict", is_flag=True, help="Warnings count as errors, and so does what cannot be run yet.")
 @click.option("--allow-unsupported", is_flag=True, help="With --strict: texts may be ahead of the compiler.")
-def command(console: Console, files: tuple[str, ...], strict: bool, allow_unsupported: bool) -> int:
-    """Check every model and scene of FILES, the consistent start included; no C compiler is needed."""
+@click.option("--output-format", type=click.Choice(FORMATS), help="Form of the findings. Default: full.")
+def command(
+    console: Console, files: tuple[str, ...], strict: bool, allow_unsupported: bool, output_format: str | None
+) -> int:
+    """Check every model and scene of FILES, the consistent start included; no C compiler is needed.
+
+    FILES may be folders (all .sd files below them) and patterns ('models/**/*.sd'). The forms concise, github, junit
+    and sarif go to standard output.
+    """
+    files = tuple(targets.files(files))
+    _form(console, output_format, files)
     if allow_unsupported and not strict:
         raise UsageError("--allow-unsupported says what --strict may pass: give both")
     refused = strict and not allow_unsupported
@@ -29,6 +40,23 @@ def command(console: Console, files: tuple[str, ...], strict: bool, allow_unsupp
     console.result = {"files": results}
     warned = any(d.severity == "warning" for d in console.report)
     return console.finish(INPUT_OUTPUT if unread else 1 if strict and warned else 0)
+
+
+def _form(console: Console, chosen: str | None, files: tuple[str, ...]) -> None:
+    """Let the console show findings in the form asked for."""
+    if chosen is None or chosen == "full":
+        if chosen and console.as_json:
+            raise UsageError("--json and --output-format full: one of them")
+        return
+    if chosen != "json" and console.as_json:
+        raise UsageError(f"--json and --output-format {chosen}: one of them")
+    if chosen == "json":
+        console.as_json = True
+        return
+    from sysdyn.cli.page import findings
+
+    forms = {"concise": findings.concise, "github": findings.github, "sarif": findings.sarif}
+    console.format = forms.get(chosen) or (lambda found, plain: findings.junit(found, plain, files))
 
 
 def _file(console: Console, path: str, refused: bool) -> dict[str, object]:

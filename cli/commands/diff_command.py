@@ -44,7 +44,8 @@ def command(
     pages = [f for f in (junit_file, html_file) if f == "-"]
     if pages and (console.as_json or len(pages) > 1):
         raise UsageError("only one thing can go to standard output")
-    from sysdyn.cli.compare.diffing import as_json, cases, differences, headline, junit, opened, table
+    from sysdyn.cli.compare.diffing import as_json, cases, differences, headline, opened, table
+    from sysdyn.cli.page.junit import junit
     from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
 
     began = time.monotonic()

@@ -165,9 +165,9 @@ def check(
 
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
     from sysdyn.cli.commands.diff_command import write
-    from sysdyn.cli.compare.diffing import junit
     from sysdyn.cli.golden.changes import page
     from sysdyn.cli.golden.checking import checkable
+    from sysdyn.cli.page.junit import junit
 
     wrong = sorted((c for c in cases if c.exit), key=lambda c: -c.ratio)
     console.result = {

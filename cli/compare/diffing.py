@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import math
-import re
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
-from xml.sax.saxutils import escape, quoteattr
 
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.page.unit_text import conversion
@@ -189,36 +187,3 @@ def _object(c: Compared) -> dict[str, Any]:
 def cases(verdict: Verdict) -> list[tuple[str, str | None]]:
     """(name, what is wrong or None) of each quantity and of the traces as a whole."""
     return [(c.name, None if c.equal else sentence(c)) for c in (*verdict.traces, *verdict.quantities)]
-
-
-_FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-def junit(suites: Sequence[tuple[str, float, Sequence[tuple[str, str | None]]]]) -> str:
-    """A JUnit file of suites (name, seconds, cases); a case fails where its second item is a text."""
-
-    def attribute(text: str) -> str:
-        return quoteattr(_FORBIDDEN.sub("\ufffd", text))
-
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>']
-    total = [case for _, _, found in suites for case in found]
-    wrong = sum(text is not None for _, text in total)
-    lines.append(f'<testsuites tests="{len(total)}" failures="{wrong}" errors="0">')
-    for name, seconds, found in suites:
-        failed = sum(text is not None for _, text in found)
-        head = f'tests="{len(found)}" failures="{failed}" errors="0" time="{seconds:.3f}"'
-        lines.append(f"  <testsuite name={attribute(name)} {head}>")
-        for case, text in found:
-            start = f"    <testcase classname={attribute(name)} name={attribute(case)}"
-            if text is None:
-                lines.append(start + "/>")
-            else:
-                first = text.splitlines()[0] if text else "failed"
-                lines += [
-                    start + ">",
-                    f"      <failure message={attribute(first)}>{escape(_FORBIDDEN.sub(chr(0xFFFD), text))}</failure>",
-                    "    </testcase>",
-                ]
-        lines.append("  </testsuite>")
-    lines.append("</testsuites>")
-    return "\n".join(lines) + "\n"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import glob
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.dsl import load
@@ -35,6 +37,34 @@ def read(path: str, report: Report) -> Document:
     if path == "-":
         return load.document(decode("<stdin>", sys.stdin.buffer), report)
     return load.read(path, report)
+
+
+def files(given: Iterable[str]) -> list[str]:
+    """The model files that arguments name: of a folder all below it, of a pattern those that fit; each once.
+
+    UsageError where a folder or a pattern has none.
+    """
+    found: dict[str, None] = {}
+    for name in given:
+        path = Path(name)
+        if name != "-" and path.is_dir():
+            inside = [p for p in sorted(path.rglob("*.sd")) if not _hidden(p.relative_to(path))]
+            if not inside:
+                raise UsageError(f"there is no .sd file in the folder {name}")
+            found |= dict.fromkeys(map(str, inside))
+        elif any(sign in name for sign in "*?[") and not path.exists():
+            fitting = sorted(glob.glob(name, recursive=True))  # noqa: PTH207 (a pattern may be absolute)
+            if not fitting:
+                raise UsageError(f"no file fits the pattern {name}")
+            found |= dict.fromkeys(fitting)
+        else:
+            found[name] = None
+    return list(found)
+
+
+def _hidden(path: Path) -> bool:
+    """Whether a name on the way begins with a dot."""
+    return any(part.startswith(".") for part in path.parts)
 
 
 def all_targets(document: Document, report: Report) -> list[Target]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import cache
@@ -31,6 +32,16 @@ from sysdyn.dsl.text.diagnostics import Place, Related, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
 LIBRARY = Path(__file__).parents[1] / "std"
+
+
+@cache
+def exported() -> dict[str, str]:
+    """The components of the standard library, with the module that each is in."""
+    found = {}
+    for path in sorted(LIBRARY.glob("*.sd")):
+        for name in re.findall(r"^component (\w+)", path.read_text(encoding="utf-8"), re.M):
+            found[name] = path.stem
+    return found
 
 
 @cache
@@ -127,9 +138,11 @@ class FileScope:
             elif symbol is not None:
                 yield symbol
             else:
-                near = nearest(word.name, module.symbols)
+                other = exported().get(word.name)
+                near = None if other else nearest(word.name, module.symbols)
                 text = ".".join(item.module.names)
                 help_ = f"nearest exported name: '{near}'" if near else f"it exports {', '.join(module.symbols)}"
+                help_ = f"from std.{other} import {word.name}" if other else help_
                 self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
                 self.scope.broken.add(word.name)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from sysdyn.dsl.elaborate.elements import Elements
-from sysdyn.dsl.elaborate.files import FileScope
+from sysdyn.dsl.elaborate.files import FileScope, exported
 from sysdyn.dsl.elaborate.head import Head
 from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.parameters import Argument
@@ -85,8 +85,11 @@ class Instances(Elements):
             if self.scope.is_broken(name):
                 raise Failed
             components = [n for n in self.scope.names() if isinstance(self.scope.find(n), ComponentSymbol)]
-            near = nearest(name, (*components, *BUILTINS))
-            help_ = f"nearest name in scope: '{near}'" if near else "from std.x import " + name
+            library = exported()
+            near = name if name in library else nearest(name, (*components, *BUILTINS, *library))
+            help_ = f"nearest name in scope: '{near}'" if near else "sysdyn std lists the library"
+            if near in library and near not in components:
+                help_ = f"from std.{library[near]} import {near}"
             raise self.resolver.fail("E101", f"unknown component '{name}'", s.component.span, help=help_)
         before = self.scope.symbols.get(label)
         if not isinstance(before, InstanceSymbol):

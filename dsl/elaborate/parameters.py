@@ -122,6 +122,7 @@ class Parameters(Frame):
                 if unit is None:
                     message = f"the values of '{statement.decl.name}' differ: {want} and {have}"
                 help_ = self._with_unit(written, unit) if have == "dimensionless" else None
+                help_ = help_ or self.resolver.missing(item.dimension, dimension, written)
                 code = "E207" if what == "default" else "E214"
                 if code == "E214":
                     name = self.current.path or self.current.component

@@ -27,7 +27,7 @@ class Statements(Declarations):
         place = self.place(s.span)
         with self.resolver.virtually() if s.kind == "psi" else nullcontext():
             left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
-        dimension = self._sides(f"{s.kind} {s.decl.name}", left, right, s.right)
+        dimension = self._sides(f"{s.kind} {s.decl.name}", left, right, s.right, s.left, s.right)
         own = tuple(
             self.resolver.whole_number(i, "an index") for i in s.decl.indices if not isinstance(i, syntax.Range)
         )
@@ -44,11 +44,11 @@ class Statements(Declarations):
         self.parts.constraints.append(constraint)
         self.resolver.constraints.setdefault(family.name, []).append(constraint)
 
-    def _sides(self, what: str, left: Typed, right: Typed, where: syntax.Expr) -> Dimension:
+    def _sides(self, what: str, left: Typed, right: Typed, where: syntax.Expr, *within: syntax.Expr) -> Dimension:
         if left.dimension is None or right.dimension is None or left.dimension == right.dimension:
             return (left.dimension if left.dimension is not None else right.dimension) or NONE
         message = f"{what}: the two sides differ: {dim.show(left.dimension)} and {dim.show(right.dimension)}"
-        help_ = self.resolver.missing(left.dimension, right.dimension)
+        help_ = self.resolver.missing(left.dimension, right.dimension, *within)
         raise self.resolver.fail("E208", message, where.span, help=help_)
 
     def _wants(self, what: str, expression: syntax.Expr, dimension: Dimension) -> Node:
@@ -57,7 +57,7 @@ class Statements(Declarations):
             want, have = dim.show(dimension), dim.show(value.dimension)
             factor = dim.show(dim.quotient(dimension, value.dimension))
             message = f"{what}: {want} expected, {have} found (factor: {factor})"
-            help_ = self.resolver.missing(value.dimension, dimension)
+            help_ = self.resolver.missing(value.dimension, dimension, expression)
             raise self.resolver.fail("E208", message, expression.span, help=help_)
         return value.node
 
@@ -84,7 +84,8 @@ class Statements(Declarations):
             if found != dim.ENERGY:
                 factor = dim.show(dim.quotient(dim.ENERGY, found))
                 message = f"work: effort*displacement is {dim.show(found)}, not J (factor: {factor})"
-                raise self.resolver.fail("E208", message, s.effort.span, help=self.resolver.missing(found, dim.ENERGY))
+                help_ = self.resolver.missing(found, dim.ENERGY, s.effort)
+                raise self.resolver.fail("E208", message, s.effort.span, help=help_)
         along = self.virtual(on.node, "quasi(w): w", s.on.span) if quasi else ((ex.const(1.0), on.node),)
         for coefficient, node in along:
             work = Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span))
@@ -195,7 +196,7 @@ class Statements(Declarations):
         self.resolver.statics = moment == "static"
         try:
             left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
-            dimension = self._sides("expect", left, right, s.right)
+            dimension = self._sides("expect", left, right, s.right, s.left, s.right)
             message = f"expect: within is in {{}}, wants {dim.show(dimension)}"
             within = None if s.within is None else self.resolver.wanted(s.within, dimension, "E208", message)
         finally:

@@ -34,7 +34,9 @@ class Arithmetic(Context):
             elif value.dimension != found:
                 message = f"the two operands differ: {dim.show(found)} + {dim.show(value.dimension)}"
                 related = (Related(dim.show(found), self.place(where.span)),)
-                raise self.fail("E203", message, term.span, related=related, help=self.missing(found, value.dimension))
+                raise self.fail(
+                    "E203", message, term.span, related=related, help=self.missing(value.dimension, found, term, where)
+                )
         signs = [-1.0 if s == "-" else 1.0 for s, _ in e.terms]
         return Typed(ex.linear(0.0, zip(signs, (v.node for v in values), strict=True)), found)  # type: ignore[union-attr]
 

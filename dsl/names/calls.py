@@ -10,6 +10,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
+from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Context, Failed, SeveralError, Value
 from sysdyn.dsl.names.symbols import Definition, FunctionSymbol, Space, TableSymbol, Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
@@ -98,8 +99,11 @@ class Calls(Context):
         if e.name == "quasi":
             raise self.fail("E319", "quasi(w) is what a work acts on", e.span, help="work E on quasi(w)")
         if e.name not in dim.FUNCTIONS:
-            near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
-            help_ = f"nearest name in scope: '{near}'" if near else None
+            texts = [self.source.text[a.span.start : a.span.end] for a in e.args]
+            help_ = habits.function(e.name, texts)
+            if help_ is None:
+                near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
+                help_ = f"nearest name in scope: '{near}'" if near else None
             if self.scope.is_broken(e.name):
                 raise Failed
             raise self.fail("E101", f"unknown function '{e.name}'", e.span, help=help_)

@@ -5,6 +5,7 @@ The resolver's rules are spread over `names`, `members`, `arithmetic` and `calls
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.units import NONE, Dimension
+from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.symbols import Definition, InstanceSymbol, ParameterSymbol, Scope, Space, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -254,7 +256,8 @@ class Context:
         """A scalar of one dimension; otherwise code with message (its {} is what was found)."""
         value = self.scalar(expression)
         if value.dimension is not None and value.dimension != dimension:
-            raise self.fail(code, message.format(dim.show(value.dimension)), expression.span)
+            help_ = self.missing(value.dimension, dimension, expression)
+            raise self.fail(code, message.format(dim.show(value.dimension)), expression.span, help=help_)
         return value.node
 
     def condition(self, expression: syntax.Expr) -> Node:
@@ -285,8 +288,11 @@ class Context:
                 raise Failed
         return value.node
 
-    def missing(self, have: Dimension | None, want: Dimension | None) -> str | None:
-        """What factor would make two dimensions agree, and which parameter has it."""
+    def missing(self, have: Dimension | None, want: Dimension | None, *within: syntax.Expr) -> str | None:
+        """What factor would make two dimensions agree, and which parameter has it, or was given without a unit.
+
+        within: expressions of which the first has the dimension `have`, the second `want`.
+        """
         if have is None or want is None:
             return None
         for factor in (dim.quotient(want, have), dim.quotient(have, want)):
@@ -296,7 +302,31 @@ class Context:
                     if isinstance(s, ParameterSymbol) and not s.shape and factor and s.dimension == factor:
                         return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
                 level = level.outer
+        for expression, factor in zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False):
+            bare = self._bare(expression)
+            if bare is not None and factor:
+                return habits.unitless(*bare, factor)
         return None
+
+    def _bare(self, expression: syntax.Expr) -> tuple[str, str | None] | None:
+        """The one parameter among the factors of an expression that is a bare number: its name and that number."""
+        inner: object = expression
+        while isinstance(inner, (syntax.Negative, syntax.Group)):
+            inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
+        factors = [f for op, f in inner.factors if op != "/"] if isinstance(inner, syntax.Product) else [inner]
+        found = []
+        for factor in factors:
+            if isinstance(factor, syntax.Negative):
+                factor = factor.operand
+            symbol = self.scope.find(factor.name) if isinstance(factor, syntax.Name) else None
+            if isinstance(symbol, ParameterSymbol) and not symbol.dimension and not symbol.truth and not symbol.shape:
+                found.append(symbol)
+        if len(found) != 1 or found[0].name in self.whole:
+            return None
+        place = found[0].place
+        line = place.source.text[place.span.end :].partition("\n")[0]
+        number = re.match(r"\s*=\s*(-?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(?:[#;].*)?$", line)
+        return found[0].name, number.group(1) if number else None
 
     def is_number(self, value: Typed, e: syntax.Expr) -> None:
         """Report a condition in the place of a number."""

@@ -42,6 +42,8 @@ from sysdyn.dsl.tree import syntax
 
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE}
+RATES = ("dot", "der", "d", "dt", "prime")
+"""Members by which other languages write a rate."""
 BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
 
 
@@ -205,6 +207,8 @@ class Members(Names):
     def no_member(self, owner: str, e: syntax.Member, members: Iterable[str]) -> Failed:
         """Report E102 with the members there are."""
         names = list(members)
+        if e.name in RATES:
+            return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=f"{owner}'")
         near = nearest(e.name, names)
         help_ = f"nearest: '{near}'" if near else f"it has {', '.join(names[:20])}" if names else None
         return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=help_)

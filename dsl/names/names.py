@@ -10,6 +10,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, known
+from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Context, Failed, SeveralError, Use, Value
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
@@ -108,10 +109,17 @@ class Names(Context):
             return Failed()
         if self.statics:
             return self.fail("E908", f"unknown static quantity '{name}'", span, help=f"one of {', '.join(STATICS)}")
-        near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
         code, message = self._unknown
-        help_ = f"nearest name in scope: '{near}'" if near else None
+        help_ = habits.name(name, self.source.text, span.start, self._moves)
+        if help_ is None:
+            near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
+            help_ = f"nearest name in scope: '{near}'" if near else None
         return self.fail(code, message.format(name), span, help=help_)
+
+    def _moves(self, name: str) -> bool:
+        """Whether a name has a rate."""
+        symbol = self.scope.find(name)
+        return isinstance(symbol, UnknownSymbol) or (isinstance(symbol, Definition) and symbol.kind == "let")
 
     # -- symbols -------------------------------------------------------------------------------------------
 
@@ -141,7 +149,8 @@ class Names(Context):
                     "E104", f"element '{symbol.name}' is not a value", span, help=f"a member: {symbol.name}.f"
                 )
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
-                raise self.fail("E104", f"'{symbol.name}' is not a value", span)
+                meant = habits.name(symbol.name, self.source.text, span.start, self._moves)
+                raise self.fail("E104", f"'{symbol.name}' is not a value", span, help=meant)
 
     def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
         if not all(name in self._bound for name in symbol.at):

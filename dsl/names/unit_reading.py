@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from sysdyn.dsl.model.unit_habits import declaration, respelled
 from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Dimension, Unit, known, multiply, names, si_text
 from sysdyn.dsl.names.symbols import Scope, nearest
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
@@ -45,6 +46,8 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: 
             help="write the unit itself",
         )
         return
+    if place.source.text[unit.span.start - 1 : unit.span.start].isalnum():
+        return  # grown to its number, as in 10k: that has been said (E114)
     message = f"'{factor.name}' is not a unit, in '{unit.text}'"
     help_: str | None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
@@ -53,6 +56,20 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: 
         verb = "divide" if factor.op == "/" else "multiply"
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
     else:
-        near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
-        help_ = f"nearest unit: '{near}'" if near else None
+        help_ = _meant(unit, factor)
     report.error("E201", message, place, help=help_)
+
+
+def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
+    """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
+    right = respelled(unit.text)
+    if right is not None:
+        return f"write '{right}'"
+    alone = respelled(factor.name)
+    if alone is not None:
+        return f"write '{alone}' for '{factor.name}'"
+    line = declaration(factor.name)
+    if line is not None:
+        return f"declare it at the top of the file: {line}"
+    near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
+    return f"nearest unit: '{near}'" if near and len(factor.name) > 1 else "sysdyn help units lists them"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 
-from sysdyn.dsl.parser import complaints
+from sysdyn.dsl.parser import complaints, foreign
 from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.parser.lexing import RESERVED, Bracket
@@ -32,7 +32,7 @@ _BLANK = re.compile(r"[ \t]*+")
 _BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as", "->", "{", ":="})
 """Terminals that stand in no bracket, but may stand behind one."""
 
-_SLIPS = RESERVED | {"=", "=="}
+_SLIPS = RESERVED | {"=", "==", ":="}
 _OUTERMOST = frozenset({"model", "component", "scene", "domain", "bundle", "from"})
 _HEADS = {
     "model": ("model", "<name>"),
@@ -69,6 +69,9 @@ class Recovery:
             if kind == "==" and automaton.accepts("="):
                 self._error(("E111", f"'==' compares; {self._defined()}", "="), self._token())
                 kind = "="
+            elif kind == ":=" and automaton.accepts("="):
+                self._error(("E113", f"':=' assigns at an event; {self._defined()}", "="), self._token())
+                kind = "="
             elif kind == "=" and automaton.accepts(":="):
                 self._error(("E113", "an action assigns with ':='", ":="), self._token())
                 kind = ":="
@@ -87,7 +90,7 @@ class Recovery:
         unit = scanner.unit or (scanner.end, scanner.end)
         text = scanner.text
         word = complaints.quoted(text[scanner.start : scanner.end])
-        help_ = f"{text[scanner.start : unit[0]]} {text[unit[0] : unit[1]]}"
+        help_ = foreign.glued(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
         self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token())
         return "<quantity>" if self.automaton.accepts("<quantity>") else "<number>"
 
@@ -146,6 +149,8 @@ class Recovery:
             self._error(("E112", "the text that begins with this '\"' is not closed on its line", '"'), self._token())
         elif bracket is not None:
             self._not_closed(bracket)
+        elif (complaint := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:
+            self._error(complaint, self._token())
         elif kind == "<fault>":
             self._error(complaints.character(text), self._token())
         elif scanner.suspect is not None:
@@ -162,6 +167,9 @@ class Recovery:
             self._error(("E107", f"'{what}' belongs in {where}, not in {here}", None), Span(start, start + 5))
         elif word and word not in self._words_here(size) and after[:1] not in (":", "["):
             complaint = complaints.unknown(word, after, body)
+            netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
+            if netlist is not None:
+                complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
             if after.startswith("->") or (complaint[0] == "E113" and after[:1] in ("=", ",") and self._indented(start)):
                 complaint = complaints.connection()
             self._error(complaint, Span(start, start + len(word)))

@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 from schema import NUMBER, conforms, envelope
-from sysdyn.cli.compare.diffing import junit
 from sysdyn.cli.main import run
+from sysdyn.cli.page.junit import junit
 from sysdyn.cli.page.unit_text import conversion
 from texts import PENDULUM, process, run_json, write
 

@@ -1,0 +1,246 @@
+"""Units as they are written elsewhere, rewritten: `Nm` is `N.m`, `m/s²` is `m/s^2`, `kN*s/m` is `kN.s/m`.
+
+Pure functions from a text to the right text, or None where no reading is certain.  No edit distance: a suggestion is
+made only where all its factors are units.
+"""
+
+from __future__ import annotations
+
+import re
+
+from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, names, si_text
+
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
+_SIGNS = {
+    "·": ".",
+    "⋅": ".",
+    "*": ".",
+    "×": ".",
+    "\u03a9": "ohm",  # the letter omega
+    "\u2126": "ohm",  # the sign of the unit
+    "°": "deg",
+    "%": "percent",
+    "**": "^",
+    "∕": "/",
+}
+_FACTOR = re.compile(r"([^\W\d_]+)(?:\^?(-?[0-9]+))?")
+_WORDS = {
+    "ohms": "ohm", "volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "amperes": "A",
+    "newton": "N", "newtons": "N", "meter": "m", "meters": "m", "metre": "m", "metres": "m", "gram": "g", "grams": "g",
+    "second": "s", "seconds": "s", "sec": "s", "secs": "s", "hour": "h", "hours": "h", "hr": "h", "hrs": "h",
+    "minute": "min", "minutes": "min", "mins": "min", "day": "d", "days": "d", "kilogram": "kg", "kilograms": "kg",
+    "kgs": "kg", "joule": "J", "joules": "J", "watt": "W", "watts": "W", "pascal": "Pa", "pascals": "Pa",
+    "hertz": "Hz", "cps": "Hz", "farad": "F", "farads": "F", "henry": "H", "henries": "H", "henrys": "H",
+    "tesla": "T", "weber": "Wb", "coulomb": "C", "coulombs": "C", "kelvin": "K", "degree": "deg", "degrees": "deg",
+    "radian": "rad", "radians": "rad", "rads": "rad", "mps": "m/s", "rev": "turn", "revs": "turn", "revolution": "turn",
+    "revolutions": "turn", "liter": "l", "liters": "l", "litre": "l", "litres": "l", "lt": "l", "ltr": "l",
+    "tonne": "t", "tonnes": "t", "ton": "t", "siemens": "S", "mho": "S", "bars": "bar", "percentage": "percent",
+    "pct": "percent", "rps": "turn/s", "kph": "km/h", "kmh": "km/h", "kmph": "km/h", "cc": "cm^3", "micron": "um",
+}  # fmt: skip
+"""Names in words; with a prefix in front of them too."""
+OTHER_SYSTEMS = {
+    "inch": "25.4 mm", "ft": "304.8 mm", "foot": "304.8 mm", "feet": "304.8 mm", "yd": "0.9144 m",
+    "mile": "1609.344 m", "lb": "0.45359237 kg", "lbs": "0.45359237 kg", "lbm": "0.45359237 kg",
+    "lbf": "4.4482216152605 N", "psi": "6894.757293168 Pa", "hp": "745.69987158227 W", "mph": "1609.344 m/h",
+    "kgf": "9.80665 N", "kp": "9.80665 N", "gal": "3.785411784 l", "gpm": "3.785411784 l/min", "oz": "28.349523125 g",
+    "cal": "4.184 J", "btu": "1055.05585262 J", "torr": "133.322368421 Pa", "mmhg": "133.322387415 Pa",
+    "psig": "6894.757293168 Pa", "slug": "14.593902937 kg", "knot": "1852 m/h", "kt": "1852 m/h",
+    "au": "149597870700 m", "ps": "735.49875 W", "cv": "735.49875 W",
+}  # fmt: skip
+"""Units that a text can declare for itself."""
+_STRONG = ("N", "V", "A", "W", "Pa", "kg", "J", "C", "Wb", "rad", "K")
+"""Bases with which names that have grown together begin: `Nm`, `kgm`, `Vs`, `Ah`, `rads`."""
+_SUFFIXES = {"meg": "e6", "k": "e3", "K": "e3", "M": "e6", "G": "e9", "m": "e-3", "u": "e-6", "µ": "e-6", "n": "e-9"}
+_SUFFIXES |= {"p": "e-12", "f": "e-15", "T": "e12", "g": "e9", "t": "e12", "Meg": "e6", "MEG": "e6"}
+
+
+def respelled(text: str) -> str | None:
+    """A wrong unit as it is meant; None where that is not certain, or where it is right already."""
+    whole = _normal(text)
+    return whole if whole != text else None
+
+
+def _normal(text: str) -> str | None:
+    """The unit with each factor as the language writes it; None where one is no unit."""
+    plain = _RAISED.sub(lambda m: "^" + m.group().translate(_SUPERSCRIPTS), text).replace("**", "^")
+    for sign, right in _SIGNS.items():
+        plain = plain.replace(sign, right)
+    found = []
+    sign = ""
+    for k, part in enumerate(re.split(r"([./])", plain)):
+        if k % 2:
+            sign = part
+            continue
+        factors = _factors(part)
+        if factors is None:
+            return None
+        # what has grown together behind a '/' is divided by, each factor: J/kgK is J/kg/K
+        found.append(sign + (sign or ".").join(factors))
+    return "".join(found)
+
+
+def _factors(text: str) -> list[str] | None:
+    """The factors between two signs, more than one where they have grown together: `m^2K`, `kgm2`, `Nm`."""
+    if text == "1":
+        return ["1"]
+    found: list[str] = []
+    end = 0
+    for match in _FACTOR.finditer(text):
+        if match.start() != end:
+            return None
+        end = match.end()
+        name, exponent = match.groups()
+        parts = [name] if known(name) else _worded(name) or _parted(name)
+        if parts is None:
+            return None
+        if exponent is not None:
+            if re.search(r"[/^]", parts[-1]):
+                return None
+            parts[-1] = f"{parts[-1]}^{exponent}"
+        found += parts
+    return found if found and end == len(text) else None
+
+
+def _worded(name: str) -> list[str] | None:
+    found = _word(name) or _cased(name)
+    return None if found is None else [found]
+
+
+def _word(name: str) -> str | None:
+    """A unit's name in words, with or without a prefix: `volts`, `kOhm`, `mVolt`, `milliamps`."""
+    lower = name.lower()
+    if lower in _WORDS:
+        return _WORDS[lower]
+    if lower == "ohm":
+        return "ohm"
+    for long, short in _LONG_PREFIXES.items():
+        if lower.startswith(long):
+            rest = _word(lower[len(long) :])
+            if rest is not None and known(short + rest):
+                return short + rest
+    tail = lower[1:]
+    base = "ohm" if tail == "ohm" else _WORDS.get(tail)
+    return name[0] + base if base and known(name[0] + base) else None
+
+
+_LONG_PREFIXES = {"milli": "m", "micro": "u", "nano": "n", "pico": "p", "kilo": "k", "mega": "M", "giga": "G"}
+_LONG_PREFIXES |= {"centi": "c", "deci": "d"}
+
+
+def _cased(name: str) -> str | None:
+    """The unit that differs in upper and lower case alone: `hz`, `RPM`, `KN`, `Kg`, `mhz`; never `Nm` as `nm`."""
+    for base in names():
+        if base.lower() == name.lower():
+            return base
+        if name[:1].lower() == "m" and name[1:].lower() == base.lower() and base != "l":
+            return None  # milli or mega
+        head, tail = name[:1], name[1:]
+        prefix = "k" if head == "K" else head
+        if base.lower() == tail.lower() and known(prefix + base) and (tail != base or prefix != head):
+            return prefix + base
+    return None
+
+
+def _parted(name: str) -> list[str] | None:
+    """A name that has grown together of two or three units, the longest first: `Nm`, `Nms`, `kgm`, `Ah`, `Pas`."""
+    for end in range(len(name) - 1, 0, -1):
+        head, tail = name[:end], name[end:]
+        base = head if head in _STRONG else head[1:]
+        if known(head) is None or base not in _STRONG:
+            continue
+        if tail == "ms":
+            return [head, "m", "s"]
+        if known(tail):
+            return [head, tail]
+        rest = _parted(tail)
+        if rest is not None:
+            return [head, *rest]
+    return None
+
+
+def declaration(name: str) -> str | None:
+    """The line that declares a unit of another system: `unit psi = 6894.757293168 Pa`."""
+    value = OTHER_SYSTEMS.get(name.lower())
+    return f"unit {name} = {value}" if value else None
+
+
+_GLUED = re.compile(r"([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)(meg|[kKMGmunpfTgtµ]|Meg|MEG)([0-9]*)$")
+
+
+def scaled(text: str) -> str | None:
+    """A number with the suffix of a circuit simulator: `10k` is `10e3`, `4u7` is `4.7e-6`; None for anything else."""
+    match = _GLUED.match(text)
+    if match is None:
+        return None
+    number, suffix, behind = match.groups()
+    if behind and "." in number:
+        return None
+    return f"{number}{'.' + behind if behind else ''}{_SUFFIXES[suffix]}"
+
+
+_QUANTITY = re.compile(
+    r"(?<![\w.])([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)[ \t]+("
+    r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[ \t]*[.*/·][ \t]*[^\W\d]\w*(?:\*?\*?\^?-?[0-9]+)?)+"
+    r"|[^\W\d]\w*(?:\^-?[0-9]+)?(?:[ \t]+[^\W\d]\w*(?:\^-?[0-9]+)?)+)"
+)
+
+
+def chained(text: str, offset: int) -> str | None:
+    """The quantity around an offset whose unit was written as a product: `3 kN*s/m` or `3 N m`; None where none is."""
+    first = text.rfind("\n", 0, offset) + 1
+    last = text.find("\n", offset)
+    line = text[first : last if last >= 0 else len(text)]
+    for match in _QUANTITY.finditer(line):
+        if match.start() + first <= offset < match.end() + first:
+            unit = re.sub(r"[ \t]*([.*/·])[ \t]*", r"\1", match.group(2))
+            unit = re.sub(r"[ \t]+", ".", unit)
+            right = _normal(unit)
+            return f"{match.group(1)} {right}" if right else None
+    return None
+
+
+_COMMON = [
+    "N/m",
+    "N.s/m",
+    "kg.m^2",
+    "m/s",
+    "m/s^2",
+    "m^2",
+    "m^3",
+    "m^3/s",
+    "N.m.s",
+    "Pa.s",
+    "Pa.s/m^3",
+    "W/K",
+    "J/K",
+    "K/W",
+    "V.s",
+    "V/m",
+    "A/m",
+    "kg/m",
+    "kg/m^3",
+    "N/m^2",
+    "N.s",
+    "N/A",
+]
+"""Units in which engineers say a dimension that has no name of its own."""
+
+
+def common(dimension: Dimension) -> str:
+    """The unit in which a dimension is usually said: `N/m` for kg/s^2."""
+    text = si_text(dimension)
+    if text.startswith("1/"):
+        return ".".join(f"{n}^-{e or 1}" for n, e in re.findall(r"/([A-Za-z]+)(?:\^([0-9]+))?", text))
+    if not re.search(r"[./^]", text):
+        return text
+    return next((unit for unit in _COMMON if _dimension(unit) == dimension), text)
+
+
+def _dimension(unit: str) -> Dimension:
+    found = NONE
+    for sign, name, exponent in re.findall(r"([./]?)([A-Za-z]+)(?:\^([0-9]+))?", unit):
+        factor = known(name)
+        assert factor is not None
+        found = multiply(found, factor[0], int(exponent or 1) * (-1 if sign == "/" else 1))
+    return found

@@ -1,0 +1,89 @@
+"""Names and functions of other languages, with what is written here: what an E101 suggests before the nearest name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sysdyn.dsl.model.unit_habits import chained, common
+from sysdyn.dsl.model.units import Dimension, known
+
+_NAMES = {
+    **dict.fromkeys(("PI", "Pi", "M_PI", "π"), "pi"),
+    **dict.fromkeys(("gnd", "GND", "Gnd", "Ground", "GROUND", "vss", "VSS"), "ground"),
+    **dict.fromkeys(("time", "Time", "TIME"), "t"),
+    **dict.fromkeys(("True", "TRUE"), "true"),
+    **dict.fromkeys(("False", "FALSE"), "false"),
+    **dict.fromkeys(("Inf", "INF", "infinity", "Infinity", "oo"), "inf"),
+    **dict.fromkeys(("g", "grav", "gravity", "g_n"), "g0"),
+}
+_FUNCTIONS = {
+    "log": "ln (the natural one), or log10",
+    "loge": "ln",
+    "pow": "a^b",
+    "power": "a^b",
+    "sqr": "x^2",
+    "square": "x^2",
+    "fabs": "abs",
+    "arcsin": "asin",
+    "arccos": "acos",
+    "arctan": "atan",
+    "arctan2": "atan2",
+    "sgn": "sign",
+    "signum": "sign",
+    "heaviside": "step",
+    "round": "floor(x + 0.5)",
+    "int": "state s: m = 0 m, and dynamic s' = ...",
+    "integral": "state s: m = 0 m, and dynamic s' = ...",
+    "integrate": "state s: m = 0 m, and dynamic s' = ...",
+    "where": "if c then a else b",
+    "ifelse": "if c then a else b",
+    "sat": "clip(x, lo, hi)",
+    "saturate": "clip(x, lo, hi)",
+    "limit": "clip(x, lo, hi)",
+    "clamp": "clip(x, lo, hi)",
+    "rem": "mod",
+    "fmod": "mod",
+    "deg2rad": "90 deg",
+    "radians": "90 deg",
+    "interp": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
+    "interp1": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
+    "lookup": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
+    "edge": "when c { ... }",
+    "pre": "the name itself: right-hand sides are read before anything changes",
+    "sample": "every 5 ms { ... }",
+    "delay": "std.control.sample_hold holds a value between samples",
+}
+_DERIVATIVES = frozenset({"der", "diff", "ddt", "deriv", "derivative", "D", "dot_", "Der", "DER"})
+_ENDINGS = ("_dot", "dot", "_d", "_prime", "Dot")
+
+
+def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> str | None:
+    """What to write for an unknown name at an offset of a text; moves: whether a name has a rate."""
+    for ending in _ENDINGS:
+        base = word.removesuffix(ending)
+        if base != word and moves(base):
+            return f"{base}'"
+    if len(word) > 1 and word[0] == "d" and moves(word[1:]):
+        return f"{word[1:]}'"
+    if known(word) is not None:
+        quantity = chained(text, offset)
+        if quantity is not None:
+            return f"{quantity}: a unit is written without spaces, its factors are joined by dots"
+    return _NAMES.get(word)
+
+
+def function(word: str, arguments: list[str]) -> str | None:
+    """What to write for an unknown function of these arguments (as texts)."""
+    if word in _DERIVATIVES and arguments:
+        inner = arguments[0]
+        simple = inner.replace(".", "").replace("_", "").replace("'", "").isalnum()
+        return f"{inner}'" if simple else f"let y = {inner}, and y' where its rate is read"
+    if word in ("pow", "power") and len(arguments) == 2:
+        return "^".join(a if a.replace("_", "").replace(".", "").isalnum() else f"({a})" for a in arguments)
+    return _FUNCTIONS.get(word)
+
+
+def unitless(name: str, value: str | None, factor: Dimension) -> str:
+    """That a parameter was given as a bare number where a quantity of that dimension would fit."""
+    unit = common(factor)
+    return f"'{name}' is a number without unit; in {unit} it fits: param {name} = {value or '...'} {unit}"

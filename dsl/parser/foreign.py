@@ -1,0 +1,68 @@
+"""Spellings of other languages that are no syntax here, recognised where a token does not fit."""
+
+from __future__ import annotations
+
+import re
+
+from sysdyn.dsl.model.unit_habits import chained, respelled, scaled
+from sysdyn.dsl.model.units import known
+from sysdyn.dsl.parser.complaints import Complaint
+
+_DIGITS_BEFORE = re.compile(r"[0-9]+$")
+_DIGITS = re.compile(r"[0-9]+")
+_SPICE = re.compile(r"(?:[\w.+-]+[ \t]+){2,}[\w.+-]+[ \t]*(?:[#;].*)?$")
+_PARTS = {"R": "resistor(R = 1 kohm)", "C": "capacitor(C = 1 uF)", "L": "inductor(L = 1 mH)", "V": "voltage(v = 5 V)"}
+_PARTS |= {"I": "current(i = 1 A)", "D": "diode()", "K": "spring(k = 1 N/m)", "M": "mass(m = 1 kg)"}
+_EXAMPLES = {"e3": "kohm", "e6": "Mohm", "e-6": "uF", "e-3": "mH", "e-9": "nF", "e-12": "pF"}
+
+
+def glued(number: str, unit: str) -> str:
+    """What is meant by a number with something grown to it: `3kg`, `5Nm`, `10k`, `4u7`."""
+    plain = scaled(number + unit)
+    if plain is not None and known(unit) is None:
+        digits, _, exponent = plain.partition("e")
+        example = _EXAMPLES.get(f"e{exponent}")
+        return f"{plain}, or with its unit, as in '{digits} {example}'" if example else plain
+    if known(unit.partition(".")[0].partition("/")[0].partition("^")[0]):
+        return f"{number} {unit}"
+    right = respelled(unit)
+    return f"{number} {right}" if right else f"{number} {unit}, or {number}*{unit} for a product"
+
+
+def spice(word: str, after: str) -> str | None:
+    """A line of a netlist: `R1 a b 1k`."""
+    if not _SPICE.match(after):
+        return None
+    plus, minus = after.split()[:2]
+    part = _PARTS.get(word[:1].upper(), "component(name = value)")
+    ends = ["ground" if node in ("0", "gnd", "GND") else node for node in (plus, minus)]
+    return f"{word}: {part} {ends[0]} -> {ends[1]}"
+
+
+def around(text: str, start: int, end: int, kind: str) -> Complaint | None:
+    """The complaint about a token at start..end that other languages explain; None for any other."""
+    sign = text[start:end]
+    line = text[text.rfind("\n", 0, start) + 1 : start]
+    before = _DIGITS_BEFORE.search(line)
+    if sign == "," and before and (behind := _DIGITS.match(text, end)):
+        meant = f"{before.group()}.{behind.group()}"
+        meant += f", or {before.group()}{behind.group()}" if len(behind.group()) == 3 else ""
+        return "E113", "a comma separates; decimals follow a point", meant
+    if sign in ("/", "*") and line.endswith("/"):
+        return "E113", "a remark is no part of a statement", "a comment begins with '#'"
+    if sign == "0" and line.rstrip().endswith("->"):
+        return "E113", "the reference of every domain has a name", "ground"
+    if kind in ("<name>", "(") and line.endswith(")"):
+        return "E113", "a product is written with its sign", f")*{sign}"
+    quantity = chained(text, start)
+    if quantity is not None and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
+        return "E113", "a unit is written without spaces, its factors are joined by dots", f"write '{quantity}'"
+    if sign == "°" and text[end : end + 1] == "C":
+        return "E113", "'°C' is no unit of a quantity: its zero is not 0 K", "celsius(20)"
+    if sign == "?":
+        return "E113", "a choice is written in words", "if c then a else b"
+    if kind == "<name>" and re.search(r"[0-9][ \t]+if[ \t]+$", line):
+        return "E113", "the condition of a choice comes first", "if c then a else b"
+    if sign == "." and before and not text[end : end + 1].isdigit():
+        return "E113", "a number ends with a digit", f"{before.group()}.0"
+    return None
