@@ -19,6 +19,7 @@ COMMANDS = {
     "explain": "Say what a diagnostic code means.",
     "fmt": "Bring model texts into the canonical layout.",
     "golden": "Golden traces of a project: record, check, accept, list.",
+    "linearize": "Matrices, eigenvalues, poles and zeros about a state.",
     "plot": "Draw quantities of a trace.",
     "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
