@@ -34,6 +34,7 @@ from sysdyn.runtime.linear.tangent import (
     constant,
     integral,
     moving,
+    quadratures,
     reduced,
     rows_at,
 )
@@ -101,6 +102,12 @@ def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -
     return tuple(found)
 
 
+def loose_of(found: Found) -> NDArray[np.bool_]:
+    """Unknowns that nothing depends on [unknowns as written]."""
+    tangible = {c.name for c in found.prepared.compiled.energies.coordinates if c.tangible}
+    return quadratures(found.system, tangible)
+
+
 def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linear:
     """The linearisation at the state of `found`.  Raises NoLinearisation."""
     state, system = found.state, found.system
@@ -114,12 +121,13 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     by_input = tuple(
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
+    loose = loose_of(found)
     try:
-        small = reduced(rows, system, state, by_input, out, labels)
+        small = reduced(rows, system, state, by_input, out, labels, loose)
     except NoLinearisation:
         if not constant(system, state) and moving(system, state):
             raise
-        small = _of_pencil(found, _descriptor(system, found, slopes, out, labels))
+        small = _of_pencil(found, _descriptor(system, found, slopes, out, labels), loose)
     form = system if index == "3" else system.another(index)
     descriptor = _descriptor(form, found, slopes, out, labels)
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
@@ -202,14 +210,14 @@ def _reads_ledger(expression: object) -> bool:
     return any(n.op == "var" and n.data[1] == "audit" for n in variables(expression))  # type: ignore[arg-type]
 
 
-def _of_pencil(found: Found, form: Descriptor) -> Reduced:
+def _of_pencil(found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Reduced:
     """The reduction where constraints are hidden deeper than rows are differentiated: by the pencil itself."""
     system = found.system
     spaces = motions(form.e, form.a)
     n = system.form.written
     known = candidates_of(system, found.state, n)
     extra = np.arange(n, len(form.states))
-    chosen = np.concatenate([chosen_states(system, spaces[0], known), extra])[: spaces[0].shape[1]]
+    chosen = np.concatenate([chosen_states(system, spaces[0], spaces[2], known, loose), extra])[: spaces[0].shape[1]]
     names = tuple(form.states[int(k)] for k in chosen)
     matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
     small = parted(matrices, chosen, spaces, names)

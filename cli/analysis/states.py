@@ -21,6 +21,7 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 
 NO_REST = "no state of rest was found from the guesses{}: every rate zero, time held at {:g} s"
+"""Said with what else was tried, and the instant."""
 
 
 def state_of(
@@ -44,7 +45,7 @@ def resting(target: Target, prepared: Prepared, tries: int) -> tuple[Found, tupl
     system = System(prepared.manifest, prepared.arrays, prepared.carrier)
     guess = _guess(prepared, system, t0)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
-    states = rests(Resting(system, tangible, t0), guess, tries)
+    states = rests(Resting(system, tangible, t0, guess), tries)
     state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf, 0, ())
     return Found(target, prepared, system, state, prepared.binding), states
 

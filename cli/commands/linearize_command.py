@@ -49,6 +49,8 @@ def command(
     with ex.fresh():
         found, failure = state_of(request, names, console.report, rest=equilibrium)
         if found is None:
+            if failure:
+                console.complain(failure, SOLVER)
             return console.finish(SOLVER if failure else 1)
         from sysdyn.cli.analysis.linear import inputs_of
 
@@ -162,6 +164,7 @@ def _shares(linear: Any, mode: Any) -> str:
 
 
 def _complex(value: complex) -> str:
+    value = complex(value.real if abs(value.real) > 1e-12 * abs(value) else 0.0, value.imag)
     return f"{value.real:.9g}" if value.imag == 0.0 else f"{value.real:.9g}{value.imag:+.9g}i"
 
 

@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.linear.tangent import quadratures
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.least_change import DENSE, FOLDS, Problem, Work, solve
@@ -27,10 +29,12 @@ MET = 1e-9
 """Largest row, relative to its terms, of a state of rest."""
 SAME = 1e-6
 """Distance of two states of rest, in magnitudes, below which they are one."""
+NEAR = 1e-9
+"""Part of a magnitude that is tried as zero."""
 SHARE = 0.05
 """Of the work that a search for a start may take: that of one search for rest."""
-AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
-"""Of random points around the guess, in magnitudes, one after the other."""
+NEAREST, FARTHEST = -1.0, 1.5
+"""Powers of ten between which random points lie around the guess, in magnitudes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +47,10 @@ class Rest:
 
 
 class Resting:
-    """The equations of rest of one model, time held at t."""
+    """The equations of rest of one model, time held at t; first: guess [unknowns] of what they leave open."""
 
-    def __init__(self, system: System, tangible: AbstractSet[str], t: float) -> None:
-        self.system, self.t = system, t
+    def __init__(self, system: System, tangible: AbstractSet[str], t: float, first: Floats) -> None:
+        self.system, self.tangible, self.t, self.first = system, tangible, t, first
         self.starter = Starter(system)
         self.rows = self.starter.settled
         self.n = system.form.written
@@ -61,14 +65,11 @@ class Resting:
         """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
         use = self.starter.groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda")
         use[self.rows.held[0]] = True
-        # a dynamic variable that nothing depends on may grow
-        in_y, _ = self.rows.structural()
-        felt = np.zeros(self.n, dtype=bool)
-        felt[self.rows.pattern.columns_of()[in_y & (self.rows.pattern.columns_of() < self.n)]] = True
+        grows = quadratures(self.system, self.tangible) & (self.system.kinds[: self.n] == "s")
         for group, family, first in self.rows.form.groups:
             if group == "lambda":
                 owner = self.system.description.rows[family].owner
-                use[first : first + self.system.description.rows[family].size] = felt[self._places("s", owner)]
+                use[first : first + self.system.description.rows[family].size] = ~grows[self._places("s", owner)]
         return use
 
     def _places(self, kind: str, owner: str) -> slice:
@@ -121,17 +122,35 @@ class Resting:
                 break
         else:
             return None
-        y = self._turned(best.x)
+        y = self._turned(self._clean(best.x, problem))
         again = self.problem(y)  # in magnitudes of its own: what is near zero in the guess's may be large in these
         own = solve(again, y)
         if not own.residual < MET:
             return None
-        y = self.starter.without_noise(
-            np.concatenate([own.x, np.zeros(self.starter.first - self.n)]),
-            np.concatenate([again.scale, np.ones(self.starter.first - self.n)]),
-        )[: self.n]
+        y = self._clean(own.x, problem)
+        null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
+        y = self._back(y, again, null)
         state = ConsistentState(self.t, y, self.rates(y), (), own.residual, 0, ())
-        return Rest(state, own.residual, self._open(y, again))
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        largest = np.abs(null).max(axis=1, initial=0.0)
+        free = tuple(self.system.name(int(k)) for k in np.flatnonzero(told & (largest > SAME)))
+        return Rest(state, own.residual, free)
+
+    def _met(self, y: Floats) -> bool:
+        return solve(self.problem(y), y, 1).residual < MET
+
+    def _clean(self, y: Floats, problem: Problem) -> Floats:
+        """Without what is near zero in its magnitude, where that is as good."""
+        clean = np.where(np.abs(y) > NEAR * group_maximum(self.system, problem.scale), y, 0.0)
+        return clean if (clean != y).any() and self._met(clean) else y
+
+    def _back(self, y: Floats, problem: Problem, null: Floats) -> Floats:
+        """What the rows leave open as it was first guessed."""
+        if not null.size:
+            return y
+        away = (y - self.first) / problem.scale
+        back = y - problem.scale * (null @ np.linalg.lstsq(null, away, rcond=1e-9)[0])
+        return back if self._met(back) else y
 
     def _turned(self, y: Floats) -> Floats:
         """Angles in -pi..pi where the rows cannot tell whole turns."""
@@ -149,19 +168,12 @@ class Resting:
         found[problem.free] = column[:, None] * null
         return found
 
-    def _open(self, y: Floats, problem: Problem) -> tuple[str, ...]:
-        if self.n > DENSE:
-            return ()
-        null = self._null(y, problem) / problem.scale[:, None]
-        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
-        largest = np.abs(null).max(axis=1, initial=0.0)
-        return tuple(self.system.name(int(k)) for k in np.flatnonzero(told & (largest > SAME)))
-
     def apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
         problem = self.problem(one.state.y)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
-        size = np.maximum(np.abs(one.state.y), np.maximum(np.abs(other.state.y), problem.scale))
+        size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
+        size = np.maximum(size, group_maximum(self.system, problem.scale))
         move = ((other.state.y - one.state.y) / size)[told]
         if one.free:
             null = (self._null(one.state.y, problem) / size[:, None])[told]
@@ -169,15 +181,20 @@ class Resting:
         return bool(np.abs(move).max(initial=0.0) > SAME)
 
 
-def rests(resting: Resting, guess: Floats, tries: int) -> tuple[Rest, ...]:
-    """States of rest from the guess [unknowns] and from random points, in the order found."""
+def rests(resting: Resting, tries: int) -> tuple[Rest, ...]:
+    """States of rest from the first guess and from random points, in the order found."""
     kept: list[Rest] = []
+    guess = resting.first
     random = np.random.default_rng(7)
     scale = resting.problem(guess).scale
     scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
+    mirrored: list[Floats] = []  # springs and pendulums are often symmetrical
     for k in range(tries + 1):
-        shaken = AMPLITUDES[k % len(AMPLITUDES)] * scale * random.standard_normal(guess.size)
-        found = resting.found(guess if k == 0 else guess + shaken)
+        shaken = 10.0 ** random.uniform(NEAREST, FARTHEST) * scale * random.standard_normal(guess.size)
+        point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
+        found = resting.found(point)
         if found is not None and all(resting.apart(other, found) for other in kept):
             kept.append(found)
+            mirrored.append(-found.state.y)
+            scale = np.maximum(scale, np.abs(found.state.y - guess))
     return tuple(kept)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.linear.modes import Mode, balanced, modes
 from sysdyn.runtime.linear.tangent import Reduced
 from sysdyn.runtime.model.description import Floats
@@ -49,21 +50,10 @@ class Verdict:
     energy: Energy | None
 
 
-def felt(a: Floats) -> Floats:
-    """A without the states that no other one depends on, themselves included (quadratures)."""
-    kept = np.arange(a.shape[0])
-    while kept.size:
-        part = a[np.ix_(kept, kept)]
-        used = (part != 0.0).any(axis=0)
-        if used.all():
-            break
-        kept = kept[used]
-    return a[np.ix_(kept, kept)]
-
-
-def verdict(small: Reduced, energy: Energy | None) -> Verdict:
-    """What both methods say together."""
-    values = np.linalg.eigvals(balanced(felt(small.a))[0]) if small.a.size else np.zeros(0)
+def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None) -> Verdict:
+    """What both methods say together; loose [unknowns]: what nothing depends on."""
+    felt = np.flatnonzero((small.places >= 0) & ~loose[small.places])
+    values = np.linalg.eigvals(balanced(small.a[np.ix_(felt, felt)])[0]) if felt.size else np.zeros(0)
     near = STILL * float(np.abs(values).max(initial=0.0))
     found = modes(small.a)
     if (values.real > near).any():
@@ -78,15 +68,17 @@ def verdict(small: Reduced, energy: Energy | None) -> Verdict:
 
 
 def energy_at(system: System, state: ConsistentState) -> Energy | None:
-    """The energy test at a state of rest; None where it says nothing: effort constraints, dynamic variables, motion,
-    efforts that no potential gives.  system: the form as written of a primal formulation.
+    """The energy test at a state of rest; None where it says nothing: steady motion, efforts that effort constraints or
+    dynamic variables give, or that have no potential.  system: the form as written of a primal formulation.
     """
-    if np.isin(system.kinds, ("e", "s")).any() or np.abs(state.y[system.kinds[: state.y.size] == "f"]).any():
+    if np.abs(state.y[system.kinds[: state.y.size] == "f"]).any():
         return None
     settled = system.another("settled")
     jy, _ = settled.jacobian(state.t, state.y, state.yd)
     full = settled.dense(jy)
     flows, places, balances = _coordinates(settled)
+    if full[np.ix_(balances, np.flatnonzero(np.isin(settled.kinds, ("e", "s"))))].any():
+        return None
     stiff = np.where(places >= 0, full[np.ix_(balances, np.maximum(places, 0))], 0.0)
     loss = full[np.ix_(balances, flows)]
     bound = _bound(settled, full, flows, places)

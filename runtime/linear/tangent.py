@@ -16,12 +16,14 @@ Receives a System, a consistent state, the slopes by inputs and of outputs.  Han
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import TOLERANCE, decomposed, least_squares, null_space
@@ -32,6 +34,8 @@ LARGEST = 1500
 """Unknowns and rates up to which full matrices are taken."""
 NOISE = 1e-13
 """Of the largest variation, in equilibrated unknowns: what is smaller is round-off of the solution."""
+PASSES, MOVES = 2, 1e-13
+"""Of the scaling of unknowns; the part of a unit vector that is no round-off."""
 OWN = 10.0
 """Preference for the flow or momentum of a coordinate whose displacement is a state."""
 ORDERS = 4
@@ -44,6 +48,9 @@ class NoLinearisation(Exception):  # noqa: N818
     def __init__(self, message: str, names: tuple[str, ...] = ()) -> None:
         self.names = names
         super().__init__(message)
+
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +85,7 @@ class Rows:
 
     starter: Starter
     jacobian: Floats
-    holds: NDArray[np.bool_]
+    holds: Mask
 
     @property
     def rates(self) -> NDArray[np.int32]:
@@ -99,6 +106,21 @@ def rows_at(system: System, state: ConsistentState) -> Rows:
     if not np.isfinite(full).all():
         raise NoLinearisation("the slopes of the equations are no numbers there")
     return Rows(starter, full[:, : starter.first], starter.every & ~starter.groups("initial"))
+
+
+def _tangent(g: Floats, by_column: Floats) -> tuple[Floats, Floats]:
+    """The null space of G, orthonormal in units [unknowns] in which those that move at all move alike; these units.
+
+    Where a farad counts in millionths, charges would pass for at rest beside voltages.
+    """
+    by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
+    tangent = null_space(by_row[:, None] * g * by_column)
+    for _ in range(PASSES):
+        size = np.linalg.norm(tangent, axis=1)
+        by_column = by_column * np.where(size > MOVES, size, 1.0)
+        by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
+        tangent = null_space(by_row[:, None] * g * by_column)
+    return tangent, by_column
 
 
 def candidates_of(system: System, state: ConsistentState, n: int) -> NDArray[np.int64]:
@@ -126,19 +148,27 @@ def _rank(part: Floats) -> int:
     return int((decomposed(part)[1] > TOLERANCE).sum()) if part.size else 0
 
 
-def chosen_states(system: System, tangent: Floats, candidates: NDArray[np.int64]) -> NDArray[np.int64]:
-    """States [k] of orthonormal directions [unknowns, k]: as many displacements as are free, then what moves beside
-    them, of the same coordinates if it can be.
+def chosen_states(
+    system: System, tangent: Floats, units: Floats, candidates: NDArray[np.int64], loose: Mask
+) -> NDArray[np.int64]:
+    """States [k] of orthonormal directions [unknowns, k] in these units: as many displacements as are free, then what
+    moves beside them, of the same coordinates if it can be, what nothing depends on (loose) last; of what is alike
+    that which moves most.
     """
-    shown = np.isin(system.kinds[candidates], ("q",))
-    first, rest = candidates[shown], candidates[~shown]
-    held = first[_pivots(tangent[first], _rank(tangent[first]))] if first.size else first
-    left = tangent @ _null(tangent[held])
-    coordinates = {_coordinate(system, int(k)) for k in held}
-    near = np.array([OWN if _coordinate(system, int(k)) in coordinates else 1.0 for k in rest])
-    part = left[rest] * near[:, None]
-    more = rest[_pivots(part, _rank(left[rest]))] if part.size else rest[:0]
-    return np.concatenate([held, more])
+    n = system.form.written
+    size = np.linalg.norm(tangent[:n], axis=1) * units[:n]
+    most = group_maximum(system, size)
+    weight = np.where(most > 0.0, size / np.where(most > 0.0, most, 1.0), 0.0)[:, None]
+    shown = system.kinds[candidates] == "q"
+    kept: list[int] = []
+    for group in (shown & ~loose[candidates], ~shown & ~loose[candidates], loose[candidates]):
+        members = candidates[group]
+        left = tangent @ _null(tangent[kept])
+        coordinates = {_coordinate(system, k) for k in kept}
+        near = np.array([OWN if _coordinate(system, int(k)) in coordinates else 1.0 for k in members])
+        part = left[members] * near[:, None] * weight[members]
+        kept += members[_pivots(part, _rank(left[members]))].tolist() if part.size else []
+    return np.array(kept, dtype=np.int64)
 
 
 def _null(rows: Floats) -> Floats:
@@ -159,9 +189,10 @@ def reduced(
     by_input: tuple[Floats, ...],
     out: Outputs,
     names: tuple[str, ...],
+    loose: Mask,
 ) -> Reduced:
     """The reduction; by_input: slopes of the start's rows by the integrals of inputs, inputs, their rates, second rates
-    [rows, inputs]; names: of the inputs.
+    [rows, inputs]; names: of the inputs; loose [unknowns]: what nothing depends on.
 
     Raises NoLinearisation.
     """
@@ -169,11 +200,11 @@ def reduced(
     g = rows.jacobian[rows.holds]
     by_row, by_column = factors(g)
     scaled = by_row[:, None] * g * by_column
-    tangent = null_space(scaled)
+    tangent, moves = _tangent(g, by_column)
     candidates = candidates_of(system, state, n)
     part = tangent[candidates]
     rank = _rank(part)
-    chosen = chosen_states(system, tangent, candidates)
+    chosen = chosen_states(system, tangent, moves, candidates, loose)
     rates = _rates(starter, system, chosen)
     _refuse_undetermined(system, tangent, part, chosen, rates, by_column, rank)
     inputs = len(names)
@@ -184,9 +215,17 @@ def reduced(
     right = np.zeros((g.shape[0] + chosen.size, chosen.size + ORDERS * inputs))
     right[g.shape[0] :, : chosen.size] = np.eye(chosen.size) / own
     right[: g.shape[0], chosen.size :] = -by_row[:, None] * starter.with_sums(np.hstack(by_input))[rows.holds]
-    moved = least_squares(np.vstack([scaled, pick / own]), right, 1e-14)
-    moved = by_column[:, None] * np.where(np.abs(moved) > NOISE * np.abs(moved).max(axis=0, initial=0.0), moved, 0.0)
-    return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out)
+    moved = (by_column / moves)[:, None] * _refined(np.vstack([scaled, pick / own]), right)
+    moved = moves[:, None] * np.where(np.abs(moved) > NOISE * np.abs(moved).max(axis=0, initial=0.0), moved, 0.0)
+    return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose)
+
+
+def _refined(matrix: Floats, right: Floats) -> Floats:
+    """The solution of consistent equations, its residual small beside the terms of each row (Skeel 1980)."""
+    found = least_squares(matrix, right, 1e-14)
+    for _ in range(2):
+        found = found + least_squares(matrix, right - matrix @ found, 1e-14)
+    return found
 
 
 def _rates(starter: Starter, system: System, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -225,6 +264,7 @@ def _without_rates_of_inputs(
     chosen: NDArray[np.int64],
     inputs: tuple[str, ...],
     out: Outputs,
+    loose: Mask,
 ) -> Reduced:
     """The matrices of variations `moved` [z, states and inputs and their rates]."""
     states, n = chosen.size, starter.n
@@ -235,6 +275,7 @@ def _without_rates_of_inputs(
     size = np.abs(out.by_y) @ np.abs(moved[:n]) + np.abs(out.by_rate) @ np.abs(yd)
     seen = np.where(np.abs(seen) > NOISE * size, seen, 0.0)
     slopes = moved[rates]
+    slopes[:, :states][:, loose[chosen]] = 0.0
     cut = [0, states, *(states + k * len(inputs) for k in range(1, ORDERS + 1))]
     a, b_, b0, b1, b2 = (slopes[:, i:j] for i, j in pairwise(cut))
     c, d_, d0, d1, d2 = (seen[:, i:j] for i, j in pairwise(cut))
@@ -255,6 +296,21 @@ def _without_rates_of_inputs(
 def integral(name: str) -> str:
     """The name of the state that is the integral of an input."""
     return f"integral of {name}"
+
+
+def quadratures(system: System, tangible: AbstractSet[str]) -> Mask:
+    """Unknowns that nothing depends on [unknowns as written]: displacements of coordinates that are not tangible,
+    dynamic variables that stand in no row but their own.
+    """
+    settled = system.another("settled")
+    n = system.form.written
+    columns = settled.pattern.columns_of()[settled.structural()[0]]
+    read = np.zeros(settled.unknowns, dtype=bool)
+    read[columns] = True
+    families, kinds = system.description.families, system.kinds[:n]
+    owners = np.array([families[int(k)].owner in tangible for k in system.family_of[:n]], dtype=bool)
+    found: Mask = ((kinds == "q") & ~owners) | ((kinds == "s") & ~read[:n])
+    return found
 
 
 def moving(system: System, state: ConsistentState) -> bool:
