@@ -22,6 +22,8 @@ from sysdyn.runtime.start.starter import Starter
 
 NO_REST = "no state of rest was found from the guesses{}: every rate zero, time held at {:g} s"
 """Said with what else was tried, and the instant."""
+TRIES = 20
+"""Random points that are tried where the guesses lead nowhere."""
 
 
 def state_of(
@@ -32,20 +34,20 @@ def state_of(
     if made is None:
         return None, None
     if rest:
-        found, states = resting(*made, tries=0)
+        found, states = resting(*made, TRIES, most=1)
         return (found, None) if states else (None, NO_REST.format("", found.state.t))
     found_ = begun(*made, request, report)
     return (found_, None) if found_ is None or request.until is None else arrived(found_, request, report)
 
 
-def resting(target: Target, prepared: Prepared, tries: int) -> tuple[Found, tuple[Rest, ...]]:
+def resting(target: Target, prepared: Prepared, tries: int, most: int | None = None) -> tuple[Found, tuple[Rest, ...]]:
     """The model at its first state of rest, and all of them; the guess where there is none."""
     scene = prepared.network.scene
     t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
     system = System(prepared.manifest, prepared.arrays, prepared.carrier)
     guess = _guess(prepared, system, t0)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
-    states = rests(Resting(system, tangible, t0, guess), tries)
+    states = rests(Resting(system, tangible, t0, guess), tries, most)
     state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf, 0, ())
     return Found(target, prepared, system, state, prepared.binding), states
 

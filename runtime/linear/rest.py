@@ -181,8 +181,8 @@ class Resting:
         return bool(np.abs(move).max(initial=0.0) > SAME)
 
 
-def rests(resting: Resting, tries: int) -> tuple[Rest, ...]:
-    """States of rest from the first guess and from random points, in the order found."""
+def rests(resting: Resting, tries: int, most: int | None = None) -> tuple[Rest, ...]:
+    """States of rest from the first guess and from random points, in the order found; most: how many are wanted."""
     kept: list[Rest] = []
     guess = resting.first
     random = np.random.default_rng(7)
@@ -190,6 +190,8 @@ def rests(resting: Resting, tries: int) -> tuple[Rest, ...]:
     scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
     mirrored: list[Floats] = []  # springs and pendulums are often symmetrical
     for k in range(tries + 1):
+        if most is not None and len(kept) >= most:
+            break
         shaken = 10.0 ** random.uniform(NEAREST, FARTHEST) * scale * random.standard_normal(guess.size)
         point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
         found = resting.found(point)
