@@ -16,6 +16,7 @@ COMMANDS = {
     "check": "Check models: everything that needs no time integration.",
     "compile": "Write the residual module and its manifest.",
     "diff": "Compare two traces.",
+    "equations": "Print the equations as a book does.",
     "equilibrium": "States of rest and their stability.",
     "explain": "Say what a diagnostic code means.",
     "fmt": "Bring model texts into the canonical layout.",
