@@ -148,12 +148,12 @@ def integrate(
         return None
     if not checked:
         check_module(prepared, started, options.t_end)
-    events = plan(prepared, started.system, rest=_rest(options))
-    options = replace(options, stops=_stops(prepared, options, report), events=events)
+    events = plan(prepared, started.system, rest=rest(options))
+    options = replace(options, stops=stops(prepared, options, report), events=events)
     return _ran(target, prepared, started, options, report)
 
 
-def _rest(options: Options) -> float:
+def rest(options: Options) -> float:
     """The part of the fastest impact of a contact below which it is the last."""
     asked = [options.accuracy, options.rtol, *(a for _, a in options.accuracy_on)]
     return 0.1 * min((a for a in asked if a is not None), default=ACCURACY)
@@ -187,7 +187,7 @@ def options_of(
         t1 = instant(request.until, "--until")
     elif t1 is None:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
-    at = [instant(text, "--at") for text in _separate(request.at)] if request.at else []
+    at = [instant(text, "--at") for text in separate(request.at)] if request.at else []
     wall = instant(request.max_wall, "--max-wall") if request.max_wall else None
     if t1 is None or None in at or report.failed:
         return None
@@ -239,7 +239,7 @@ def options_of(
     )
 
 
-def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
+def stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
     """Instants at which the text jumps or has kinks in time, and those of pulses that steps would pass over."""
     text = prepared.compiled.form, prepared.binding, options.t_start, options.t_end, prepared.network.tables
     found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
@@ -261,7 +261,7 @@ def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float
     return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
 
 
-def _separate(text: str) -> list[str]:
+def separate(text: str) -> list[str]:
     """The parts between commas outside brackets."""
     parts, depth = [""], 0
     for character in text:

@@ -1,0 +1,69 @@
+"""Which equations are printed for a --form."""
+
+from __future__ import annotations
+
+from sysdyn.cli.analysis.asked import begun
+from sysdyn.cli.analysis.linear import inputs_of, linearised
+from sysdyn.cli.equations.sheet import Sheet, Sheets
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.targets import Target
+from sysdyn.compiler.equations.book import Equation, Summed
+from sysdyn.compiler.equations.matrices import NoSuchEquations
+from sysdyn.dsl.model.expression import Node, const, param, scale, var
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.linear.tangent import NoLinearisation
+from sysdyn.runtime.model.system import System
+
+
+def sheet_of(
+    target: Target, prepared: Prepared, form: str, request: Request, report: Report
+) -> Sheet | None:
+    """The sheet; None where the report says why there is none.  Raises NoSuchEquations."""
+    sheets = Sheets(prepared.compiled, [c.name for c in prepared.network.coordinates])
+    match form:
+        case "matrices":
+            return sheets.matrices()
+        case "canonical":
+            return sheets.canonical()
+        case "underlying":
+            return sheets.underlying()
+        case "linear":
+            return _linear(sheets, target, prepared, request, report)
+        case _:
+            return sheets.descriptor()
+
+
+def _linear(sheets: Sheets, target: Target, prepared: Prepared, request: Request, report: Report) -> Sheet | None:
+    """The equations x' = A x + B u about the start, in numbers; x and u are deviations."""
+    found = begun(target, prepared, request, report)
+    if found is None:
+        return None
+    inputs = inputs_of(target, prepared, None)
+    try:
+        linear = linearised(found, inputs)
+    except NoLinearisation as error:
+        raise NoSuchEquations(str(error)) from error
+    small, system = linear.reduced, found.system
+    nodes = [unknown_node(system, int(k)) for k in small.places]
+    controls = [param(name, *map(const, at)) for name, at in inputs]
+    lines = []
+    for k, node in enumerate(nodes):
+        values = (*small.a[k], *small.b[k])
+        terms = [scale(float(v), n) for v, n in zip(values, (*nodes, *controls), strict=True) if v != 0.0]
+        rate = var(node.data[0], node.data[1], *node.args, order=1)
+        right = tuple(Summed((), term) for term in terms)
+        name = system.name(int(small.places[k]))
+        lines.append(sheets.line(Equation("linear", name, None, (Summed((), rate),), right)))
+    return Sheet((), tuple(lines), ())
+
+
+def unknown_node(system: System, place: int) -> Node:
+    """The unknown at a place as a node."""
+    family = system.description.families[int(system.family_of[place])]
+    position = place - int(system.form.at[int(system.family_of[place])])
+    index: list[Node] = []
+    for first, last in reversed(family.shape):
+        position, rest = divmod(position, last - first + 1)
+        index.insert(0, const(float(first + rest)))
+    return var(family.owner, family.kind, *index)

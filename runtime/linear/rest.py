@@ -1,0 +1,202 @@
+"""States of rest: every rate is zero but those of displacements that nothing depends on, which may go on steadily.
+
+    0 = U - Phi_q^T kappa - Psi_f^T mu   at f' = 0, p' = 0;   Phi = 0, Psi = 0, Gamma = 0, Lambda = 0, momenta
+
+with f = 0 of every coordinate whose displacement something depends on, time held.  Newton's method (least change, see
+numerics/least_change.py) from the guesses and from seeded random points around them.
+Receives a System and what of it is tangible.  Hands on states of rest, each once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.linear.tangent import quadratures
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import group_maximum
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import factors
+from sysdyn.runtime.numerics.least_change import DENSE, FOLDS, Problem, Work, solve
+from sysdyn.runtime.numerics.rank import null_space
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.start.starter import Starter
+
+Mask = NDArray[np.bool_]
+MET = 1e-9
+"""Largest row, relative to its terms, of a state of rest."""
+SAME = 1e-6
+"""Distance of two states of rest, in magnitudes, below which they are one."""
+NEAR = 1e-9
+"""Part of a magnitude that is tried as zero."""
+SHARE = 0.05
+"""Of the work that a search for a start may take: that of one search for rest."""
+NEAREST, FARTHEST = -1.0, 1.5
+"""Powers of ten between which random points lie around the guess, in magnitudes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """A state of rest; residual: largest row relative to its terms; free: unknowns that it leaves open, by name."""
+
+    state: ConsistentState
+    residual: float
+    free: tuple[str, ...]
+
+
+class Resting:
+    """The equations of rest of one model, time held at t; first: guess [unknowns] of what they leave open."""
+
+    def __init__(self, system: System, tangible: AbstractSet[str], t: float, first: Floats) -> None:
+        self.system, self.tangible, self.t, self.first = system, tangible, t, first
+        self.starter = Starter(system)
+        self.rows = self.starter.settled
+        self.n = system.form.written
+        families = system.description.families
+        owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: self.n]], dtype=bool)
+        self.still = (system.kinds[: self.n] == "f") & owners
+        self.use = self._use()
+        self.turns = np.array([families[int(k)].unit == "rad" for k in system.family_of[: self.n]], dtype=bool)
+        self.turns &= system.kinds[: self.n] == "q"
+
+    def _use(self) -> Mask:
+        """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
+        use = self.starter.groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda")
+        use[self.rows.held[0]] = True
+        grows = quadratures(self.system, self.tangible) & (self.system.kinds[: self.n] == "s")
+        for group, family, first in self.rows.form.groups:
+            if group == "lambda":
+                owner = self.system.description.rows[family].owner
+                use[first : first + self.system.description.rows[family].size] = ~grows[self._places("s", owner)]
+        return use
+
+    def _places(self, kind: str, owner: str) -> slice:
+        families = self.system.description.families
+        k = next(k for k, f in enumerate(families) if f.kind == kind and f.owner == owner)
+        first = int(self.system.form.at[k])
+        return slice(first, first + families[k].size)
+
+    def residual(self, y: Floats) -> Floats:
+        """All rows at rest [rows]."""
+        return self.rows.residual(self.t, y, self.rates(y))
+
+    def rates(self, y: Floats) -> Floats:
+        """Rates at rest: displacements go on with their flows."""
+        yd = np.zeros(self.n)
+        yd[self.system.form.k_q] = y[self.system.form.k_f]
+        return yd
+
+    def jacobian(self, y: Floats) -> Floats:
+        """Values by y on the pattern of the rows."""
+        return self.rows.jacobian(self.t, y, self.rates(y))[0]
+
+    def problem(self, guess: Floats) -> Problem:
+        """Rest nearest to a guess."""
+        x = np.concatenate([guess, np.zeros(self.starter.first - self.n)])
+        scale = self.starter.scale(self.t, x)[: self.n]
+        follows = np.isin(self.system.kinds[: self.n], ("kappa", "mu", "e"))
+        pattern = self.rows.pattern
+        return Problem(
+            residual=self.residual,
+            jacobian=self.jacobian,
+            rows=pattern.row.astype(np.int64),
+            columns=pattern.columns_of().astype(np.int64),
+            number=self.rows.rows,
+            use=self.use,
+            free=~self.still,
+            guess=guess,
+            scale=scale,
+            weight=np.where(follows, 1e-3, 1.0),
+            work=Work(SHARE),
+        )
+
+    def found(self, guess: Floats) -> Rest | None:
+        """The state of rest that Newton's method comes to from a guess."""
+        guess = np.where(self.still, 0.0, guess)
+        problem = self.problem(guess)
+        for folds in (0, FOLDS):
+            best = solve(problem, guess, folds=folds)
+            if best.residual < MET:
+                break
+        else:
+            return None
+        y = self._turned(self._clean(best.x, problem))
+        again = self.problem(y)  # in magnitudes of its own: what is near zero in the guess's may be large in these
+        own = solve(again, y)
+        if not own.residual < MET:
+            return None
+        y = self._clean(own.x, problem)
+        null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
+        y = self._back(y, again, null)
+        state = ConsistentState(self.t, y, self.rates(y), (), own.residual, 0, ())
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        largest = np.abs(null).max(axis=1, initial=0.0)
+        free = tuple(self.system.name(int(k)) for k in np.flatnonzero(told & (largest > SAME)))
+        return Rest(state, own.residual, free)
+
+    def _met(self, y: Floats) -> bool:
+        return solve(self.problem(y), y, 1).residual < MET
+
+    def _clean(self, y: Floats, problem: Problem) -> Floats:
+        """Without what is near zero in its magnitude, where that is as good."""
+        clean = np.where(np.abs(y) > NEAR * group_maximum(self.system, problem.scale), y, 0.0)
+        return clean if (clean != y).any() and self._met(clean) else y
+
+    def _back(self, y: Floats, problem: Problem, null: Floats) -> Floats:
+        """What the rows leave open as it was first guessed."""
+        if not null.size:
+            return y
+        away = (y - self.first) / problem.scale
+        back = y - problem.scale * (null @ np.linalg.lstsq(null, away, rcond=1e-9)[0])
+        return back if self._met(back) else y
+
+    def _turned(self, y: Floats) -> Floats:
+        """Angles in -pi..pi where the rows cannot tell whole turns."""
+        turned = np.where(self.turns, np.pi - np.mod(np.pi - y, 2.0 * np.pi), y)
+        near = solve(replace(self.problem(turned), guess=turned), turned, 3)
+        return near.x if near.residual < MET else y
+
+    def _null(self, y: Floats, problem: Problem) -> Floats:
+        """Directions along which the rows of rest do not change [unknowns, k]."""
+        full = self.rows.dense(self.jacobian(y))[self.use][:, problem.free]
+        row, column = factors(full)
+        found = np.zeros((self.n, 0))
+        null = null_space(row[:, None] * full * column)
+        found = np.zeros((self.n, null.shape[1]))
+        found[problem.free] = column[:, None] * null
+        return found
+
+    def apart(self, one: Rest, other: Rest) -> bool:
+        """Whether two states differ by more than what the first leaves open."""
+        problem = self.problem(one.state.y)
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
+        size = np.maximum(size, group_maximum(self.system, problem.scale))
+        move = ((other.state.y - one.state.y) / size)[told]
+        if one.free:
+            null = (self._null(one.state.y, problem) / size[:, None])[told]
+            move = move - null @ np.linalg.lstsq(null, move, rcond=1e-9)[0]
+        return bool(np.abs(move).max(initial=0.0) > SAME)
+
+
+def rests(resting: Resting, tries: int, most: int | None = None) -> tuple[Rest, ...]:
+    """States of rest from the first guess and from random points, in the order found; most: how many are wanted."""
+    kept: list[Rest] = []
+    guess = resting.first
+    random = np.random.default_rng(7)
+    scale = resting.problem(guess).scale
+    scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
+    mirrored: list[Floats] = []  # springs and pendulums are often symmetrical
+    for k in range(tries + 1):
+        if most is not None and len(kept) >= most:
+            break
+        shaken = 10.0 ** random.uniform(NEAREST, FARTHEST) * scale * random.standard_normal(guess.size)
+        point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
+        found = resting.found(point)
+        if found is not None and all(resting.apart(other, found) for other in kept):
+            kept.append(found)
+            mirrored.append(-found.state.y)
+            scale = np.maximum(scale, np.abs(found.state.y - guess))
+    return tuple(kept)
