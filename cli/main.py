@@ -22,6 +22,7 @@ COMMANDS = {
     "plot": "Draw quantities of a trace.",
     "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
+    "trade": "Measure what accuracy costs, and name the cheapest setting.",
     "verify": "Compare the formulations and methods of a scene.",
 }
 

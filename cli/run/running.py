@@ -137,10 +137,21 @@ def ready(request: Request, target: Target, report: Report) -> Prepared | None:
 
 def integrate(target: Target, prepared: Prepared, options: Options, report: Report) -> Ran | None:
     """From the consistent start to the trace; None where the report says why not."""
+    started = begin(prepared, options, report)
+    return None if started is None else run_from(target, prepared, started, options, report)
+
+
+def begin(prepared: Prepared, options: Options, report: Report) -> Started | None:
+    """The consistent start, the compiled rows compared with the text there; None where the report says why not."""
     started = start(prepared, options.t_start, report, options.redundancy)
     if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
         return None
     check_module(prepared, started, options.t_end)
+    return started
+
+
+def run_from(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
+    """From a start to the trace; None where the report says why not.  One without events may serve several runs."""
     events = plan(prepared, started.system, rest=_rest(options))
     options = replace(options, stops=_stops(prepared, options, report), events=events)
     return _ran(target, prepared, started, options, report)
