@@ -103,7 +103,8 @@ def _judged(found: Traded, console: Console, use: str) -> int:
     if use:
         console.data(use, verbatim=True)
         return 0
-    console.complain(f"{verdict(found)}; a looser --accuracy, or --full", SOLVER)
+    remedy = "a looser --accuracy, or --full" if found.ended else "the budget was spent first: a longer --max-wall"
+    console.complain(f"{verdict(found)}; {remedy}", SOLVER)
     return SOLVER
 
 

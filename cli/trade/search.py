@@ -17,8 +17,8 @@ from sysdyn.cli.trade.traded import Combination, Measured, cheapest, meets
 
 LOOSEST, FIRST, TIGHTEST = 2, 4, 24
 """Numbers of the tolerances 1e-1, 1e-2, 1e-12."""
-ORDER = {"bdf": 4.0, "radau": 4.0, "dopri": 8.0}
-"""Error ~ work^-order at best: what a combination with one run may still hope for."""
+ORDER = {"bdf": 4.0, "radau": 5.0, "dopri": 8.0}
+"""Error ~ work^-order at best: what a combination of one or two runs may still hope for."""
 HOPE = 1.5
 """Times the best work that a forecast may be: forecasts are rough."""
 JUMP = 8
@@ -175,7 +175,7 @@ class Search:
         last = usable[-1]
         order = ORDER[climb.combination.method]
         steps = last.work - last.fixed
-        if len(usable) > 1 and usable[-2].error and last.error and steps > usable[-2].work - usable[-2].fixed > 0.0:
+        if len(usable) > 2 and usable[-2].error and last.error and steps > usable[-2].work - usable[-2].fixed > 0.0:
             grown = steps / (usable[-2].work - usable[-2].fixed)
             order = min(max(math.log(usable[-2].error / last.error) / math.log(grown), 1.0), order)
         over = self._over(last)
