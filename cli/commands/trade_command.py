@@ -13,12 +13,14 @@ from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run import lock, targets
+from sysdyn.cli.run.running import Request, version
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
 from sysdyn.cli.trade.reference import NoReference
 from sysdyn.cli.trade.search import tolerance
 from sysdyn.cli.trade.traded import Combination, Measured, Refusal, Traded, meets
 from sysdyn.cli.trade.trading import trade
+from sysdyn.dsl.text.diagnostics import Report
 
 KINDS = (".html", ".png", ".svg")
 
@@ -30,12 +32,14 @@ KINDS = (".html", ".png", ".svg")
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("-o", "output", metavar="FILE.html|.png|.svg", help="The work-precision plot; a page that zooms.")
 @click.option("--full", is_flag=True, help="Every combination at every tolerance from 1e-1 to 1e-12.")
+@click.option("--lock", "locks", is_flag=True, help="Write the choice into FILE.lock, which simulate honours.")
 @click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
 def command(
     console: Console,
     progress: str,
     no_timings: bool,
     full: bool,
+    locks: bool,
     output: str | None,
     max_wall: str | None,
     **options: Any,
@@ -47,6 +51,8 @@ def command(
     choice goes by. --formulation, --index, --method fix a choice; --max-wall limits the whole search.
     """
     target = _target(output)
+    if locks and options["file"] == "-":
+        raise UsageError("--lock of a text from standard input: a lock stands beside a file")
     line = ProgressLine("never" if console.quiet else progress)
     request = Request(**options)
     try:
@@ -68,6 +74,8 @@ def command(
         drawn = page(found, use).encode() if target.suffix == ".html" else picture(found, target.suffix[1:])
         target.write_bytes(drawn)
         console.say(f"{target}: {len(found.measured)} runs")
+    if locks and best is not None:
+        console.say(f"{_lock(request, found, best)}: {best.combination.name} for {found.name}")
     return console.finish(_judged(found, console, use))
 
 
@@ -91,6 +99,17 @@ def _budget(text: str | None) -> float | None:
     if not seconds > 0.0:
         raise UsageError(f"--max-wall {text}: it must be positive")
     return seconds
+
+
+def _lock(request: Request, found: Traded, best: Measured) -> Path:
+    """Writes the choice for its scene."""
+    report = Report()
+    document = targets.read(request.file, report)
+    scene = targets.one(document, request.file, request.model, request.scene, report)
+    assert scene is not None
+    c = best.combination
+    held = lock.Lock(c.formulation, c.index, c.method, request.levels, best.tolerance, found.accuracy)
+    return lock.write(request.file, scene, held, version())
 
 
 def _judged(found: Traded, console: Console, use: str) -> int:

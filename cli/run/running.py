@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run import targets
+from sysdyn.cli.run import lock, targets
 from sysdyn.cli.run.events import plan, zeno
 from sysdyn.cli.run.expectations import Claim, judge, watch
 from sysdyn.cli.run.module_check import check_module
@@ -72,6 +72,7 @@ class Request:
     max_wall: str | None = None
     timings: bool = True
     no_prune: bool = False
+    no_lock: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +104,36 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     output = request.output or _default_output(request.file, target.scene.name.name if target.scene else "")
     if Path(output).is_file() and not replaceable(output):
         raise UsageError(f"-o {output} exists and is no trace of sysdyn: give another name, or remove it")
+    request, locked = _locked(request, target, report)
     with ex.fresh():
         prepared = ready(request, target, report)
         options = None if prepared is None else options_of(request, target, prepared, report, began, progress)
+        if options is not None and locked is not None:
+            options = _under(options, locked)
         return None if prepared is None or options is None else integrate(target, prepared, options, report)
+
+
+def _locked(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
+    """The request with what the file's lock says where neither it nor the scene does."""
+    held = None if request.no_lock else lock.read(request.file, target, version(), report)
+    if held is None:
+        return request, None
+    given = (request.formulation, request.index, request.method)
+    found = lock.taken(held, target, *given, tuple(path for path, _ in request.levels))
+    return replace(
+        request,
+        formulation=request.formulation or found.formulation,
+        index=request.index or found.index,
+        method=request.method or found.method,
+        levels=(*request.levels, *found.levels),
+    ), found if found.text else None
+
+
+def _under(options: Options, found: lock.Taken) -> Options:
+    """Options that name the lock, and begin at its tolerance where the accuracy asked is that of its measurement."""
+    asked = min([a for a in (options.accuracy, *(a for _, a in options.accuracy_on)) if a is not None], default=None)
+    first = found.tolerance if asked == found.accuracy else None
+    return replace(options, first=first, attributes={**options.attributes, "lock": found.text})
 
 
 def check_tolerances(request: Request) -> None:
@@ -288,7 +315,7 @@ def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
     return {
         "Conventions": "CF-1.11",
         "title": target.name,
-        "source": f"sysdyn {_version()}",
+        "source": f"sysdyn {version()}",
         "model": prepared.network.model,
         "scene": prepared.network.scene.name if prepared.network.scene else "",
         "formulation": prepared.formulation,
@@ -297,7 +324,8 @@ def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
     }
 
 
-def _version() -> str:
+def version() -> str:
+    """Of the package."""
     try:
         return metadata.version("sysdyn")
     except metadata.PackageNotFoundError:  # run from a folder that is not installed
