@@ -20,6 +20,7 @@ COMMANDS = {
     "fmt": "Bring model texts into the canonical layout.",
     "golden": "Golden traces of a project: record, check, accept, list.",
     "plot": "Draw quantities of a trace.",
+    "reduce": "Find what a scene does not need, and leave it out.",
     "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
     "trade": "Measure what accuracy costs, and name the cheapest setting.",

@@ -57,7 +57,7 @@ def command(
     request = Request(**options)
     try:
         with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
-            budget = _budget(max_wall)
+            budget = budget_of(max_wall)
             found = trade(request, console.report, Path(folder), full=full, budget=budget, progress=line)
     except NoReference as error:
         console.complain(f"there is no reference: {error}", SOLVER)
@@ -88,7 +88,7 @@ def _target(output: str | None) -> Path | None:
     return target
 
 
-def _budget(text: str | None) -> float | None:
+def budget_of(text: str | None) -> float | None:
     """Seconds of wall time for all of it."""
     if text is None:
         return None
