@@ -27,9 +27,11 @@ COMMANDS = {
     "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
     "new": "Begin a project: model, scenes, golden trace, CI file.",
     "plot": "Draw quantities of a trace.",
+    "reduce": "Find what a scene does not need, and leave it out.",
     "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
     "std": "Show the standard library, or a component of it.",
+    "trade": "Measure what accuracy costs, and name the cheapest setting.",
     "verify": "Compare the formulations and methods of a scene.",
 }
 

@@ -151,7 +151,8 @@ class Sheets:
         lines = []
         for matrix in matrices(self.algebra, self.compiled.form):
             text, latex = (
-                [[w.sum_of([Summed((), t) for t in entry]) for entry in row] for row in matrix.rows] for w in self.writers
+                [[w.sum_of([Summed((), t) for t in entry]) for entry in row] for row in matrix.rows]
+                for w in self.writers
             )
             texts = (matrix.name, _grid(text)), (_NAMES[matrix.name], _array(latex))
             lines.append(Line("matrix", matrix.name, *texts, ("", ""), None))

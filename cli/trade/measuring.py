@@ -1,0 +1,207 @@
+"""Settings of one scene, run: each formulation compiled once, its start found once.
+
+Received: a request, its target; handed back: combinations that exist, and a `Measured` of each that is run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import FORMULATIONS
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import ACCURACY, Ran, Request, begin, options_of, ready, run_from
+from sysdyn.cli.run.starting import Started
+from sysdyn.cli.run.targets import Target
+from sysdyn.cli.trade.errors import error_of
+from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
+from sysdyn.cli.trade.work import counted, of_rows
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.integrate.options import Options, choose_index
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.trace.trace import Trace
+
+METHODS = ("dopri", "radau", "bdf")
+GRID = 200
+"""Intervals of the trace where the scene leaves them to the solver."""
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """A formulation at its start.  again: it has events, and every run finds its own start; sizes: (unknowns, entries)
+    by index form.
+    """
+
+    prepared: Prepared
+    options: Options
+    started: Started
+    again: bool
+    sizes: dict[str, tuple[int, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Of one run: steps, and wall time [s]; None: none."""
+
+    steps: int | None = None
+    wall: float | None = None
+
+
+class Bench:
+    """The settings of one scene.  Traces go to `folder`."""
+
+    def __init__(self, request: Request, target: Target, report: Report, folder: Path, began: float) -> None:
+        self.request, self.target, self.report, self.folder, self.began = request, target, report, folder, began
+        self.carried: dict[str, Carried] = {}
+        self.refusals: list[Refusal] = []
+
+    # --- formulations -------------------------------------------------------------------------------------------
+
+    def prepare(self) -> bool:
+        """Every formulation that can express the scene, its own first; False where the report says why none."""
+        asked = self.request.formulation
+        if not self._carry(asked, self.report):
+            return False
+        first = next(iter(self.carried))
+        if asked in (None, "auto"):
+            for name in FORMULATIONS:
+                if name not in ("auto", first):
+                    self._carry(name, Report())
+        return True
+
+    def _carry(self, name: str | None, report: Report) -> bool:
+        request = replace(self.request, formulation=name)
+        with ex.fresh():
+            prepared = ready(request, self.target, report)
+            options = options_of(request, self.target, prepared, report, self.began, None) if prepared else None
+            started = begin(prepared, options, report) if prepared and options and not report.failed else None
+        if prepared is None or options is None or started is None:
+            reasons = [d for d in report if d.severity == "error"] or list(report)
+            if name is not None and reasons:
+                self.refusals.append(Refusal(name, reasons[0].message, reasons[0].code))
+            return False
+        every = options.every or (options.t_end - options.t_start) / GRID
+        options = replace(options, every=every, watch=None, sampled_at=(), sample_steps=False)
+        again = bool(prepared.network.events or prepared.network.switches)
+        self.carried[prepared.formulation] = Carried(prepared, options, started, again, {})
+        return True
+
+    @property
+    def options(self) -> Options:
+        """Those of the scene's own formulation."""
+        return next(iter(self.carried.values())).options
+
+    @property
+    def accuracy(self) -> float:
+        """Asked of the judged quantities."""
+        return min([self.options.accuracy or ACCURACY, *(wanted for _, wanted in self.options.accuracy_on)])
+
+    def judged(self, trace: Trace) -> tuple[str, ...]:
+        """Quantities whose errors count."""
+        on = [name for name, _ in self.options.accuracy_on]
+        return tuple(name for name in trace.names if not on or name in on)
+
+    def combinations(self) -> Iterator[Combination]:
+        """Every formulation x index x method that exists; forms that are one appear once."""
+        level = " ".join(f"{path}={name}" for path, name in self.request.levels)
+        for formulation, carried in self.carried.items():
+            seen = set()
+            for index in INDICES:
+                form = choose_index(index, carried.started.facts)[0]
+                if form in seen or (self.request.index not in (None, "auto", index)):
+                    continue
+                seen.add(form)
+                for method in METHODS:
+                    fits = self.request.method in (None, "auto", method)
+                    if fits and (method != "dopri" or index == "0"):
+                        yield Combination(formulation, index, method, level)
+
+    # --- runs ---------------------------------------------------------------------------------------------------
+
+    def trace(
+        self, combination: Combination, tolerance: float, limits: Limits, *, name: str = "run"
+    ) -> tuple[Ran | None, str]:
+        """One run at the solver's own tolerance: what came of it, and why it may not be used."""
+        carried, report = self.carried[combination.formulation], Report()
+        most = [n for n in (carried.options.max_steps, limits.steps) if n is not None]
+        options = replace(
+            carried.options,
+            output=self.folder / f"{name}.h5",
+            accuracy=None,
+            accuracy_on=(),
+            rtol=tolerance,
+            method=combination.method,
+            index=combination.index,
+            max_steps=min(most, default=None),
+            max_wall=limits.wall,
+        )
+        try:
+            started = begin(carried.prepared, options, report) if carried.again else carried.started
+            ran = run_from(self.target, carried.prepared, started, options, report) if started else None
+        except UsageError as error:
+            return None, error.format_message()
+        except SolverFailure as failure:
+            return None, str(failure)
+        except (ArithmeticError, ValueError, MemoryError) as error:  # one setting's fault ends no other
+            return None, f"{type(error).__name__}: {error}"
+        return (ran, _reason(ran, report)) if ran else (None, _reason(None, report))
+
+    def measure(
+        self, combination: Combination, tolerance: float, reference: Trace, until: float, limits: Limits
+    ) -> Measured | str:
+        """One run, compared with the reference; a sentence where there is no such setting."""
+        ran, reason = self.trace(combination, tolerance, limits)
+        if ran is None:
+            return reason
+        outcome = ran.outcome
+        found = outcome.traced
+        error = None
+        if outcome.final:
+            error = error_of(found, reference, self.judged(reference), self.accuracy, until)
+            if not math.isfinite(error):
+                reason = reason or "a quantity is no number"
+        fixed = of_rows(found.time.size, self.size(combination), combination.method)
+        numbers = {key: n for key, n in outcome.statistics.items() if isinstance(n, int)}
+        return Measured(
+            combination,
+            tolerance,
+            error,
+            outcome.timings["cpu_integrate_s"],
+            outcome.statistics["steps"],
+            fixed + self._work(combination, numbers),
+            fixed,
+            float(np.max(np.abs(found["audit.energy"].values), initial=0.0)),
+            float(np.max(found["audit.constraints"].values, initial=0.0)),
+            reason,
+            tuple(numbers.items()),
+        )
+
+    def _work(self, combination: Combination, statistics: dict[str, int]) -> float:
+        facts = self.carried[combination.formulation].started.facts
+        projected = combination.index in ("0", "1") and (facts.index or 0) > 1
+        return counted(statistics, self.size(combination), combination.method, projected=projected)
+
+    def size(self, combination: Combination) -> tuple[int, int]:
+        """Rows and entries of the Jacobian's pattern in a combination's form."""
+        carried = self.carried[combination.formulation]
+        form = choose_index(combination.index, carried.started.facts)[0]
+        if form not in carried.sizes:
+            system = carried.started.system
+            system = system if system.form.name == form else system.another(form)
+            carried.sizes[form] = system.rows, system.pattern.entries
+        return carried.sizes[form]
+
+
+def _reason(ran: Ran | None, report: Report) -> str:
+    """Why a run may not be chosen; "" where it may."""
+    if ran is not None and ran.failure:
+        return ran.failure
+    errors = [d.message for d in report if d.severity == "error" and d.code not in ("E907", "E909")]
+    if ran is not None and ran.outcome.met:
+        return ""
+    return errors[0] if errors else "not met"
