@@ -31,6 +31,7 @@ COMMANDS = {
     "report": "Write one page about a model and its run.",
     "simulate": "Run a scene: text in, trace out.",
     "std": "Show the standard library, or a component of it.",
+    "sweep": "Run a scene many times, with other numbers.",
     "trade": "Measure what accuracy costs, and name the cheapest setting.",
     "verify": "Compare the formulations and methods of a scene.",
 }

@@ -317,7 +317,6 @@ def _default_output(file: str, scene: str) -> str:
 
 
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
-    text = target.document.file.source.text
     left_out = {"pruned": listed(prepared.left_out)} if prepared.left_out else {}
     return {
         "Conventions": "CF-1.11",
@@ -326,9 +325,14 @@ def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
         "model": prepared.network.model,
         "scene": prepared.network.scene.name if prepared.network.scene else "",
         "formulation": prepared.formulation,
-        "model_sha256": hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest(),
+        "model_sha256": model_digest(target),
         **left_out,
     }
+
+
+def model_digest(target: Target) -> str:
+    """SHA-256 of the model's text."""
+    return hashlib.sha256(target.document.file.source.text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 @functools.cache
