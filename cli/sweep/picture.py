@@ -43,7 +43,9 @@ def picture(found: Swept, kind: str) -> bytes:
             axes[-1, k + bands].set_xlabel(_labelled(found, varied))
         if bands:
             axes[-1, 0].set_xlabel("time, s")
-        axes[0, 0].set_title(f"{len(found.cases)} runs" + (", median, 80 % and all" if bands else ", end values"))
+        axes[0, 0].set_title(f"{len(found.cases)} runs" + (", median, 80 % and all" if bands else ": at the end"))
+        if bands:
+            axes[0, 1].set_title("at the end")
         data = io.BytesIO()
         figure.savefig(data, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
     return data.getvalue()

@@ -64,7 +64,8 @@ class Study:
         elif self.sample == "latin":
             found = qmc.LatinHypercube(dimension, seed=random).random(self.runs)
         else:
-            found = qmc.Sobol(dimension, seed=random).random(self.runs)
+            # balanced in powers of two; the first of them are still evenly spread
+            found = qmc.Sobol(dimension, seed=random).random_base2(max(self.runs - 1, 1).bit_length())[: self.runs]
         tiny = np.finfo(np.float64).eps
         return np.asarray(np.clip(found, tiny, 1.0 - tiny))
 

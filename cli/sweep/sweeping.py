@@ -28,6 +28,9 @@ from sysdyn.dsl.text.diagnostics import Report
 REFRESH = 10.0
 """Seconds between two versions of the file, at least ten times what writing one takes."""
 
+FORETOLD = 16
+"""Runs after which the time left is said: workers begin slowly."""
+
 Progress = Callable[[float, float | None], None]
 
 
@@ -102,7 +105,8 @@ def sweep(request: Request, study: Study, output: Path, jobs: int, progress: Pro
                 journal.take(kept)
                 now = time.monotonic()
                 number = len(journal.done) - resumed
-                progress(len(journal.done) / len(cases), (now - began) / number * (left - number))
+                ahead = (now - began) / number * (left - number) if number > FORETOLD else None
+                progress(len(journal.done) / len(cases), ahead)
                 if now - written > max(REFRESH, 10.0 * cost):
                     results.write(output, cases, journal.done, units, attributes, timings=timings)
                     written = time.monotonic()
