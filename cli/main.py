@@ -23,6 +23,7 @@ COMMANDS = {
     "fmt": "Bring model texts into the canonical layout.",
     "golden": "Golden traces of a project: record, check, accept, list.",
     "help": "Explain a topic of the language: units, tables, scenes, events, ...",
+    "import": "Write a SPICE netlist as a model text.",
     "linearize": "Matrices, eigenvalues, poles and zeros about a state.",
     "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
     "new": "Begin a project: model, scenes, golden trace, CI file.",
