@@ -100,10 +100,11 @@ class Calls(Context):
             raise self.fail("E319", "quasi(w) is what a work acts on", e.span, help="work E on quasi(w)")
         if e.name not in dim.FUNCTIONS:
             texts = [self.source.text[a.span.start : a.span.end] for a in e.args]
-            help_ = habits.function(e.name, texts)
-            if help_ is None:
-                near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
-                help_ = f"nearest name in scope: '{near}'" if near else None
+            remedy = habits.function(e.name, texts)
+            if remedy is not None and not self.scope.is_broken(e.name):
+                raise self.remedied("E101", f"unknown function '{e.name}'", e.span, remedy)
+            near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
+            help_ = f"nearest name in scope: '{near}'" if near else None
             if self.scope.is_broken(e.name):
                 raise Failed
             raise self.fail("E101", f"unknown function '{e.name}'", e.span, help=help_)

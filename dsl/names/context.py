@@ -18,7 +18,7 @@ from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.units import NONE, Dimension
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.symbols import Definition, InstanceSymbol, ParameterSymbol, Scope, Space, Typed, Vector
-from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
 Value = Typed | Vector
@@ -223,6 +223,13 @@ class Context:
         """Report an error; raise what is returned."""
         self.report.error(code, message, self.place(span), **more)  # type: ignore[arg-type]
         return Failed()
+
+    def remedied(self, code: str, message: str, span: syntax.Span, remedy: habits.Remedy) -> Failed:
+        """Report an error whose remedy may be certain; raise what is returned."""
+        edit = None
+        if remedy.meant is not None:
+            edit = Edit(self.source.place(*(remedy.span or span)), remedy.meant)
+        return self.fail(code, message, span, help=remedy.said, edit=edit)
 
     # -- entries -------------------------------------------------------------------------------------------
 
