@@ -15,6 +15,7 @@ from sysdyn.dsl.names.context import Context, Failed, SeveralError, Value
 from sysdyn.dsl.names.symbols import Definition, FunctionSymbol, Space, TableSymbol, Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.tree import syntax
+from sysdyn.dsl.tree.walking import children
 
 
 class Calls(Context):
@@ -216,12 +217,7 @@ def walk(root: syntax.Expr) -> Iterator[object]:
     while stack:
         node = stack.pop()
         yield node
-        for name in getattr(type(node), "__slots__", ()):
-            child = getattr(node, name)
-            for part in child if isinstance(child, tuple) else (child,):
-                for item in part if isinstance(part, tuple) else (part,):
-                    if type(item).__module__.startswith("sysdyn.dsl.tree.syntax"):
-                        stack.append(item)
+        stack += children(node)
 
 
 def _times(a: Typed, b: Typed) -> Typed:
