@@ -25,7 +25,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
-from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.trace import Trace
 
 NOT_STIFF = "not stiff"
 """Why method auto stays with the explicit method."""
@@ -33,14 +33,14 @@ NOT_STIFF = "not stiff"
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a simulation did.  statistics and timings as the trace holds them; reached [s]; error_estimate relative
-    (None without accuracy control); warnings: sentences; failure: of a run that stopped (its trace has final = 0);
-    judgement: of a run that ended; below_round_off: the estimate is less than double precision resolves; reason: why
-    method auto took its method ("" where it was named); cancelled: traced differences of terms much larger than they
-    are; events: of a run that ended.
+    """What a simulation did.  trace: its file, or held: the trace in memory; statistics and timings as the trace holds
+    them; reached [s]; error_estimate relative (None without accuracy control); warnings: sentences; failure: of a run
+    that stopped (its trace has final = 0); judgement: of a run that ended; below_round_off: the estimate is less than
+    double precision resolves; reason: why method auto took its method ("" where it was named); cancelled: traced
+    differences of terms much larger than they are; events: of a run that ended.
     """
 
-    trace: Path
+    trace: Path | None
     final: bool
     reached: float
     statistics: dict[str, Any]
@@ -58,6 +58,15 @@ class Outcome:
     reason: str = ""
     cancelled: tuple[Cancelled, ...] = ()
     events: tuple[Happened, ...] = ()
+    held: Trace | None = None
+
+    @property
+    def traced(self) -> Trace:
+        """The trace, read from its file or as it is held."""
+        if self.held is not None:
+            return self.held
+        assert self.trace is not None
+        return Trace.open(self.trace)
 
     @property
     def met(self) -> bool:
@@ -193,8 +202,9 @@ def simulate(
     form = system.form.name
     way = Way(method, system, index, {"3": str(facts.index), "2": "2"}.get(form, form))
     ways = (way,) if options.method != "auto" else alternatives(way, written, start, options)
-    with claimed(Path(options.output).resolve()):
-        return _runs(Runs(start, options, ways[0]), ways[1:], written, facts, warnings)
+    runs = Runs(start, options, ways[0])
+    with runs.keeping.claimed():
+        return _runs(runs, ways[1:], written, facts, warnings)
 
 
 def alternatives(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
@@ -232,7 +242,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     def outcome(final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None) -> Outcome:
         estimate = achieved.error_estimate if achieved is not None else None
         return Outcome(
-            runs.path,
+            runs.keeping.path,
             final,
             reached,
             runs.statistics_object(estimate),
@@ -246,6 +256,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
             warnings,
             failure,
             reason=runs.way.reason,
+            held=runs.held,
         )
 
     achieved: Achieved | None = None
@@ -268,7 +279,8 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     ended = outcome(True, options.t_end, achieved, None)
     lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, ended.error_estimate))
     below = achieved is not None and achieved.below_round_off
-    return replace(ended, judgement=judgement, below_round_off=below, cancelled=lost, events=finished.events)
+    ended = replace(ended, held=runs.held, judgement=judgement, below_round_off=below)
+    return replace(ended, cancelled=lost, events=finished.events)
 
 
 def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

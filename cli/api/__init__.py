@@ -1,4 +1,4 @@
-"""The Python face of sysdyn for notebooks and scripts: `compile_model`, `simulate`, `Trace`.
+"""The Python face of sysdyn for notebooks and scripts: `load`, `simulate`, `Trace`, `compile_model`, `check`.
 
 They call what the commands call.  Findings of a model that cannot be used are raised as `ModelError`, wrong usage as
 `UsageError`, a solver that stops as `SolverFailure`, a run that is not met as `NotMet`; notes and warnings stay silent.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,15 @@ from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tabl
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.checking import checked
+from sysdyn.cli.run.loaded import Loaded
 from sysdyn.cli.run.prepare import prepare
-from sysdyn.cli.run.running import Request, run
+from sysdyn.cli.run.running import Ran, Request, run
 from sysdyn.cli.run.starting import start
-from sysdyn.dsl import load
+from sysdyn.dsl import load as load_
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.judgement import NotMet as Missed
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
@@ -32,7 +36,20 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
 from sysdyn.runtime.trace.trace import Trace
 
-__all__ = ["ModelError", "Module", "NotMet", "SolverFailure", "Trace", "UsageError", "compile_model", "simulate"]
+__all__ = [
+    "Diagnostic",
+    "Model",
+    "ModelError",
+    "Module",
+    "NotMet",
+    "SolverFailure",
+    "Trace",
+    "UsageError",
+    "check",
+    "compile_model",
+    "load",
+    "simulate",
+]
 
 
 class Module:
@@ -165,7 +182,7 @@ def compile_model(
     assert target is not None
     with ex.fresh():
         inner = Report()
-        network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
+        network = load_.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
         report.extend(inner if network else targets.unsupported(inner))
         wanted = None if formulation == "auto" else formulation
         if network is None:
@@ -200,21 +217,93 @@ def simulate(path: str | Path, *, unmet: str = "raise", **options: Any) -> Trace
     trace's file (a default as the command's); unmet: "warn" where a run that is not met shall warn instead of raising
     `NotMet`.  Returns the trace.
     """
-    if unmet not in ("raise", "warn"):
-        raise UsageError(f"unmet {unmet!r}: raise or warn")
+    _known(unmet)
     report = Report()
     ran = run(_request(str(path), options), report)
+    return _handed(ran, report, unmet)
+
+
+def _known(unmet: str) -> None:
+    if unmet not in ("raise", "warn"):
+        raise UsageError(f"unmet {unmet!r}: raise or warn")
+
+
+def _handed(ran: Ran | None, report: Report, unmet: str) -> Trace:
+    """The trace of a run that came to its end, or what stopped it."""
     if ran is None or ran.exit == 1:
         raise ModelError(report.diagnostics)
     if ran.outcome.failure is not None:
         raise ran.outcome.failure
-    trace = Trace.open(ran.outcome.trace)
+    trace = ran.outcome.traced
     if ran.outcome.judgement is not None and not ran.outcome.met:
         found = NotMet(trace, ran.outcome.judgement.not_met, report.diagnostics)
         if unmet == "raise":
             raise found
-        warnings.warn(str(found), stacklevel=2)
+        warnings.warn(str(found), stacklevel=3)
     return trace
+
+
+class Model:
+    """A model of a file under a scene, compiled once and run often; see `load`.
+
+    parameters: values in SI units as the text has them; traced: names of the scene's quantities; formulation.
+    """
+
+    def __init__(self, loaded: Loaded) -> None:
+        self._loaded = loaded
+        prepared = loaded.first.prepared
+        self.parameters: dict[str, Any] = dict(prepared.binding.values)
+        self.traced = tuple(o.name for o in prepared.network.observations if o.stored)
+        self.formulation = prepared.formulation
+
+    def __repr__(self) -> str:
+        return f"<sysdyn model {self._loaded.target.name}: {len(self.parameters)} parameters, {self.formulation}>"
+
+    def run(
+        self,
+        set: Mapping[str, Any] | None = None,
+        until: float | str | None = None,
+        at: Iterable[float] | str | None = None,
+        *,
+        unmet: str = "raise",
+        **options: Any,
+    ) -> Trace:
+        """One run, in memory: parameters or inputs by name (numbers in SI units, or texts), the end [s], instants [s].
+
+        options: `accuracy`, `rtol`, `atol`, `method`, `index`, `max_steps`, `max_wall`, `output` of the command that
+        differ from those of `load`.  Raises as `simulate` does.
+        """
+        _known(unmet)
+        if not options.keys() <= _RUN:
+            raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
+        given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
+        report = Report()
+        ran = self._loaded.run(set or {}, report, **_changes(given))
+        return _handed(ran, report, unmet)
+
+
+_RUN = frozenset(("accuracy", "accuracy_check", "rtol", "atol", "method", "index", "max_steps", "max_wall", "output"))
+
+
+def load(path: str | Path, *, model: str | None = None, scene: str | None = None, **options: Any) -> Model:
+    """A model prepared once, for many runs; the options are those of `simulate`.
+
+    200 runs cost what their integrations cost, and a few milliseconds each for the consistent start.
+    """
+    given = {"model": model, "scene": scene, **options}
+    if given.get("formulation") == "auto":
+        given["formulation"] = None
+    return Model(Loaded(replace(_request(str(path), given), output=None)))
+
+
+def check(text: str, name: str = "<text>") -> list[Diagnostic]:
+    """What `sysdyn check` finds in a text: every finding, of every model and scene; [] where it is clean."""
+    report = Report()
+    document = load_.document(SourceText(name, text), report)
+    for target in targets.all_targets(document, report):
+        with ex.fresh():
+            checked(target, report)
+    return list(report.diagnostics)
 
 
 def _request(path: str, options: dict[str, Any]) -> Request:
@@ -222,6 +311,19 @@ def _request(path: str, options: dict[str, Any]) -> Request:
     settings = given.pop("set", None) or given.pop("settings", ())
     pairs: Iterable[tuple[str, Any]] = settings.items() if isinstance(settings, Mapping) else settings
     given["settings"] = tuple((name, _text(value)) for name, value in pairs)
+    return _made(Request, path, **_changes(given))
+
+
+def _made(make: Any, *arguments: Any, **options: Any) -> Request:
+    try:
+        return make(*arguments, **options)  # type: ignore[no-any-return]
+    except TypeError as error:
+        raise UsageError(str(error).replace("Request.__init__()", "simulate()")) from None
+
+
+def _changes(options: dict[str, Any]) -> dict[str, Any]:
+    """Options as a request has them."""
+    given = dict(options)
     level = given.pop("level", None)
     if level is not None:
         given["levels"] = tuple(level.items() if isinstance(level, Mapping) else level)
@@ -237,10 +339,7 @@ def _request(path: str, options: dict[str, Any]) -> Request:
         given["timings"] = not given.pop("no_timings")
     if given.get("output") is not None:
         given["output"] = str(given["output"])
-    try:
-        return Request(path, **given)
-    except TypeError as error:
-        raise UsageError(str(error).replace("Request.__init__()", "simulate()")) from None
+    return given
 
 
 def _text(value: Any) -> str:

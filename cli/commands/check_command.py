@@ -8,10 +8,8 @@ import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import INPUT_OUTPUT, UsageError, classify
 from sysdyn.cli.run import targets
-from sysdyn.dsl import load
+from sysdyn.cli.run.checking import checked
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Network
-from sysdyn.dsl.text.diagnostics import Report
 
 FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
 
@@ -93,7 +91,7 @@ def _file(console: Console, path: str, refused: bool) -> dict[str, object]:
     found = []
     for target in targets.all_targets(document, console.report):
         with ex.fresh():
-            summary = _target(console, target, refused)
+            summary = checked(target, console.report, refused)
         found.append(summary)
         if summary["ok"]:
             console.say(f"{path}: {target.name}: {_line(summary)}")
@@ -111,43 +109,3 @@ def _line(summary: dict[str, object]) -> str:
     from sysdyn.cli.run.starting import shortened
 
     return "; ".join([f"ok: {counts}", *shortened(moved)])
-
-
-def _target(console: Console, target: targets.Target, refused: bool = False) -> dict[str, object]:
-    """Findings go to the report of the console; the counts come back.  refused: what cannot be run yet is an error."""
-    names = {"scene": target.scene.name.name if target.scene else None, "model": target.model.name.name}
-    inner = Report()
-    network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
-    summary: dict[str, object] = {**names, "ok": network is not None}
-    if network is not None and all(p.values for p in network.parameters):
-        summary |= _started(network, inner)
-    incomplete = refused and not summary["ok"]
-    console.report.extend(targets.unsupported(inner) if incomplete else inner)
-    return summary
-
-
-def _started(network: Network, report: Report) -> dict[str, object]:
-    from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
-    from sysdyn.cli.run.starting import described, start
-
-    prepared = prepare(network, report, backend="numpy")
-    if prepared is None:
-        return {"ok": False}
-    scene = network.scene
-    t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
-    started = start(prepared, t0, report)
-    if started is None:
-        return {"ok": False}
-    facts = started.facts
-    return {
-        "ok": not report.failed,
-        "formulation": prepared.formulation,
-        "coordinates": facts.coordinates,
-        "m1": facts.m1,
-        "m2": facts.m2,
-        "dof": facts.dof,
-        "configuration_dof": facts.configuration_dof,
-        "redundant": facts.redundant,
-        "index": facts.index,
-        "moved": described(started.state),
-    }

@@ -140,14 +140,13 @@ def _runs() -> Iterator[Finding]:
 def _run(backend: str) -> Finding:
     from sysdyn.cli.run.running import Request, run
     from sysdyn.dsl.text.diagnostics import Report
-    from sysdyn.runtime.trace.trace import Trace
 
     began, report = time.monotonic(), Report()
     with tempfile.TemporaryDirectory() as place:
         model = Path(place) / "swing.sd"
         model.write_text(SWING, encoding="utf-8")
         ran = run(Request(str(model), backend=backend, output=str(Path(place) / "swing.h5")), report)
-        end = math.nan if ran is None else float(Trace.open(ran.outcome.trace)["x"].values[-1])
+        end = math.nan if ran is None else float(ran.outcome.traced["x"].values[-1])
     took = time.monotonic() - began
     name = f"run ({backend})"
     if ran is None or report.failed:

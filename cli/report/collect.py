@@ -22,7 +22,6 @@ from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.options import Options, Progress
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.trace import Trace
 
 LONG = 20.0
 """Wall seconds of a run that is not repeated for the energies of its elements."""
@@ -80,7 +79,7 @@ def _study(
             ran = integrate(target, prepared, options, report)
         started = ran.started if ran is not None else None
         if ran is not None:
-            trace = Trace.open(ran.outcome.trace)
+            trace = ran.outcome.traced
             _split(stages, ran)
             findings += ran.outcome.warnings
             found = _energies(target, prepared, options, ran, folder, stages)
@@ -138,7 +137,7 @@ def _energies(
             report = Report()
             rich = prepare(network, report, formulation=prepared.formulation, backend=prepared.backend)
             again = None if rich is None else integrate(target, rich, fixed, report)
-            return None if again is None or again.failure else shares(Trace.open(again.outcome.trace), parts)
+            return None if again is None or again.failure else shares(again.outcome.traced, parts)
         except (UsageError, TraceError):
             return None
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import tempfile
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,7 +108,7 @@ def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report
 
     within = prepared.binding.evaluate(golden.within)
     try:
-        with Recorded(path) as reference, Recorded(outcome.trace) as trace:
+        with Recorded(path) as reference, _file(outcome) as file, Recorded(file) as trace:
             names = set(reference.quantities) & set(trace.quantities)
             tube = Tolerance(rtol=within, tau=reference.tau)
             verdict = differences(common(reference, names), common(trace, names), tube)
@@ -118,6 +120,18 @@ def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report
     if worst is not None and not verdict.equal:
         report.error("E909", f"expect failed: {text} within {within:g}: {sentence(worst)}", golden.place)
     return Claim(text, verdict.equal, *found)
+
+
+@contextlib.contextmanager
+def _file(outcome: Outcome) -> Iterator[Path]:
+    """The trace's file; of one that is held in memory, a file for as long as it is read."""
+    if outcome.trace is not None:
+        yield outcome.trace
+        return
+    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        path = Path(folder) / "trace.h5"
+        outcome.traced.save(path)
+        yield path
 
 
 def _sides(

@@ -274,5 +274,5 @@ def _bounds(options: Options, trace: Trace) -> dict[str, float]:
 def _read(ran: Ran, options: Options) -> Run:
     accuracy = min([options.accuracy or ACCURACY, *(wanted for _, wanted in options.accuracy_on)])
     claims = tuple((claim.text, claim.ok) for claim in ran.claims)
-    trace = Trace.open(ran.outcome.trace)
+    trace = ran.outcome.traced
     return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure)

@@ -52,10 +52,13 @@ class Node:
 
 
 @contextmanager
-def fresh() -> Iterator[None]:
-    """Forget all nodes made before: one block a model, so that results do not depend on what came earlier."""
+def fresh(nodes: dict[Any, Node] | None = None) -> Iterator[None]:
+    """Forget all nodes made before: one block a model, so that results do not depend on what came earlier.
+
+    nodes: those of a block to which one returns.
+    """
     global _interned
-    before, _interned = _interned, {}
+    before, _interned = _interned, {} if nodes is None else nodes
     try:
         yield
     finally:

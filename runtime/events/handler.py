@@ -32,7 +32,7 @@ STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
 FALLEN = 1e-4
-"""Of what else counts as zero: a gap that an impact opened closes again below it."""
+"""Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
 AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
 """Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
 
@@ -51,6 +51,17 @@ class Watched:
     side: int
 
 
+@dataclass(frozen=True, slots=True)
+class Bounce:
+    """A gap that an impact opened, in free flight: its value there, which is zero but for round-off (level <= 0), what
+    it rises to (height), and the time until it closes again (flight, s; both infinite where nothing pulls it back).
+    """
+
+    level: float
+    height: float
+    flight: float
+
+
 class Handler:
     """Events of one run.  system: as the stepper sees it; restart: consistent points of it."""
 
@@ -65,7 +76,7 @@ class Handler:
         self.determined = Determined(self.contacts)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
-        self.level: dict[int, float] = {}
+        self.bounces: dict[int, Bounce] = {}
         self.happened: list[Happened] = []
         self.samples = 0
         self._next = [0] * len(plan.sampled)
@@ -112,7 +123,7 @@ class Handler:
         found = self.watched()
         array = (lib.Watch * max(len(found), 1))()
         for k, w in enumerate(found):
-            array[k] = lib.Watch(w.row, w.side, self._least(w) - self.level.get(w.row, 0.0))
+            array[k] = lib.Watch(w.row, w.side, self._least(w) - self._level(w))
         return array
 
     # -- the start -----------------------------------------------------------------------------------------------
@@ -153,7 +164,7 @@ class Handler:
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        rows = [(w.row, w.side, self._least(w), self._rate(w), self.level.get(w.row, 0.0)) for w in watched]
+        rows = [(w.row, w.side, self._least(w), self._rate(w), self._level(w)) for w in watched]
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
@@ -165,7 +176,18 @@ class Handler:
 
     def _least(self, watched: Watched) -> float:
         """What a watched value may fall by unseen: behind an impact nearly nothing, for bounces become small."""
-        return (FALLEN if watched.row in self.level else 1.0) * self.observer.zero(watched.row)
+        zero, bounce = self.observer.zero(watched.row), self.bounces.get(watched.row)
+        return zero if bounce is None else FALLEN * min(zero, bounce.height)
+
+    def _level(self, watched: Watched) -> float:
+        """The value at which what is watched begins: that of a bounce, else zero."""
+        bounce = self.bounces.get(watched.row)
+        return 0.0 if bounce is None else bounce.level
+
+    def flight(self, unseen: float) -> float:
+        """Time (s) until the first bounce ends that rises less than `unseen` times the largest value of its gap."""
+        low = (b.flight for row, b in self.bounces.items() if b.height < unseen * self.observer.largest[row])
+        return min(low, default=np.inf)
 
     def _rate(self, watched: Watched) -> int:
         """The row of the rate of what is watched, where there is one."""
@@ -244,18 +266,24 @@ class Handler:
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
         self._renew(t, *found)
-        self._level(t, *found)
+        self._bounce(t, *found)
         self._note(t, said, touched)
         return found
 
-    def _level(self, t: float, y: Floats, yd: Floats) -> None:
-        """The values at which gaps that an impact opened begin."""
+    def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
+        """The gaps that an impact opened."""
         values = self.observer(t, y, yd)
-        for k, contact in enumerate(self.plan.contacts):
-            if contact.kind == "phi":
-                self.level.pop(contact.value, None)
-                if not self.contacts.active[k] and abs(values[contact.value]) <= self.observer.zero(contact.value):
-                    self.level[contact.value] = min(float(values[contact.value]), 0.0)
+        self.bounces = {
+            c.value: self._thrown(float(values[c.value]), float(values[c.rate]), -float(values[c.acceleration]))
+            for k, c in enumerate(self.plan.contacts)
+            if c.kind == "phi" and not self.contacts.active[k] and abs(values[c.value]) <= self.observer.zero(c.value)
+        }
+
+    @staticmethod
+    def _thrown(value: float, speed: float, pull: float) -> Bounce:
+        back = speed > 0.0 and pull > 0.0
+        height, flight = (0.5 * speed * speed / pull, 2.0 * speed / pull) if back else (np.inf, np.inf)
+        return Bounce(min(value, 0.0), height, flight)
 
     def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
         """The point with the active set that fits a little later, None where none differs.

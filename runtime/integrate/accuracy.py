@@ -1,9 +1,10 @@
 """An accuracy asked for, met by an estimate of the global error.
 
 A draft is followed by a run at the tolerance that should do, a tenth of the draft's, and both are compared at instants
-of the draft's own rows.  With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of
-the tolerances)^p; p as measured over three runs, at most what the method's law credits.  Where the estimate misses what
-was asked, a finer run follows and is compared with the last one.  The finest run is handed back with its estimate.
+of the draft's own rows; a run behind them at instants of the last one's.  With error ~ tolerance^p the error of the
+finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as measured over three runs, at most what the
+method's law credits.  Where the estimate misses what was asked, a finer run follows and is compared with the last one.
+The finest run is handed back with its estimate.
 Each run finds the magnitudes of its unknowns for itself: those that an earlier run met late would hide what is small
 early and grows.  Two runs that took the same steps say nothing: a third takes steps of half the length elsewhere.
 """
@@ -72,10 +73,11 @@ LAWS = {
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """What a run hands to the comparison.  values [instants, quantities]; largest [quantities] against
-    which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it is zero to round-off;
-    between [instants]: between an event of this run and the same one of the run before it; late [instants, quantities]:
-    what each value moves by within the time tolerance (TIMING): on a steep front no more is asked.
+    """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
+    [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
+    is zero to round-off; between [instants]: between an event of this run and the same one of the run before it; late
+    [instants, quantities]: what each value moves by within the time tolerance (TIMING): on a steep front no more is
+    asked; there: values and late at instants of its own, for the run behind it (None: those are the same).
     """
 
     tolerance: float
@@ -85,6 +87,12 @@ class Sampled:
     noise: Floats | float = 0.0
     between: NDArray[np.bool_] | None = None
     late: Floats | float = 0.0
+    there: tuple[Floats, Floats | float] | None = None
+
+    @property
+    def own(self) -> tuple[Floats, Floats | float]:
+        """Values and late at its own instants."""
+        return (self.values, self.late) if self.there is None else self.there
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +114,9 @@ Run = Callable[[float, float], Sampled]
 
 def apart(coarse: Sampled, fine: Sampled) -> Floats:
     """How far two runs' values are from each other [instants, quantities], within the time tolerance."""
-    late = np.maximum(np.nan_to_num(coarse.late), np.nan_to_num(fine.late))
-    return np.asarray(np.fmax(np.abs(fine.values - coarse.values) - late, 0.0 * fine.values * coarse.values))
+    values, late = coarse.own
+    late = np.maximum(np.nan_to_num(late), np.nan_to_num(fine.late))
+    return np.asarray(np.fmax(np.abs(fine.values - values) - late, 0.0 * fine.values * values))
 
 
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
@@ -116,10 +125,11 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
     if not use.any() or not fine.values.size:
         return 0.0, 0.0
-    if coarse.values.shape != fine.values.shape:
+    before = coarse.own[0]
+    if before.shape != fine.values.shape:
         return np.inf, np.inf
     # zero by symmetry, in both runs: what is left of it is nobody's error
-    use &= ~(np.maximum(np.abs(coarse.values), np.abs(fine.values)).max(axis=0) <= fine.noise)
+    use &= ~(np.maximum(np.abs(before), np.abs(fine.values)).max(axis=0) <= fine.noise)
     if not use.any():
         return 0.0, 0.0
     there = ... if fine.between is None else ~fine.between

@@ -25,17 +25,17 @@ Watch = Callable[[tuple[str, ...]], Callable[[Floats, Floats], NDArray[np.bool_]
 class Options:
     """What `sysdyn simulate` asks for.  Times in s.
 
-    every: interval of the trace (None: accepted steps); at: further instants of the trace; sampled_at: instants of
-    samples alone; accuracy relative to the largest value of each traced quantity, accuracy_on: (name, accuracy) of
-    single ones (the others are then free if `accuracy` is None); rtol, atol: the solver's own, switch the control
-    off; accuracy_check: a second run by another method must agree; euler_step: of method "euler"; longest: step [s];
-    stops: ascending instants at which the text jumps or has kinks: a step ends and the integration restarts there;
-    redundancy: what becomes of redundant constraints: drop (the last written of each dependent group is left out),
-    minimum_norm (the least multipliers), error (the caller has seen to it); sample_steps: the watcher sees accepted
-    steps too; watch: what of a run the samples are to hold.
+    output: the trace's file, None: it stays in memory; every: interval of the trace (None: accepted steps); at:
+    further instants of the trace; sampled_at: instants of samples alone; accuracy relative to the largest value of
+    each traced quantity, accuracy_on: (name, accuracy) of single ones (the others are then free if `accuracy` is
+    None); rtol, atol: the solver's own, switch the control off; accuracy_check: a second run by another method must
+    agree; euler_step: of method "euler"; longest: step [s]; stops: ascending instants at which the text jumps or has
+    kinks: a step ends and the integration restarts there; redundancy: what becomes of redundant constraints: drop (the
+    last written of each dependent group is left out), minimum_norm (the least multipliers), error (the caller has seen
+    to it); sample_steps: the watcher sees accepted steps too; watch: what of a run the samples are to hold.
     """
 
-    output: str | Path
+    output: str | Path | None
     t_start: float
     t_end: float
     every: float | None = None

@@ -20,6 +20,11 @@ from sysdyn.runtime.model.description import Floats
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration, Sink
 
+UNSEEN = 100.0
+"""Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
+PARTS = 8
+"""Steps at least that such a bounce takes; radau and dopri follow a parabola in one."""
+
 _DENSE = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p)
 _REFINE = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
 
@@ -35,6 +40,7 @@ class Pieces:
         self.handler.restart = run.restart
         run.restart.thorough = "dynamics_rate" in run.system.description.blocks and bool(plan.contacts)
         self.handler.contacts.size(run.magnitude, run._time)
+        self._longest, self._landing, self._end = run.method.contents.h_max, np.inf, run.segments[0].end
         n = run.system.form.written
         self._first(self.handler.begin(start.t, run.y[:n].copy(), run._start_rate[:n].copy()))
         self._watch()
@@ -57,9 +63,20 @@ class Pieces:
 
     def aim(self, end: float) -> None:
         """The next step ends no later than at the next sample, or the end (s) of the segment."""
-        sample = self.handler.next_sample()
-        self.run.method.contents.t_end = min(end, sample)
-        self.run.run_.contents.end_kind = TRACE if sample <= end else 0
+        self._end, sample = end, self.handler.next_sample()
+        self.run.method.contents.t_end = min(end, sample, self._landing)
+        self.run.run_.contents.end_kind = TRACE if sample <= min(end, self._landing) else 0
+
+    def _bounce(self, t: float) -> None:
+        """Steps short enough for a bounce that begins at t (s), until it must have ended."""
+        run, method = self.run, self.run.method.contents
+        method.h_max, before, self._landing = self._longest, self._landing, np.inf
+        if run.request.method == "bdf":
+            flight = self.handler.flight(UNSEEN * run.request.rtol)
+            if np.isfinite(flight):
+                method.h_max, self._landing = min(flight / PARTS, self._longest), t + 2.0 * flight
+        if self._landing != before:
+            self.aim(self._end)
 
     # -- where a piece ends --------------------------------------------------------------------------------------
 
@@ -113,6 +130,7 @@ class Pieces:
     def _go_on(self, t: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats]) -> None:
         core = self.run.run_.contents
         core.start_kind = TRACE
+        self._bounce(t)
         self.run.go_on(t, t, point, before)
         core.start_kind = 0
         self._watch()
@@ -121,6 +139,10 @@ class Pieces:
         """What is due where a piece has met its end; whether the segment, which ends at `end` (s), goes on."""
         run, method = self.run, self.run.method.contents
         due = self.handler.due(method.t)
+        if not due and method.t < end:  # a bounce that has not come back
+            self._landing, method.h_max = np.inf, self._longest
+            self.aim(end)
+            return True
         if due:
             n = run.system.form.written
             y, yd = run.method.point()
@@ -138,5 +160,6 @@ class Pieces:
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or self.handler.settled(t, y, yd, said)
+        self._bounce(t)
         self._watch()
         return point

@@ -1,16 +1,13 @@
 """The runs of one simulation, each of which writes a trace.
 
-The first run, a draft where the accuracy is controlled, streams into the file itself; a finer run into a neighbour
-`.NAME.part` that takes its place when it is finished: whatever is killed, a readable trace stands at the path.
+The first is a draft where the accuracy is controlled; the last that finished is kept (trace/keeping.py).
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
 import time
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,8 +22,8 @@ from sysdyn.runtime.model.description import Description, Floats, Ints, element
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.trace.trace import Column, TraceWriter, columns_of
-from sysdyn.runtime.trace.trace_store import clear
+from sysdyn.runtime.trace.keeping import Held, Writer, keeping
+from sysdyn.runtime.trace.trace import Column, Layout, Trace, columns_of
 
 LONG = 1000
 """Steps of the bdf after which method auto tries radau."""
@@ -82,7 +79,7 @@ class Samples:
 
 
 class Runs:
-    """The runs of one simulation: each writes a trace; the last finished one stands at the path."""
+    """The runs of one simulation: each writes a trace; the last finished one is kept."""
 
     def __init__(self, start: ConsistentState, options: Options, way: Way) -> None:
         self.start, self.options = start, options
@@ -92,24 +89,22 @@ class Runs:
         self.begin = self.system.description.p.copy(), self.system.description.switches.active.copy()
         self.names = _observed_names(self.system.description)
         self.instants, self.kinds = instants(options)
-        self.path = Path(options.output)
-        self.target = self.path.resolve()
-        for place in (self.target, self._part):
-            clear(place)
+        self.keeping = keeping(options.output)
         self.statistics, self.last_statistics = Statistics(), Statistics()
         self.cpu = self.wall = 0.0
         self.number = 0
         self.began = time.monotonic()
-        self.writer: TraceWriter | None = None
+        self.writer: Writer | None = None
         self.finished: Finished | None = None
         self.rows: list[Floats] = []
         self.samples: list[Floats] = []
-        self.done: tuple[Finished, list[Floats], TraceWriter] | None = None
+        self.done: tuple[Finished, list[Floats], Writer] | None = None
         self.samplings: tuple[Sampled, ...] = ()
         self.jumps: Floats | None = None
         self.controlled = False
         self.forecast: float | None = None
         self.common = known(self.instants, options)
+        self.compared_at: Floats | None = None
 
     def take(self, way: Way) -> None:
         """Goes on with another method and form."""
@@ -147,11 +142,6 @@ class Runs:
         )
 
     @property
-    def _part(self) -> Path:
-        """Where a finer run writes before it takes the trace's place."""
-        return self.target.with_name(f".{self.target.name}.part")
-
-    @property
     def most_steps(self) -> int | None:
         """The steps of a run: of the options, or of the patience with a method on trial."""
         return min((n for n in (self.options.max_steps, self.patience) if n is not None), default=None)
@@ -168,10 +158,10 @@ class Runs:
             self.samples = [*self.samples[:-1], *([kept] if kept.size else []), taken[-1:]]
 
     def _compare(self, rows: Floats, kind: Ints) -> None:
-        """Keeps what runs are compared by: the first one's own rows, thinned; later the rows at these instants."""
-        if self.common is None:
+        """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
+        if self.options.every is None:
             self.thinned.take(rows[(kind & TRACE) > 0])
-        elif (kind & COMPARED).any():
+        if (kind & COMPARED).any():
             self.rows.append(rows[(kind & COMPARED) > 0])
 
     def _observed(self, rows: Floats) -> Floats:
@@ -199,7 +189,6 @@ class Runs:
     def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
         first = self.done is None
-        target = self.target if first else self._part
         attributes: dict[str, str | float | int] = {
             **self.options.attributes,
             "method": self.method,
@@ -209,7 +198,8 @@ class Runs:
         }
         self.samples = []
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
-        self.writer = TraceWriter(target, self.columns, len(self.names), attributes, self.options.parameters)
+        layout = Layout(self.columns, len(self.names), attributes, self.options.parameters)
+        self.writer = self.keeping.writer(layout, first)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest))
         try:
             finished = self._integrate(integration)
@@ -217,7 +207,8 @@ class Runs:
             self._leave(integration, first)
             raise
         self.writer.flush()
-        self._take(first)
+        if self.done is not None:
+            self.keeping.take(self.writer, self.done[2])
         self.done, self.finished = (finished, self.samples, self.writer), finished
         return finished
 
@@ -245,18 +236,7 @@ class Runs:
             attributes: dict[str, str | float | int] = {**self.last_attributes(None), "met": 0, "judged": ""}
             self.writer.finish(nominal, attributes, final=False, events=integration.happened())
             return
-        self.writer.discard()
-        with contextlib.suppress(OSError):
-            self.writer.path.unlink()
-
-    def _take(self, first: bool) -> None:
-        """The finished run's file takes the path (the writer keeps writing its last attributes to it)."""
-        assert self.writer is not None
-        if not first:
-            assert self.done is not None
-            self.done[2].discard()
-            self.writer.path.replace(self.target)
-            self.writer.path = self.target
+        self.keeping.drop(self.writer)
 
     def sizes(self, largest: Floats, magnitude: Floats) -> Floats:
         """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
@@ -280,6 +260,12 @@ class Runs:
         """Nominal magnitude of each stored quantity."""
         sizes = self.sizes(largest, magnitude)
         return {column.name: float(size) for column, size in zip(self.columns, sizes, strict=True)}
+
+    @property
+    def held(self) -> Trace | None:
+        """The trace of a run that is kept in memory, once it is closed."""
+        writer = self.writer if self.done is None else self.done[2]
+        return writer.trace if isinstance(writer, Held) else None
 
     def last_attributes(self, error_estimate: float | None) -> dict[str, str]:
         """Statistics and timings as JSON."""
@@ -309,24 +295,32 @@ class Runs:
         """One run of the accuracy control; longest: step, as part of the span."""
         self.controlled = True
         finished = self.run(tolerance, None, longest)
-        if self.common is None:
+        rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self._width))
+        instants, there = self.common, None
+        if self.options.every is None:
             self.common = common(self.thinned.time, self.options)
-            rows = self.thinned.rows(self.common)
-        else:
-            rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self._width))
-        places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
+            there = self._sampled(self.thinned.rows(self.common), finished)
+        self.compared_at = instants if instants is not None else self.common
+        values, late = there if there is not None and instants is None else self._sampled(rows, finished)
         sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
         noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(self.meters)))
         jumps = np.unique([e.time for e in finished.events])
         last, self.jumps = self.jumps, jumps
-        between = beside(self.common, jumps if last is None else last, jumps, self.options.t_end - self.options.t_start)
-        if finished.beyond > BEYOND:
-            rows = np.full_like(rows, np.nan)
-        late = self._late(rows)
-        found = Sampled(tolerance, rows[:, places], np.array(sizes), finished.statistics.steps, noise, between, late)
+        span = self.options.t_end - self.options.t_start
+        assert self.compared_at is not None
+        between = beside(self.compared_at, jumps if last is None else last, jumps, span)
+        steps = finished.statistics.steps
+        found = Sampled(tolerance, values, np.array(sizes), steps, noise, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
+
+    def _sampled(self, rows: Floats, finished: Finished) -> tuple[Floats, Floats]:
+        """The compared quantities [k, quantities] at rows, and what they move by within the time tolerance."""
+        if finished.beyond > BEYOND:
+            rows = np.full_like(rows, np.nan)
+        places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
+        return rows[:, places], self._late(rows)
 
     def _late(self, rows: Floats) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]."""
@@ -363,20 +357,20 @@ class Runs:
         """
         asked = {name: float(wanted) for name, wanted in zip(self.compared, target, strict=True)}
         name = min(asked, key=lambda n: asked[n], default="")
-        if len(self.samplings) < 2 or self.samplings[0].values.shape != self.samplings[1].values.shape:
+        if len(self.samplings) < 2 or self.samplings[0].own[0].shape != self.samplings[1].values.shape:
             return name, asked.get(name, 0.0), None
         one, two = self.samplings
-        assert self.common is not None
+        assert self.compared_at is not None
         size = (one if one.tolerance < two.tolerance else two).largest
         with np.errstate(all="ignore"):
             ratio = accuracy.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
-        ratio = np.where(one.values == two.values, 0.0, ratio)
+        ratio = np.where(one.own[0] == two.values, 0.0, ratio)
         ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
         name = self.compared[k]
-        return name, asked[name], float(self.common[beyond[0]]) if beyond.size else None
+        return name, asked[name], float(self.compared_at[beyond[0]]) if beyond.size else None
 
     def collected(self) -> Samples:
         """Samples of the run that stands in the trace."""

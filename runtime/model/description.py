@@ -7,7 +7,7 @@ hands on a `Description`: unknown families, row families, blocks with their kern
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -133,7 +133,9 @@ class Initial:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]."""
+    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts: of the index forms made
+    so far (model/system.py), which need be found once.
+    """
 
     families: tuple[Family, ...]
     rows: tuple[RowFamily, ...]
@@ -142,6 +144,7 @@ class Description:
     ix: Ints
     initial: tuple[Initial, ...]
     switches: Switches
+    layouts: dict[Any, Any] = field(default_factory=dict, compare=False, init=False)
 
     def families_of(self, kind: str) -> tuple[int, ...]:
         """Numbers of the families of one kind."""

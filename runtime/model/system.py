@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +23,20 @@ from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
 from sysdyn.runtime.model.patterns import Pattern, Places, compress, places
 
 Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What of a form depends on the structure alone.  slots: of each part of the matrix in the pattern; entries: of the
+    largest part; may_hold: rows, unknowns, slots, switches (-1: always) of the rows that may read "multiplier = 0",
+    reads_rate: which of them read its rate.
+    """
+
+    pattern: Pattern
+    slots: tuple[Ints, ...]
+    entries: int
+    may_hold: tuple[Ints, Ints, Ints, NDArray[np.int64]]
+    reads_rate: Ints
 
 
 class System:
@@ -84,7 +99,14 @@ class System:
         )
         return dy, dyd
 
-    def _assemble(self) -> None:
+    def _laid_out(self) -> Layout:
+        """Pattern and slots of the form, found once a description."""
+        key = self.form.name, self.left_out
+        if key not in self.description.layouts:
+            self.description.layouts[key] = self._layout()
+        return self.description.layouts[key]  # type: ignore[no-any-return]
+
+    def _layout(self) -> Layout:
         form = self.form
         number = np.asarray(form.k_row, dtype=np.int64)
         parts = [Places(number, form.k_q.astype(np.int64)), Places(number, form.k_f.astype(np.int64))]
@@ -94,9 +116,16 @@ class System:
         held = held_rows(self.description, form, self.left_out)
         times = switch_rows(self.description, form)
         parts.append(Places(np.concatenate([held[0], times[0]]), np.concatenate([held[1], times[1]])))
-        self.pattern: Pattern
-        self.pattern, slots = compress(form.rows, form.unknowns, parts)
+        pattern, slots = compress(form.rows, form.unknowns, parts)
         entries = max([part.row.size for part in parts] + [1])
+        place = np.concatenate([np.full(held[0].size, -1), times[2]])
+        reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
+        at_times = parts[-1].row.astype(np.int32), parts[-1].column.astype(np.int32), slots[-1], place
+        return Layout(pattern, tuple(slots), entries, at_times, reads_rate)
+
+    def _assemble(self) -> None:
+        form, layout = self.form, self._laid_out()
+        self.pattern, slots = layout.pattern, list(layout.slots)
         calls = (lib.Call * max(len(form.calls), 1))()
         for k, call in enumerate(form.calls):
             calls[k] = self.call(
@@ -108,12 +137,9 @@ class System:
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
         self.kinematic_scale = np.ones(form.k_row.size)
-        self._scratch = np.zeros(entries)
+        self._scratch = np.zeros(layout.entries)
         self._keep += [calls, slots]
-        number = np.concatenate([np.full(held[0].size, -1), times[2]])
-        self._reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
-        at_times = parts[-1].row.astype(np.int32), parts[-1].column.astype(np.int32)
-        self._may_hold: tuple[Ints, Ints, Ints, NDArray[np.int64]] = (*at_times, slots[-1], number)
+        self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
         self.core = lib.System(
             unknowns=form.unknowns,
             rows=form.rows,

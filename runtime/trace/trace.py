@@ -23,7 +23,7 @@ from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.opening import opened
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Parameter, Store, columns_of, input_output
 
-__all__ = ["Column", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
+__all__ = ["Column", "Layout", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
 
 UNCHANGED = 1e-9
 """Part of the stored energy that is no energy turned over: its balance is round-off."""
@@ -31,6 +31,37 @@ FLUSH_SECONDS = 0.8
 """Flushed at least every second of wall time: rows arrive about every 50 ms."""
 MANY = 1 << 20
 """Numbers that may wait in memory."""
+
+
+class Met:
+    """The largest of each stored quantity, and of the energies that went round, over the rows so far."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self.columns = tuple(columns)
+        self.turned_over = 0.0
+        self._energies: Floats | None = None
+        self._largest = np.zeros(len(self.columns))
+        self._places = np.array([BEFORE + column.place for column in self.columns], dtype=np.intp)
+
+    def take(self, rows: Floats) -> None:
+        """Rows [k, 8 + 2 observed]."""
+        self._energy(rows[:, 2:6])
+        self._largest = np.fmax(self._largest, np.abs(rows[:, self._places]).max(axis=0))
+
+    def _energy(self, rows: Floats) -> None:
+        """Largest of kinetic energy, change of potential energy, energy dissipated and supplied (J).
+
+        At least what round-off is beside the stored energy.
+        """
+        if self._energies is None:
+            self._energies = np.array([0.0, rows[0, 1], 0.0, 0.0])
+        most = max(np.abs(rows - self._energies).max(), UNCHANGED * np.abs(rows[:, :2]).max())
+        if np.isfinite(most):
+            self.turned_over = max(self.turned_over, float(most))
+
+    def largest(self) -> dict[str, float]:
+        """Largest magnitude of each stored quantity."""
+        return {column.name: float(s) for column, s in zip(self.columns, self._largest, strict=True)}
 
 
 class TraceWriter:
@@ -41,22 +72,11 @@ class TraceWriter:
     reader still has open: a copy of the visible one takes its place.
     """
 
-    def __init__(
-        self,
-        path: str | Path,
-        columns: Sequence[Column],
-        observed: int,
-        attributes: Mapping[str, str | float | int],
-        parameters: Sequence[Parameter] = (),
-    ) -> None:
-        self.path = Path(path)
-        self._layout = Layout(tuple(columns), observed, dict(attributes), tuple(parameters))
+    def __init__(self, path: str | Path, layout: Layout) -> None:
+        self.path, self._layout = Path(path), layout
         self._waiting: list[Floats] = []
         self._late: list[Floats] = []  # rows that the hidden store lacks
-        self._energies: Floats | None = None
-        self._turned_over = 0.0
-        self._seen = np.zeros(len(self._layout.columns))
-        self._places = np.array([BEFORE + column.place for column in self._layout.columns], dtype=np.intp)
+        self._met = Met(self._layout.columns)
         self._numbers, self._flushed = 0, time.monotonic()
         self._visible: Store | None = None
         self._hidden: Store | None = None
@@ -85,25 +105,13 @@ class TraceWriter:
         if rows.size:
             self._waiting.append(rows)
             self._numbers += rows.size
-            self._energy(rows[:, 2:6])
-            self._seen = np.fmax(self._seen, np.abs(rows[:, self._places]).max(axis=0))
+            self._met.take(rows)
         if self._numbers > MANY or time.monotonic() - self._flushed > FLUSH_SECONDS:
             self.flush()
 
-    def _energy(self, rows: Floats) -> None:
-        """Largest of kinetic energy, change of potential energy, energy dissipated and supplied (J).
-
-        At least what round-off is beside the stored energy.
-        """
-        if self._energies is None:
-            self._energies = np.array([0.0, rows[0, 1], 0.0, 0.0])
-        most = max(np.abs(rows - self._energies).max(), UNCHANGED * np.abs(rows[:, :2]).max())
-        if np.isfinite(most):
-            self._turned_over = max(self._turned_over, float(most))
-
     def seen(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
-        return {column.name: float(s) for column, s in zip(self._layout.columns, self._seen, strict=True)}
+        return self._met.largest()
 
     def flush(self) -> None:
         """All rows so far stand in the trace."""
@@ -177,7 +185,7 @@ class TraceWriter:
         sizes = {
             column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns
         }
-        sizes["/audit/energy"] = {"nominal": self._turned_over}
+        sizes["/audit/energy"] = {"nominal": self._met.turned_over}
         self._turn({**sizes, "/": {**attributes, "final": np.int64(final)}}, events)
         self.discard()
 
@@ -287,6 +295,32 @@ class Trace:
             events = _events(source["events"]) if "events" in source else ()
             return cls(str(path), np.asarray(data["time"][:length]), attributes, parameters, quantities, events)
 
+    def save(self, file: str | Path) -> None:
+        """Writes the trace to a file, in the layout of `sysdyn simulate`.  Raises TraceError."""
+        names, width = self.names, len(self.names)
+        columns = [
+            Column(name, k, self[name].units, name, self[name].derivative is not None) for k, name in enumerate(names)
+        ]
+        rows = np.full((self.time.size, BEFORE + 2 * width), np.nan)
+        rows[:, 0] = self.time
+        for place, name in ((6, "audit.energy"), (7, "audit.constraints")):
+            rows[:, place] = self[name]
+        for column in columns:
+            rows[:, BEFORE + column.place] = self[column.name]
+            if column.derivative:
+                rows[:, BEFORE + width + column.place] = self[column.name].derivative
+        parameters = tuple(Parameter(name, value, unit) for name, (value, unit) in self.parameters.items())
+        nominal = {n: {"nominal": self[n].nominal} for n in names if self[n].nominal is not None}
+        energy = {"/audit/energy": {"nominal": self["audit.energy"].nominal or 0.0}}
+        closing = [name for name in ("final", "met", "judged") if name in self.attributes]
+        last: dict[str, Any] = {name: self.attributes[name] for name in closing}
+        path = Path(file)
+        with input_output(path):
+            path.unlink(missing_ok=True)
+            store = Store(path, Layout(tuple(columns), width, self.attributes, parameters))
+            store.append(rows)
+            store.close_with({**nominal, **energy, "/": last}, self.events)
+
     @property
     def names(self) -> tuple[str, ...]:
         """Traced quantities (without the audit)."""
@@ -317,3 +351,8 @@ class Trace:
     def statistics(self) -> dict[str, Any]:
         """Counters of the run."""
         return dict(json.loads(self.attributes.get("statistics", "{}")))
+
+    @property
+    def timings(self) -> dict[str, float]:
+        """CPU and wall seconds of the run; empty where they were not asked for."""
+        return dict(json.loads(self.attributes.get("timings", "{}")))

@@ -137,7 +137,7 @@ def test_interruption(tmp_path, capsys, monkeypatch):
 
 
 def test_strict_counts_warnings(tmp_path, capsys, monkeypatch):
-    from sysdyn.cli.commands import check_command
+    from sysdyn.cli.run import checking
     from sysdyn.dsl import load
 
     path = write(tmp_path, PENDULUM)
@@ -147,7 +147,7 @@ def test_strict_counts_warnings(tmp_path, capsys, monkeypatch):
         report.warning("W201", "a warning", None)
         return network(document, model, scene, report, *rest, **options)
 
-    monkeypatch.setattr(check_command.load, "network", warned)
+    monkeypatch.setattr(checking.load, "network", warned)
     assert run(["check", path]) == 0
     assert run(["check", "--strict", path]) == 1
     assert "W201" in capsys.readouterr().err

@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from sysdyn.cli.commands.check_command import _target
 from sysdyn.cli.console import Console
 from sysdyn.cli.main import run
+from sysdyn.cli.run.checking import checked
 from sysdyn.cli.run.targets import all_targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
@@ -23,7 +23,7 @@ def found(text: str) -> list[str]:
         document = load.document(SourceText("example.sd", text), console.report)
         for target in all_targets(document, console.report):
             with ex.fresh():
-                _target(console, target)
+                checked(target, console.report)
     except ModelError as error:
         console.report.extend(error.diagnostics)
     return [d.code for d in console.report]

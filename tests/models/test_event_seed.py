@@ -89,15 +89,28 @@ def test_a_ball_through_fifty_impacts_and_to_rest(tmp_path):
     assert np.abs(books - books[0]).max() < 1e-9 * 9.81
 
 
-def test_a_ball_beyond_its_last_impact(tmp_path):
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+def test_a_ball_beyond_its_last_impact(method, tmp_path):
     end = math.sqrt(2.0 / 9.81) * (1.0 + 0.5) / (1.0 - 0.5)  # the sum of all flights
-    trace = run("bouncing_ball", tmp_path, [1.1 * end], {"e": 0.5}, accuracy=1e-6, until=repr(1.5 * end))
+    trace = run("bouncing_ball", tmp_path, [1.1 * end], {"e": 0.5}, accuracy=1e-6, until=repr(1.5 * end), method=method)
     late = trace.time > end
     assert np.abs(trace["h"].values[late]).max() < 1e-9
     assert np.abs(trace["v"].values[late]).max() < 1e-9
     assert abs(trace.events[-1].time - end) < 1e-6
     assert trace.events[-1].after == "holds"
     assert len(trace.events) < 40
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_low_bounces_are_resolved_at_any_tolerance(rtol, tmp_path):
+    """By the bdf, whose error test does not see them: each flight is e times as long as the one before it."""
+    file, end = SEED / "bouncing_ball.sd", math.sqrt(2.0 / 9.81) * (1.0 + 0.8) / (1.0 - 0.8)
+    trace = simulate(file, scene="reference", until=repr(end + 0.2), rtol=rtol, method="bdf", output=tmp_path / "t.h5")
+    flights = np.diff([e.time for e in trace.events if e.name.startswith("impact")])
+    assert len(flights) >= 50
+    assert np.abs(flights[1:] / flights[:-1] - 0.8).max() < 5e-3
+    assert trace.events[-1].after == "holds"
+    assert trace.statistics["steps"] < 3000
 
 
 @pytest.mark.parametrize("changed", [{"mu": 0.11, "v_0": -2.0}, {"M": 0.7, "g": 3.7, "x_0": 1.0}])

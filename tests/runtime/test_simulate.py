@@ -135,7 +135,7 @@ def test_statistics_and_timings(tmp_path):
     names = ["steps", "rejected_steps", "residual_evaluations", "jacobian_evaluations", "factorisations"]
     assert list(json.loads(attributes["statistics"])) == [*names, "newton_failures", "error_estimate"]
     timings = json.loads(attributes["timings"])
-    assert set(timings) == {"cpu_integrate_s", "wall_integrate_s", "cpu_compile_s", "wall_total_s"}
+    assert set(timings) - {"forecast_s"} == {"cpu_integrate_s", "wall_integrate_s", "cpu_compile_s", "wall_total_s"}
     assert 0.0 < timings["cpu_integrate_s"] <= timings["wall_total_s"] * 1.5
     assert result.statistics["steps"] > 0
 

@@ -15,7 +15,7 @@ from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.trace.trace import Column, Parameter, Trace, TraceWriter
+from sysdyn.runtime.trace.trace import Column, Layout, Parameter, Trace, TraceWriter
 
 HERE = Path(__file__).parent
 
@@ -80,9 +80,9 @@ LIMITED = """
 import resource, signal, sys
 import numpy as np
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.trace import Column, TraceWriter
+from sysdyn.runtime.trace.trace import Column, Layout, TraceWriter
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-writer = TraceWriter(sys.argv[1], [Column("x", 0, "m", "x", False)], 1, {"model": "m"})
+writer = TraceWriter(sys.argv[1], Layout((Column("x", 0, "m", "x", False),), 1, {"model": "m"}, ()))
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
 try:
     for k in range(100):
@@ -103,7 +103,7 @@ def test_a_full_disk_is_an_error_and_no_signal(tmp_path):
 
 
 def test_too_little_room_is_seen_before_anything_is_written(tmp_path, monkeypatch):
-    writer = TraceWriter(tmp_path / "o.h5", [Column("x", 0, "m", "x", False)], 1, {})
+    writer = TraceWriter(tmp_path / "o.h5", Layout((Column("x", 0, "m", "x", False),), 1, {}, ()))
     assert Trace.open(tmp_path / "o.h5").time.size == 0
     writer.append(np.ones((10, 10)))
     writer.flush()

@@ -1,0 +1,125 @@
+"""A model that is read and compiled once, and run often: only numbers change between its runs.
+
+A setting that the binding takes (a parameter or its element, by a number or a constant) changes numbers alone; another
+one (an input, a text with names, a level) is elaborated and compiled once and then kept.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, options_of, ready
+from sysdyn.cli.run.targets import Target
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+
+KEPT = 64
+"""Texts that are kept compiled."""
+_ELEMENT = re.compile(r"([^\[\]]+)\[(-?\d+(?:,-?\d+)*)\]")
+
+Settings = Mapping[str, Any]
+"""Names of parameters (`m`, `m[2]`, `M1.R`) and inputs -> numbers in SI units, arrays, or texts of the language."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """A text under settings that are part of it, with the space of its expressions."""
+
+    prepared: Prepared
+    nodes: dict[Any, ex.Node]
+    checked: list[bool] = field(default_factory=list)
+    """Its module was compared with its text."""
+
+
+class Loaded:
+    """A target of a file: `run` it with other numbers.  ModelError, UsageError where text or options are wrong."""
+
+    def __init__(self, request: Request) -> None:
+        check_tolerances(request)
+        self.request = request
+        report = Report()
+        document = targets.read(request.file, report)
+        target = targets.one(document, request.file, request.model, request.scene, report)
+        if target is None:
+            raise ModelError(report.diagnostics)
+        self.target: Target = target
+        self._compiled: dict[tuple[tuple[str, str], ...], Compiled] = {}
+        self.first = self._text(())
+        report.raise_if_failed()
+
+    def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
+        """The text under settings that its numbers cannot take."""
+        if settings not in self._compiled:
+            report, nodes = Report(), dict[Any, ex.Node]()
+            with ex.fresh(nodes):
+                whole = (*self.request.settings, *settings)
+                prepared = ready(replace(self.request, settings=whole), self.target, report)
+            if prepared is None:
+                raise ModelError(report.diagnostics)
+            if len(self._compiled) >= KEPT:
+                self._compiled.pop(next(iter(self._compiled)))
+            self._compiled[settings] = Compiled(prepared, nodes)
+        return self._compiled[settings]
+
+    def _split(self, settings: Settings) -> tuple[dict[Any, Any], tuple[tuple[str, str], ...]]:
+        """Numbers for the binding by name or (name, index, ...); the rest as texts."""
+        known = {p.name: p for p in self.first.prepared.network.parameters}
+        numbers, texts = dict[Any, Any](), list[tuple[str, str]]()
+        for name, value in settings.items():
+            element = _ELEMENT.fullmatch(name)
+            plain = element[1] if element else name
+            parameter = known.get(plain)
+            number = value
+            if isinstance(value, str) and parameter is not None:
+                silent = Report()
+                with ex.fresh():
+                    number = load.constant(self.target.document, value, parameter.unit.dimension, name, silent)
+            if parameter is None or number is None or isinstance(number, str):
+                texts.append((name, value if isinstance(value, str) else repr(float(value))))
+            else:
+                key = (plain, *map(int, element[2].split(","))) if element else name
+                numbers[key] = np.asarray(number, dtype=float)
+        return numbers, tuple(texts)
+
+    def bound(self, settings: Settings) -> tuple[Prepared, Compiled]:
+        """The model with these numbers."""
+        numbers, texts = self._split(settings)
+        compiled = self._text(texts)
+        if not numbers:
+            return compiled.prepared, compiled
+        with ex.fresh(compiled.nodes):
+            binding = compiled.prepared.compiled.bind(numbers)
+        return replace(compiled.prepared, binding=binding, cpu_compile_s=0.0), compiled
+
+    def run(self, settings: Settings, report: Report, **changes: Any) -> Ran | None:
+        """One run; changes: options of the request that differ (`until`, `at`, `output`, ...), output None: in memory.
+
+        None where the report says why not.
+        """
+        request = replace(self.request, **changes)
+        check_tolerances(request)
+        prepared, compiled = self.bound(settings)
+        with ex.fresh(compiled.nodes):
+            options = options_of(request, self.target, prepared, report, time.monotonic(), None)
+            if options is None:
+                return None
+            options = replace(options, output=request.output)
+            ran = integrate(self.target, prepared, options, report, checked=bool(compiled.checked))
+            compiled.checked.extend([True] if ran is not None else [])
+            return ran
+
+    def findings(self, settings: Settings) -> tuple[Diagnostic, ...]:
+        """What is wrong with these settings; () where they can be run."""
+        try:
+            self.bound(settings)
+        except ModelError as error:
+            return tuple(error.diagnostics)
+        return ()

@@ -1,0 +1,119 @@
+"""`api.load`: a model compiled once and run often gives what `simulate` gives; `api.check`; traces in memory."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sysdyn.api import ModelError, NotMet, SolverFailure, Trace, UsageError, check, load, simulate
+
+MODELS = Path(__file__).parents[2] / "models"
+
+ARRAY = """
+model masses {
+  param n = 3
+  for i in 1..n {
+    param m[i] = i*(1 kg)
+  }
+  param k = 4 N/m
+  input push: N = 0 N
+  coord x[1..n]: translation = 1 m
+  energy T* = sum(i in 1..n: 1/2*m[i]*x[i]'^2)
+  energy V = sum(i in 1..n: 1/2*k*x[i]^2)
+  work push on x[1]
+  for i in 1..n {
+    init x[i]' = 0 m/s
+  }
+}
+scene s of masses {
+  time 0 s to 2 s
+  trace x[1] as a, x[2] as b every 10 ms
+  accuracy 1e-6
+}
+"""
+
+
+@pytest.fixture
+def masses(tmp_path):
+    path = tmp_path / "masses.sd"
+    path.write_text(ARRAY)
+    return path
+
+
+@pytest.mark.parametrize("name", ["seed/pendulum", "seed/dc_motor", "seed/bouncing_ball", "seed/diode_circuit"])
+def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
+    file = MODELS / f"{name}.sd"
+    model = load(file, scene="reference")
+    model.run({next(iter(model.parameters)): 1.1 * float(next(iter(model.parameters.values())))})
+    for changed in ({}, {k: 1.05 * float(v) for k, v in model.parameters.items() if np.ndim(v) == 0}):
+        mine = model.run(changed)
+        other = simulate(file, scene="reference", set=changed, output=tmp_path / "t.h5")
+        assert set(mine.names) == set(other.names)
+        assert all(np.array_equal(mine[n], other[n], equal_nan=True) for n in (*mine.names, "audit.energy"))
+        assert np.array_equal(mine.time, other.time)
+        assert [(e.time, e.name, e.after) for e in mine.events] == [(e.time, e.name, e.after) for e in other.events]
+        assert mine.statistics == other.statistics
+        assert all(mine[n].nominal == other[n].nominal and mine[n].units == other[n].units for n in mine.names)
+
+
+def test_settings_of_every_kind(masses):
+    """Parameters by number or text, one element, an array, an input, a size: each against its closed form."""
+    model = load(masses)
+    rate = 2.0  # sqrt(k/m[1])
+    for settings, a, b in (
+        ({}, np.cos(rate * 2), np.cos(rate / np.sqrt(2) * 2)),
+        ({"k": "9 N/m"}, np.cos(3.0 * 2), np.cos(3.0 / np.sqrt(2) * 2)),
+        ({"m[2]": 4.0}, np.cos(rate * 2), np.cos(1.0 * 2)),
+        ({"m": [4.0, 1.0, 1.0]}, np.cos(1.0 * 2), np.cos(2.0 * 2)),
+        ({"push": "4 N"}, 1.0, np.cos(rate / np.sqrt(2) * 2)),
+        ({"push": "4 N", "k": 1.0}, 4.0 - 3.0 * np.cos(2.0), np.cos(2.0 / np.sqrt(2))),
+        ({"n": 2}, np.cos(rate * 2), np.cos(rate / np.sqrt(2) * 2)),
+    ):
+        run = model.run(settings)
+        assert abs(run["a"].values[-1] - a) < 4e-6, settings
+        assert abs(run["b"].values[-1] - b) < 4e-6, settings
+    assert model.run({}, until=1.0, at=[0.123]).time[-1] == 1.0
+    assert 0.123 in model.run({}, until="1 s", at=[0.123]).time
+
+
+def test_what_cannot_be_run_says_why(masses):
+    model = load(masses)
+    for settings, said in (
+        ({"zz": 1.0}, "not a parameter"),
+        ({"k": "3 kg"}, "kg"),
+        ({"m": [1.0, 2.0]}, "shape"),
+    ):
+        with pytest.raises(ModelError, match=said):
+            model.run(settings)
+    with pytest.raises(UsageError, match="formulation"):
+        model.run({}, formulation="kane")
+    with pytest.raises(SolverFailure):
+        model.run({}, max_steps=3)
+    assert model.run({})["a"].values[-1] == pytest.approx(np.cos(4.0), abs=4e-6)  # still usable
+    assert "masses" in repr(model)
+
+
+def test_a_run_that_is_not_met_raises_with_its_trace(masses):
+    model = load(masses, method="bdf")
+    with pytest.raises(NotMet) as found:
+        model.run({}, rtol=0.5, until=2000.0)
+    assert found.value.trace.met is False
+    with pytest.warns(UserWarning, match="energy"):
+        assert model.run({}, rtol=0.5, until=2000.0, unmet="warn").met is False
+
+
+def test_a_trace_in_memory_is_saved_as_the_command_writes_it(masses, tmp_path):
+    model = load(masses)
+    held = model.run({"k": 2.0})
+    held.save(tmp_path / "saved.h5")
+    again = Trace.open(tmp_path / "saved.h5")
+    assert set(again.names) == set(held.names)
+    assert all(np.array_equal(again[n], held[n]) and again[n].nominal == held[n].nominal for n in held.names)
+    assert (again.met, again.statistics, again.parameters) == (held.met, held.statistics, held.parameters)
+    assert again.timings["cpu_integrate_s"] > 0.0
+
+
+def test_check_of_a_text():
+    assert check(ARRAY) == []
+    found = check("model m {\n  coord x: translation\n  energy T* = 1/2*y*x'^2\n}\n", "mine.sd")
+    assert [d.code for d in found] == ["E101"]
+    assert found[0].place.file == "mine.sd"
