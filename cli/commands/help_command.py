@@ -5,10 +5,11 @@ from __future__ import annotations
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import offered
 
 
 @with_console("help")
-@click.argument("topic", required=False)
+@click.argument("topic", required=False, shell_complete=offered)
 @click.option("--html", "html_file", metavar="FILE", help="Write everything, library and codes too, as one page.")
 def command(console: Console, topic: str | None, html_file: str | None) -> int:
     """Explain TOPIC, a page of the language; a command or a code of a finding too. Without TOPIC: the index."""
