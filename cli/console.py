@@ -36,6 +36,12 @@ class Console:
         self.result: dict[str, Any] = {}
         self._plain: list[dict[str, object]] = []
 
+    def renew(self) -> None:
+        """Forget what was found: another round begins."""
+        self.report = Report()
+        self.result = {}
+        self._plain = []
+
     def say(self, message: str) -> None:
         """A message for the person at the terminal."""
         if not (self.quiet or self.as_json):

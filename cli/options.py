@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 FORMULATIONS = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "auto"]
 INDICES = ["auto", "3", "2", "2v", "1", "0"]
@@ -26,17 +30,44 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # generic since click
         return name.strip(), text.strip()
 
 
+def offered(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """What a shell completes; imported only when a shell asks."""
+    complete: Callable[..., list[CompletionItem]] = importlib.import_module("sysdyn.cli.completion").complete
+    return complete(context, parameter, begun)
+
+
 def chosen(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options that choose the model, the scene and how it is compiled."""
     for option in reversed(
         [
-            click.option("--scene", metavar="NAME", help="The scene; needed where the file has several."),
-            click.option("--model", metavar="NAME", help="The model; needed where the file has several and no scene."),
+            click.option(
+                "--scene", metavar="NAME", shell_complete=offered, help="The scene; needed where the file has several."
+            ),
+            click.option(
+                "--model",
+                metavar="NAME",
+                shell_complete=offered,
+                help="The model; needed where the file has several and no scene.",
+            ),
             click.option("--formulation", type=click.Choice(FORMULATIONS), help="Default: the scene's, else auto."),
             click.option("--index", type=click.Choice(INDICES), help="Index form. Default: the scene's, else auto."),
             click.option("--backend", type=click.Choice(["c", "numpy"]), default="c", show_default=True),
-            click.option("--set", "settings", type=Setting(), multiple=True, help="Parameter or input; repeatable."),
-            click.option("--level", "levels", type=Setting(), multiple=True, help="PATH=NAME; repeatable."),
+            click.option(
+                "--set",
+                "settings",
+                type=Setting(),
+                multiple=True,
+                shell_complete=offered,
+                help="Parameter or input; repeatable.",
+            ),
+            click.option(
+                "--level",
+                "levels",
+                type=Setting(),
+                multiple=True,
+                shell_complete=offered,
+                help="PATH=NAME; repeatable.",
+            ),
             click.option("--no-prune", is_flag=True, help="Keep what the scene does not need."),
         ]
     ):

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
+
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import INPUT_OUTPUT, UsageError, classify
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.checking import checked
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import ModelError
 
 FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
 
@@ -16,30 +20,75 @@ FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
 @click.argument("files", nargs=-1, required=True)
 @click.option("--strict", is_flag=True, help="Warnings count as errors, and so does what cannot be run yet.")
 @click.option("--allow-unsupported", is_flag=True, help="With --strict: texts may be ahead of the compiler.")
+@click.option("--fix", is_flag=True, help="Write the remedies that leave no choice into FILES, and show the changes.")
+@click.option("--watch", is_flag=True, help="Check again whenever a file changes, until interrupted.")
 @click.option("--output-format", type=click.Choice(FORMATS), help="Form of the findings. Default: full.")
 def command(
-    console: Console, files: tuple[str, ...], strict: bool, allow_unsupported: bool, output_format: str | None
+    console: Console,
+    files: tuple[str, ...],
+    strict: bool,
+    allow_unsupported: bool,
+    fix: bool,
+    watch: bool,
+    output_format: str | None,
 ) -> int:
     """Check every model and scene of FILES, the consistent start included; no C compiler is needed.
 
     FILES may be folders (all .sd files below them) and patterns ('models/**/*.sd'). The forms concise, github, junit
     and sarif go to standard output.
     """
-    files = tuple(targets.files(files))
+    given, files = files, tuple(targets.files(files))
     _form(console, output_format, files)
     if allow_unsupported and not strict:
         raise UsageError("--allow-unsupported says what --strict may pass: give both")
+    if fix and "-" in files:
+        raise UsageError("--fix writes files: standard input is none")
     refused = strict and not allow_unsupported
+    if not watch:
+        return _all(console, files, refused, strict=strict, fix=fix)
+    if "-" in files or console.as_json or output_format in ("junit", "sarif"):
+        raise UsageError("--watch prints findings as they come: no standard input, --json, junit or sarif")
+    from sysdyn.cli.run import watching
+
+    seen = watching.stamps(given)
+    while True:  # until it is interrupted
+        console.renew()
+        code = _all(console, targets.files(given), refused, strict=strict, fix=fix)
+        console.say(f"exit {code}; waiting for a change of {', '.join(given)}")
+        seen = watching.changed(given, watching.stamps(given) if fix else seen)
+
+
+def _all(console: Console, files: Iterable[str], refused: bool, *, strict: bool, fix: bool) -> int:
+    """Check the files and show what was found; the exit code."""
     results, unread = [], False
     for path in files:
         try:
-            results.append(_file(console, path, refused))
+            changes = _fixed(console, path) if fix else []
+            results.append(_file(console, path, refused) | ({"fixed": changes} if fix else {}))
         except OSError as error:
             unread = True
             console.complain(classify(error)[1], INPUT_OUTPUT)
+        except ModelError as error:  # a file that is no text does not hide the others
+            console.report.extend(error.diagnostics)
     console.result = {"files": results}
     warned = any(d.severity == "warning" for d in console.report)
     return console.finish(INPUT_OUTPUT if unread else 1 if strict and warned else 0)
+
+
+def _fixed(console: Console, path: str) -> list[dict[str, object]]:
+    """Mend a file in place; the findings that were mended."""
+    from sysdyn.cli.commands.fmt_command import difference, replace
+    from sysdyn.cli.run.mending import mended
+    from sysdyn.dsl.text.diagnostics import SourceText
+
+    source = SourceText.read(path)
+    text, done = mended(source)
+    if done:
+        replace(Path(path), text)
+        if console.format is None:
+            console.data("".join(difference(source, text, "fixed")), verbatim=True)
+        console.say(f"{path}: {len(done)} of its findings mended")
+    return [d.to_json() for d in done]
 
 
 def _form(console: Console, chosen: str | None, files: tuple[str, ...]) -> None:

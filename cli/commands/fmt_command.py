@@ -50,20 +50,21 @@ def _one(console: Console, name: str, *, check: bool, diff: bool) -> bool:
         return False
     text = format_text(tree)
     if diff:
-        console.data("".join(_difference(source, text)), verbatim=True)
+        console.data("".join(difference(source, text)), verbatim=True)
     elif name == "-" and not check:
         console.data(text, verbatim=True)
     elif text != source.text and not check:
-        _replace(Path(name), text)
+        replace(Path(name), text)
     return text != source.text
 
 
-def _difference(source: SourceText, text: str) -> list[str]:
+def difference(source: SourceText, text: str, what: str = "formatted") -> list[str]:
+    """The lines of a unified diff from a file to what is made of it."""
     before, after = source.text.splitlines(keepends=True), text.splitlines(keepends=True)
-    return list(difflib.unified_diff(before, after, source.name, f"{source.name} (formatted)"))
+    return list(difflib.unified_diff(before, after, source.name, f"{source.name} ({what})"))
 
 
-def _replace(path: Path, text: str) -> None:
+def replace(path: Path, text: str) -> None:
     """Write beside the file, then rename: a file is never half written."""
     target = path.resolve()
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=".sd")

@@ -5,14 +5,25 @@ from __future__ import annotations
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import offered
 
 
 @with_console("help")
-@click.argument("topic", required=False)
-def command(console: Console, topic: str | None) -> int:
+@click.argument("topic", required=False, shell_complete=offered)
+@click.option("--html", "html_file", metavar="FILE", help="Write everything, library and codes too, as one page.")
+def command(console: Console, topic: str | None, html_file: str | None) -> int:
     """Explain TOPIC, a page of the language; a command or a code of a finding too. Without TOPIC: the index."""
     from sysdyn.cli.manual import topics
 
+    if html_file is not None:
+        if topic is not None:
+            raise UsageError("--html writes all topics: leave the topic out")
+        from sysdyn.cli.commands.diff_command import write
+        from sysdyn.cli.manual.site import site
+
+        write(html_file, site())
+        console.result = {"file": html_file}
+        return console.finish()
     if topic is None:
         console.result = {"topics": [{"name": t.name, "title": t.title} for t in topics.topics().values()]}
         console.data(f"sysdyn help TOPIC\n\n{topics.index()}\n\n{_OTHER}")

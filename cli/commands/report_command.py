@@ -10,7 +10,6 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
-from sysdyn.cli.run.running import Request
 
 
 @with_console("report")
@@ -32,6 +31,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
     from sysdyn.cli.commands.diff_command import write
     from sysdyn.cli.report.collect import collect
     from sysdyn.cli.report.page import page
+    from sysdyn.cli.run.running import Request
     from sysdyn.dsl.model import expression as ex
 
     line = ProgressLine("never" if console.quiet else progress)

@@ -6,16 +6,16 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
-from sysdyn.cli.run.running import Ran, Request, run
-from sysdyn.cli.run.starting import described, shortened
+
+if TYPE_CHECKING:
+    from sysdyn.cli.run.running import Ran, Request
 
 
 @with_console("simulate")
@@ -29,6 +29,9 @@ from sysdyn.cli.run.starting import described, shortened
 @click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
 def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
     """Simulate a scene of FILE and write its trace."""
+    from sysdyn.cli.run.running import Request, run
+    from sysdyn.cli.run.starting import described, shortened
+
     line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)
     if request.output == "-" and console.as_json:
@@ -54,6 +57,8 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
 
 def _to_standard_output(request: Request, console: Console, line: ProgressLine) -> Ran | None:
     """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
+    from sysdyn.cli.run.running import run
+
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
         path = Path(folder) / "trace.h5"
         try:
@@ -82,10 +87,12 @@ def _summary(ran: Ran) -> str:
 
 
 def _last(values: Any) -> float:
-    return float(values[-1]) if np.size(values) else float("nan")
+    return float(values[-1]) if len(values) else float("nan")
 
 
 def _result(ran: Ran) -> dict[str, Any]:
+    from sysdyn.cli.run.starting import described
+
     o = ran.outcome
     return {
         "trace": str(o.trace),

@@ -5,10 +5,11 @@ from __future__ import annotations
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import offered
 
 
 @with_console("std")
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=offered)
 def command(console: Console, name: str | None) -> int:
     """Show the standard library: the index, a module, or the ports, parameters, laws and an example of NAME."""
     from sysdyn.cli.manual import library

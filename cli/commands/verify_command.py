@@ -6,7 +6,7 @@ import tempfile
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from sysdyn.cli.console import Console, with_console
@@ -14,12 +14,10 @@ from sysdyn.cli.failures import SOLVER
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
-from sysdyn.cli.run.running import Request
-from sysdyn.cli.run.sizes import sizes
-from sysdyn.cli.run.starting import shortened
-from sysdyn.cli.verify.agreement import Gap
-from sysdyn.cli.verify.verification import TIMES, verify
-from sysdyn.cli.verify.verified import Run, Verified
+
+if TYPE_CHECKING:
+    from sysdyn.cli.verify.agreement import Gap
+    from sysdyn.cli.verify.verified import Run, Verified
 
 
 @with_console("verify")
@@ -39,6 +37,10 @@ def command(console: Console, progress: str, no_timings: bool, full: bool, outpu
     --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree, 3 where a
     ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.
     """
+    from sysdyn.cli.run.running import Request
+    from sysdyn.cli.run.sizes import sizes
+    from sysdyn.cli.verify.verification import verify
+
     line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)
     path, reduced = (Path(), ()) if full else sizes(request.file)
@@ -64,6 +66,8 @@ def command(console: Console, progress: str, no_timings: bool, full: bool, outpu
 
 def _judged(found: Verified, console: Console) -> int:
     """Says what is wrong; the exit code."""
+    from sysdyn.cli.run.starting import shortened
+
     code = 0
     for text in _complaints(found):
         console.complain(text, 1)
@@ -91,6 +95,8 @@ def _judged(found: Verified, console: Console) -> int:
 
 
 def _complaints(found: Verified) -> list[str]:
+    from sysdyn.cli.run.starting import shortened
+
     pairs = []
     for d in found.disagreements:
         if d.doubted:
@@ -142,6 +148,8 @@ def _warnings(found: Verified) -> list[str]:
 
 def _table(found: Verified, *, timings: bool) -> str:
     """The table, with what stands above and below it."""
+    from sysdyn.cli.verify.verification import TIMES
+
     head = ["formulation", "method", "index", "accuracy", "steps", "CPU ms", "estimate", "energy J", "constraints"]
     rows = [[*head, "apart", "worst", "at s"]]
     for run, gap in zip((*found.runs, found.finer), found.worst, strict=True):

@@ -89,7 +89,7 @@ def page(entry: Entry) -> str:
     if not isinstance(entry.item, syntax.Component):
         return f"{entry.name}: {entry.line}\nIn every file, without an import.\n\n{_indented(entry.text)}"
     body = tuple(_statements(entry.item.body))
-    parts = [f"{entry.name}: {entry.doc}\n\n    from std.{entry.module} import {entry.name}", _picture(entry)]
+    parts = [f"{entry.name}: {entry.doc}\n\n    from std.{entry.module} import {entry.name}", picture(entry)]
     rows = [(f"  {p['name']}", p["unit"], p["default"] or "required", p["doc"]) for p in parameters(entry.item)]
     if rows:
         parts.append("Parameters and inputs\n" + aligned([("  name", "unit", "default", ""), *rows]))
@@ -160,7 +160,7 @@ def parameters(component: syntax.Component) -> list[dict[str, str]]:
     return list(found.values())
 
 
-def _picture(entry: Entry) -> str:
+def picture(entry: Entry) -> str:
     """The component as a box: ends on the left, ends and outputs on the right, domains in words."""
     assert isinstance(entry.item, syntax.Component)
     found = ports(entry.item)

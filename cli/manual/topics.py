@@ -13,6 +13,7 @@ from sysdyn.cli.page.columns import aligned
 FOLDER = Path(sysdyn.dsl.load.__file__).parent / "language"
 FIRST = [
     "overview",
+    "tutorial",
     "text",
     "units",
     "expressions",
@@ -32,6 +33,7 @@ FIRST = [
     "expectations",
     "events",
     "formulations",
+    "accuracy",
     "habits",
 ]
 """The order in which the pages are read."""
@@ -48,11 +50,16 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """A fenced text of a page; code: what it shows, where it is wrong on purpose."""
+    """A fenced text of a page: a model (kind sd) or commands (sh), one a line.
+
+    code: what it shows, where it is wrong on purpose; file: the name under which commands behind it find it.
+    """
 
     topic: str
     text: str
     code: str | None
+    kind: str = "sd"
+    file: str | None = None
 
 
 @cache
@@ -91,9 +98,10 @@ def examples() -> list[Example]:
     """Every fenced text of every page."""
     found = []
     for topic in topics().values():
-        for kind, code, text in re.findall(r"^```(\w*) ?(\w*)\n(.*?)^```$", topic.text, re.M | re.S):
-            assert kind == "sd", f"{topic.name}: a fence without a language is not tested"
-            found.append(Example(topic.name, text, code or None))
+        for kind, said, text in re.findall(r"^```(\w*) ?([\w.]*)\n(.*?)^```$", topic.text, re.M | re.S):
+            assert kind in ("sd", "sh"), f"{topic.name}: a fence without a language is not tested"
+            file = said if said.endswith(".sd") else None
+            found.append(Example(topic.name, text, None if file else said or None, kind, file))
     return found
 
 
@@ -111,8 +119,9 @@ def page(topic: Topic) -> str:
             table = []
         if line.startswith("```"):
             fenced = not fenced
-            code = line.removeprefix("```sd").strip()
-            lines += [f"    # wrong: {code}"] if fenced and code else []
+            said = line.removeprefix("```sd").removeprefix("```sh").strip()
+            word = "file" if said.endswith(".sd") else "wrong"
+            lines += [f"    # {word}: {said}"] if fenced and said else []
         else:
             lines.append(f"    {line}".rstrip() if fenced else line.replace("**", ""))
     return "\n".join(lines).rstrip() + "\n"

@@ -109,6 +109,11 @@ def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
         result["relatedLocations"] = [
             {"physicalLocation": _physical(r.place), "message": {"text": r.message}} for r in d.related
         ]
+    if d.edit is not None:
+        change = _physical(d.edit.place)
+        replacement = {"deletedRegion": change["region"], "insertedContent": {"text": d.edit.text}}
+        changes = [{"artifactLocation": change["artifactLocation"], "replacements": [replacement]}]
+        result["fixes"] = [{"description": {"text": d.help or d.message}, "artifactChanges": changes}]
     return result
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Shape
@@ -134,6 +135,13 @@ class _Walk:
     def __init__(self, elaborator: Elaborator, known: Values) -> None:
         self.discretes = elaborator.parts.discretes
         self.known = known
+        self.loops: dict[int, tuple[syntax.For, ...]] = {}
+        """The loops around the declaration of a let or an output, by its symbol's identity."""
+        for space, body in elaborator.bodies:
+            for statement, loops in body:
+                if isinstance(statement, (syntax.Let, syntax.Output)) and loops:
+                    symbol = space.scope.symbols.get(statement.decl.name)
+                    self.loops[id(symbol)] = loops
 
     def inside(self, scope: Scope, shown: str, read: str, around: int) -> Iterator[_Candidate]:
         """shown, read: the path to the scope, with its dot; around: how many indices that path holds."""
@@ -156,7 +164,7 @@ class _Walk:
     def _members(self, symbol: Symbol, shown: str, read: str, member: str = "") -> Iterator[_Candidate]:
         """member: of a bundle, whose array is indexed at its own name."""
         kind, tails, shape = self._offers(symbol)
-        above, here = self._indices(shape)
+        above, here = self._indices(shape) if id(symbol) not in self.loops else _ranges(self.loops[id(symbol)])
         paths = f"{shown}{above}{member}", f"{read}{here}{member}"
         if isinstance(symbol, TwoPortSymbol):
             for k, branch in enumerate(symbol.branches):
@@ -183,7 +191,9 @@ class _Walk:
                 return "two-port", _PORTS, symbol.branches[0].family.shape
             case ConstraintSymbol():
                 return "constraint", (".multiplier", ".residual"), symbol.family.shape
-            case Definition() if symbol.kind != "const" and not symbol.at:
+            case Definition() if symbol.kind != "const" and (not symbol.at or id(symbol) in self.loops):
+                if symbol.implied:
+                    return "", (), ()
                 return symbol.kind, ("", "'") if symbol.kind == "let" else ("",), ()
             case ParameterSymbol() if symbol.family.name in self.discretes:
                 return "discrete", ("",), symbol.shape
@@ -200,6 +210,13 @@ class _Walk:
     def _whole(self, node: object) -> str:
         number = self.known.number(node)  # type: ignore[arg-type]
         return str(int(number)) if math.isfinite(number) else "1"
+
+
+def _ranges(loops: tuple[syntax.For, ...]) -> tuple[str, str]:
+    """The indices of a let in loops: as shown, and those of its first element."""
+    bounds = [(format_expression(loop.lower), format_expression(loop.upper)) for loop in loops]
+    shown = ", ".join(f"{first}..{last}" for first, last in bounds)
+    return f"[{shown}]", f"[{', '.join(first for first, _ in bounds)}]"
 
 
 def _candidates(

@@ -7,6 +7,7 @@ made only where all its factors are units.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, names, si_text
 
@@ -186,7 +187,16 @@ _QUANTITY = re.compile(
 )
 
 
-def chained(text: str, offset: int) -> str | None:
+@dataclass(frozen=True, slots=True)
+class Chained:
+    """A quantity whose unit was written as a product: its offsets in the text, and how it is written here."""
+
+    start: int
+    end: int
+    right: str
+
+
+def chained(text: str, offset: int) -> Chained | None:
     """The quantity around an offset whose unit was written as a product: `3 kN*s/m` or `3 N m`; None where none is."""
     first = text.rfind("\n", 0, offset) + 1
     last = text.find("\n", offset)
@@ -196,7 +206,8 @@ def chained(text: str, offset: int) -> str | None:
             unit = re.sub(r"[ \t]*([.*/·])[ \t]*", r"\1", match.group(2))
             unit = re.sub(r"[ \t]+", ".", unit)
             right = _normal(unit)
-            return f"{match.group(1)} {right}" if right else None
+            found = f"{match.group(1)} {right}"
+            return Chained(match.start() + first, match.end() + first, found) if right else None
     return None
 
 

@@ -15,6 +15,7 @@ from sysdyn.dsl.names.context import Context, Failed, SeveralError, Value
 from sysdyn.dsl.names.symbols import Definition, FunctionSymbol, Space, TableSymbol, Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.tree import syntax
+from sysdyn.dsl.tree.walking import children
 
 
 class Calls(Context):
@@ -100,10 +101,11 @@ class Calls(Context):
             raise self.fail("E319", "quasi(w) is what a work acts on", e.span, help="work E on quasi(w)")
         if e.name not in dim.FUNCTIONS:
             texts = [self.source.text[a.span.start : a.span.end] for a in e.args]
-            help_ = habits.function(e.name, texts)
-            if help_ is None:
-                near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
-                help_ = f"nearest name in scope: '{near}'" if near else None
+            remedy = habits.function(e.name, texts)
+            if remedy is not None and not self.scope.is_broken(e.name):
+                raise self.remedied("E101", f"unknown function '{e.name}'", e.span, remedy)
+            near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
+            help_ = f"nearest name in scope: '{near}'" if near else None
             if self.scope.is_broken(e.name):
                 raise Failed
             raise self.fail("E101", f"unknown function '{e.name}'", e.span, help=help_)
@@ -215,12 +217,7 @@ def walk(root: syntax.Expr) -> Iterator[object]:
     while stack:
         node = stack.pop()
         yield node
-        for name in getattr(type(node), "__slots__", ()):
-            child = getattr(node, name)
-            for part in child if isinstance(child, tuple) else (child,):
-                for item in part if isinstance(part, tuple) else (part,):
-                    if type(item).__module__.startswith("sysdyn.dsl.tree.syntax"):
-                        stack.append(item)
+        stack += children(node)
 
 
 def _times(a: Typed, b: Typed) -> Typed:

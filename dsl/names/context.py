@@ -17,9 +17,19 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.units import NONE, Dimension
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.symbols import Definition, InstanceSymbol, ParameterSymbol, Scope, Space, Typed, Vector
-from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.names.symbols import (
+    Definition,
+    InstanceSymbol,
+    ParameterSymbol,
+    Scope,
+    Space,
+    Typed,
+    UnknownSymbol,
+    Vector,
+)
+from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.dsl.tree.walking import children
 
 Value = Typed | Vector
 
@@ -224,6 +234,13 @@ class Context:
         self.report.error(code, message, self.place(span), **more)  # type: ignore[arg-type]
         return Failed()
 
+    def remedied(self, code: str, message: str, span: syntax.Span, remedy: habits.Remedy) -> Failed:
+        """Report an error whose remedy may be certain; raise what is returned."""
+        edit = None
+        if remedy.meant is not None:
+            edit = Edit(self.source.place(*(remedy.span or span)), remedy.meant)
+        return self.fail(code, message, span, help=remedy.said, edit=edit)
+
     # -- entries -------------------------------------------------------------------------------------------
 
     def resolve(self, expression: syntax.Expr) -> Value:
@@ -302,11 +319,38 @@ class Context:
                     if isinstance(s, ParameterSymbol) and not s.shape and factor and s.dimension == factor:
                         return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
                 level = level.outer
-        for expression, factor in zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False):
-            bare = self._bare(expression)
-            if bare is not None and factor:
-                return habits.unitless(*bare, factor)
-        return None
+        pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
+        bare = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := self._bare(e))]
+        # a prime is forgotten more often than it is too much
+        rates = sorted(filter(None, (self._rate(e, factor) for e, factor in pairs)), key=lambda said: said[-2] == "'")
+        said = [*bare, *rates]
+        return said[0] if said else None
+
+    def _rate(self, expression: syntax.Expr, factor: Dimension) -> str | None:
+        """A prime that is missing, or one too many: an expression is off by a time (or its square), and one thing in
+        it moves.
+        """
+        powers = dict(factor)
+        if set(powers) != {"s"} or abs(powers["s"]) not in (1, 2):
+            return None
+        primed, plain = set(), set()
+        stack: list[object] = [expression]
+        while stack:
+            e = stack.pop()
+            if isinstance(e, syntax.Prime):
+                primed.add(self._written(e.base))
+            elif isinstance(e, syntax.Name) and isinstance(self.scope.find(e.name), UnknownSymbol):
+                plain.add(e.name)
+            elif not isinstance(e, (syntax.Member, syntax.Method)):
+                stack += children(e)
+        found = primed if powers["s"] > 0 else plain
+        if len(found) != 1:
+            return None
+        (name,) = found
+        return f"{name} in place of {name}'?" if powers["s"] > 0 else f"{name}' in place of {name}?"
+
+    def _written(self, e: syntax.Expr) -> str:
+        return " ".join(self.source.text[e.span.start : e.span.end].split())
 
     def _bare(self, expression: syntax.Expr) -> tuple[str, str | None] | None:
         """The one parameter among the factors of an expression that is a bare number: its name and that number."""

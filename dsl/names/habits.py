@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from sysdyn.dsl.model.unit_habits import chained, common
 from sysdyn.dsl.model.units import Dimension, known
@@ -57,30 +58,44 @@ _DERIVATIVES = frozenset({"der", "diff", "ddt", "deriv", "derivative", "D", "dot
 _ENDINGS = ("_dot", "dot", "_d", "_prime", "Dot")
 
 
-def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> str | None:
+@dataclass(frozen=True, slots=True)
+class Remedy:
+    """What to write; meant: what certainly belongs at start..end (of the name, where None) instead."""
+
+    said: str
+    meant: str | None = None
+    span: tuple[int, int] | None = None
+
+
+def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> Remedy | None:
     """What to write for an unknown name at an offset of a text; moves: whether a name has a rate."""
     for ending in _ENDINGS:
         base = word.removesuffix(ending)
         if base != word and moves(base):
-            return f"{base}'"
+            return Remedy(f"{base}'", f"{base}'")
     if len(word) > 1 and word[0] == "d" and moves(word[1:]):
-        return f"{word[1:]}'"
+        return Remedy(f"{word[1:]}'")
     if known(word) is not None:
         quantity = chained(text, offset)
         if quantity is not None:
-            return f"{quantity}: a unit is written without spaces, its factors are joined by dots"
-    return _NAMES.get(word)
+            said = f"{quantity.right}: a unit is written without spaces, its factors are joined by dots"
+            return Remedy(said, quantity.right, (quantity.start, quantity.end))
+    right = _NAMES.get(word)
+    return None if right is None else Remedy(right, None if right == "g0" else right)
 
 
-def function(word: str, arguments: list[str]) -> str | None:
+def function(word: str, arguments: list[str]) -> Remedy | None:
     """What to write for an unknown function of these arguments (as texts)."""
     if word in _DERIVATIVES and arguments:
         inner = arguments[0]
-        simple = inner.replace(".", "").replace("_", "").replace("'", "").isalnum()
-        return f"{inner}'" if simple else f"let y = {inner}, and y' where its rate is read"
+        if inner.replace(".", "").replace("_", "").replace("'", "").isalnum():
+            return Remedy(f"{inner}'", f"{inner}'" if len(arguments) == 1 or arguments[1] == "t" else None)
+        return Remedy(f"let y = {inner}, and y' where its rate is read")
     if word in ("pow", "power") and len(arguments) == 2:
-        return "^".join(a if a.replace("_", "").replace(".", "").isalnum() else f"({a})" for a in arguments)
-    return _FUNCTIONS.get(word)
+        whole = "^".join(a if a.replace("_", "").replace(".", "").isalnum() else f"({a})" for a in arguments)
+        return Remedy(whole, whole)
+    right = _FUNCTIONS.get(word)
+    return None if right is None else Remedy(right)
 
 
 def unitless(name: str, value: str | None, factor: Dimension) -> str:

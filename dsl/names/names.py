@@ -110,10 +110,11 @@ class Names(Context):
         if self.statics:
             return self.fail("E908", f"unknown static quantity '{name}'", span, help=f"one of {', '.join(STATICS)}")
         code, message = self._unknown
-        help_ = habits.name(name, self.source.text, span.start, self._moves)
-        if help_ is None:
-            near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
-            help_ = f"nearest name in scope: '{near}'" if near else None
+        remedy = habits.name(name, self.source.text, span.start, self._moves)
+        if remedy is not None:
+            return self.remedied(code, message.format(name), span, remedy)
+        near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
+        help_ = f"nearest name in scope: '{near}'" if near else None
         return self.fail(code, message.format(name), span, help=help_)
 
     def _moves(self, name: str) -> bool:
@@ -149,8 +150,9 @@ class Names(Context):
                     "E104", f"element '{symbol.name}' is not a value", span, help=f"a member: {symbol.name}.f"
                 )
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
-                meant = habits.name(symbol.name, self.source.text, span.start, self._moves)
-                raise self.fail("E104", f"'{symbol.name}' is not a value", span, help=meant)
+                remedy = habits.name(symbol.name, self.source.text, span.start, self._moves)
+                message = f"'{symbol.name}' is not a value"
+                raise self.remedied("E104", message, span, remedy) if remedy else self.fail("E104", message, span)
 
     def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
         if not all(name in self._bound for name in symbol.at):

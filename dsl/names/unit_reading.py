@@ -7,7 +7,7 @@ from fractions import Fraction
 from sysdyn.dsl.model.unit_habits import declaration, respelled
 from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Dimension, Unit, known, multiply, names, si_text
 from sysdyn.dsl.names.symbols import Scope, nearest
-from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
 
@@ -50,6 +50,7 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: 
         return  # grown to its number, as in 10k: that has been said (E114)
     message = f"'{factor.name}' is not a unit, in '{unit.text}'"
     help_: str | None
+    edit = None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
     if scope.find(factor.name) is not None and before:
         sign = "/" if factor.op == "/" else "*"
@@ -57,7 +58,10 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: 
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
     else:
         help_ = _meant(unit, factor)
-    report.error("E201", message, place, help=help_)
+        right = respelled(unit.text)
+        if right is not None:
+            edit = Edit(Place(place.source, unit.span), right)
+    report.error("E201", message, place, help=help_, edit=edit)
 
 
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from sysdyn.dsl.model.unit_habits import chained, respelled, scaled
 from sysdyn.dsl.model.units import known
 from sysdyn.dsl.parser.complaints import Complaint
+from sysdyn.dsl.text.source import Span
 
 _DIGITS_BEFORE = re.compile(r"[0-9]+$")
 _DIGITS = re.compile(r"[0-9]+")
@@ -16,17 +18,26 @@ _PARTS |= {"I": "current(i = 1 A)", "D": "diode()", "K": "spring(k = 1 N/m)", "M
 _EXAMPLES = {"e3": "kohm", "e6": "Mohm", "e-6": "uF", "e-3": "mH", "e-9": "nF", "e-12": "pF"}
 
 
-def glued(number: str, unit: str) -> str:
-    """What is meant by a number with something grown to it: `3kg`, `5Nm`, `10k`, `4u7`."""
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A foreign spelling: what is said about it; meant: what certainly belongs at the span instead, if anything."""
+
+    complaint: Complaint
+    meant: str | None = None
+    span: Span | None = None
+
+
+def glued(number: str, unit: str) -> tuple[str, str | None]:
+    """What is meant by a number with something grown to it (`3kg`, `5Nm`, `10k`), and what it is for certain."""
     plain = scaled(number + unit)
     if plain is not None and known(unit) is None:
         digits, _, exponent = plain.partition("e")
         example = _EXAMPLES.get(f"e{exponent}")
-        return f"{plain}, or with its unit, as in '{digits} {example}'" if example else plain
-    if known(unit.partition(".")[0].partition("/")[0].partition("^")[0]):
-        return f"{number} {unit}"
-    right = respelled(unit)
-    return f"{number} {right}" if right else f"{number} {unit}, or {number}*{unit} for a product"
+        return f"{plain}, or with its unit, as in '{digits} {example}'" if example else plain, None
+    right = unit if known(unit.partition(".")[0].partition("/")[0].partition("^")[0]) else respelled(unit)
+    if right:
+        return f"{number} {right}", f"{number} {right}"
+    return f"{number} {unit}, or {number}*{unit} for a product", None
 
 
 def spice(word: str, after: str) -> str | None:
@@ -39,30 +50,44 @@ def spice(word: str, after: str) -> str | None:
     return f"{word}: {part} {ends[0]} -> {ends[1]}"
 
 
-def around(text: str, start: int, end: int, kind: str) -> Complaint | None:
-    """The complaint about a token at start..end that other languages explain; None for any other."""
+def around(text: str, start: int, end: int, kind: str) -> Slip | None:
+    """The slip at a token start..end that other languages explain; None for any other."""
     sign = text[start:end]
-    line = text[text.rfind("\n", 0, start) + 1 : start]
+    first = text.rfind("\n", 0, start) + 1
+    line = text[first:start]
     before = _DIGITS_BEFORE.search(line)
     if sign == "," and before and (behind := _DIGITS.match(text, end)):
         meant = f"{before.group()}.{behind.group()}"
-        meant += f", or {before.group()}{behind.group()}" if len(behind.group()) == 3 else ""
-        return "E113", "a comma separates; decimals follow a point", meant
-    if sign in ("/", "*") and line.endswith("/"):
-        return "E113", "a remark is no part of a statement", "a comment begins with '#'"
-    if sign == "0" and line.rstrip().endswith("->"):
-        return "E113", "the reference of every domain has a name", "ground"
-    if kind in ("<name>", "(") and line.endswith(")"):
-        return "E113", "a product is written with its sign", f")*{sign}"
+        span = Span(first + before.start(), behind.end())
+        if len(behind.group()) == 3:
+            either = f"{meant}, or {before.group()}{behind.group()}"
+            return Slip(("E113", "a comma separates; decimals follow a point", either))
+        return Slip(("E113", "a comma separates; decimals follow a point", meant), meant, span)
     quantity = chained(text, start)
     if quantity is not None and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
-        return "E113", "a unit is written without spaces, its factors are joined by dots", f"write '{quantity}'"
-    if sign == "°" and text[end : end + 1] == "C":
-        return "E113", "'°C' is no unit of a quantity: its zero is not 0 K", "celsius(20)"
+        said = "a unit is written without spaces, its factors are joined by dots"
+        return Slip(("E113", said, f"write '{quantity.right}'"), quantity.right, Span(quantity.start, quantity.end))
+    return _known_sign(text, Span(start, end), kind, line)
+
+
+def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
+    """The slips that one sign tells."""
+    sign = text[span.start : span.end]
+    before = _DIGITS_BEFORE.search(line)
+    if sign in ("/", "*") and line.endswith("/"):
+        return Slip(("E113", "a remark is no part of a statement", "a comment begins with '#'"))
+    if sign == "*" and line.endswith("*"):
+        return Slip(("E113", "a power is written with '^'", "a^b"), "^", Span(span.start - 1, span.end))
+    if sign == "0" and line.rstrip().endswith("->"):
+        return Slip(("E113", "the reference of every domain has a name", "ground"), "ground")
+    if kind in ("<name>", "(") and line.endswith(")"):
+        return Slip(("E113", "a product is written with its sign", f")*{sign}"))
+    if sign == "°" and text[span.end : span.end + 1] == "C":
+        return Slip(("E113", "'°C' is no unit of a quantity: its zero is not 0 K", "celsius(20)"))
     if sign == "?":
-        return "E113", "a choice is written in words", "if c then a else b"
+        return Slip(("E113", "a choice is written in words", "if c then a else b"))
     if kind == "<name>" and re.search(r"[0-9][ \t]+if[ \t]+$", line):
-        return "E113", "the condition of a choice comes first", "if c then a else b"
-    if sign == "." and before and not text[end : end + 1].isdigit():
-        return "E113", "a number ends with a digit", f"{before.group()}.0"
+        return Slip(("E113", "the condition of a choice comes first", "if c then a else b"))
+    if sign == "." and before and not text[span.end : span.end + 1].isdigit():
+        return Slip(("E113", "a number ends with a digit", f"{before.group()}.0"), ".0")
     return None

@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.diagnostics import Edit, Report
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree.syntax import Decl, Number, Quantity, Unit, UnitFactor, Word
 
@@ -30,9 +30,13 @@ class Notes:
     report: Report = field(default_factory=Report)
     docs: dict[int, str] = field(default_factory=dict)
 
-    def error(self, code: str, message: str, span: Span, help: str | None = None) -> None:
-        """Add a finding at a span."""
-        self.report.error(code, message, self.source.place(span.start, span.end), help=help)
+    def error(
+        self, code: str, message: str, span: Span, help: str | None = None, edit: tuple[Span, str] | None = None
+    ) -> None:
+        """Add a finding at a span; edit: a span and what is certainly meant there."""
+        place = self.source.place(span.start, span.end)
+        change = None if edit is None else Edit(self.source.place(*edit[0]), edit[1])
+        self.report.error(code, message, place, help=help, edit=change)
 
     def doc(self, span: Span) -> str | None:
         """The documentation above the statement of that span."""

@@ -67,19 +67,19 @@ class Recovery:
             if automaton.accepts(kind):
                 return kind
             if kind == "==" and automaton.accepts("="):
-                self._error(("E111", f"'==' compares; {self._defined()}", "="), self._token())
+                self._error(("E111", f"'==' compares; {self._defined()}", "="), self._token(), "=")
                 kind = "="
             elif kind == ":=" and automaton.accepts("="):
-                self._error(("E113", f"':=' assigns at an event; {self._defined()}", "="), self._token())
+                self._error(("E113", f"':=' assigns at an event; {self._defined()}", "="), self._token(), "=")
                 kind = "="
             elif kind == "=" and automaton.accepts(":="):
-                self._error(("E113", "an action assigns with ':='", ":="), self._token())
+                self._error(("E113", "an action assigns with ':='", ":="), self._token(), ":=")
                 kind = ":="
             elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
                 self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
                 kind = "<name>"
             elif kind == "=" and automaton.accepts("=="):
-                self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token())
+                self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token(), "==")
                 kind = "=="
         return kind
 
@@ -90,8 +90,8 @@ class Recovery:
         unit = scanner.unit or (scanner.end, scanner.end)
         text = scanner.text
         word = complaints.quoted(text[scanner.start : scanner.end])
-        help_ = foreign.glued(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
-        self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token())
+        help_, meant = foreign.glued(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
+        self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token(), meant)
         return "<quantity>" if self.automaton.accepts("<quantity>") else "<number>"
 
     def _defined(self) -> str:
@@ -149,8 +149,8 @@ class Recovery:
             self._error(("E112", "the text that begins with this '\"' is not closed on its line", '"'), self._token())
         elif bracket is not None:
             self._not_closed(bracket)
-        elif (complaint := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:
-            self._error(complaint, self._token())
+        elif (slip := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:
+            self._error(slip.complaint, self._token(), slip.meant, slip.span)
         elif kind == "<fault>":
             self._error(complaints.character(text), self._token())
         elif scanner.suspect is not None:
@@ -389,8 +389,9 @@ class Recovery:
         scanner = self.scanner
         return Span(scanner.start, scanner.end)
 
-    def _error(self, complaint: Complaint, span: Span) -> None:
-        """Report a complaint."""
+    def _error(self, complaint: Complaint, span: Span, meant: str | None = None, where: Span | None = None) -> None:
+        """Report a complaint; meant: what certainly belongs at the span (or where) instead."""
         self.errors += 1
         code, message, help_ = complaint
-        self.automaton.notes.error(code, message, span, help_)
+        edit = None if meant is None else (where or span, meant)
+        self.automaton.notes.error(code, message, span, help_, edit)

@@ -12,7 +12,7 @@ from typing import Any
 
 from sysdyn.dsl.text.source import Place, SourceText, Span
 
-__all__ = ["Diagnostic", "ModelError", "Place", "Related", "Report", "SourceText", "Span"]
+__all__ = ["Diagnostic", "Edit", "ModelError", "Place", "Related", "Report", "SourceText", "Span"]
 
 _SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
 
@@ -31,6 +31,14 @@ class Related:
 
 
 @dataclass(frozen=True, slots=True)
+class Edit:
+    """What can safely be written in a place instead: the meaning that the author had for certain."""
+
+    place: Place
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnostic:
     """One finding; `place` is None only for what belongs to no text (a command-line value)."""
 
@@ -41,6 +49,8 @@ class Diagnostic:
     related: tuple[Related, ...] = ()
     label: str | None = None
     """A short text beside the carets, where the message alone does not say what is marked."""
+    edit: Edit | None = None
+    """The remedy as a change of the text, where there is one without a choice (`check --fix`, SARIF)."""
 
     @property
     def severity(self) -> str:
@@ -102,9 +112,10 @@ class Report:
         help: str | None = None,
         related: Iterable[Related] = (),
         label: str | None = None,
+        edit: Edit | None = None,
     ) -> None:
         """Add a finding; its severity follows from the code's letter."""
-        self.add(Diagnostic(code, message, place, help, tuple(related), label))
+        self.add(Diagnostic(code, message, place, help, tuple(related), label, edit))
 
     warning = error
     note = error

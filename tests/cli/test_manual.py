@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import browser
 import pytest
+from pages import read
 from sysdyn.cli.main import run
-from sysdyn.cli.manual import library
+from sysdyn.cli.manual import library, topics
+from sysdyn.dsl.text import codes
 from sysdyn.dsl.tree import syntax
 
 GALLERY = Path(__file__).resolve().parents[2] / "models" / "gallery"
@@ -137,3 +140,46 @@ def test_index_of_the_library_names_everything(capsys):
 def test_unknown_names_of_the_library_lead_on(name, said, capsys):
     assert run(["std", name]) == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.fixture
+def site(tmp_path, capsys):
+    assert run(["help", "--html", "site.html"]) == 0
+    assert capsys.readouterr().out == ""
+    return tmp_path / "site.html"
+
+
+def test_the_page_of_everything_is_whole_and_loads_nothing(site):
+    page = read(site)  # links and ids fit, nothing comes from outside
+    assert page.scripts == []
+    assert set(topics.topics()) | {"std", "codes"} | set(codes.codes()) <= set(page.ids)
+    assert {f"std-{e.module}-{e.name}" for e in library.entries()} <= set(page.ids)
+    words = page.words
+    for example in topics.examples():
+        assert example.text.strip("\n") in words
+    for entry in COMPONENTS:
+        assert library.example(entry).strip("\n") in words
+        assert entry.doc in words
+    for code in codes.codes().values():
+        assert code.title in words
+    assert len(page.links) > 60, "pages and codes are linked where they are named"
+    assert "**" not in words.replace("x**2", "").replace("x'**2", "")
+
+
+def test_the_page_of_everything_goes_to_standard_output(capsys):
+    assert run(["help", "--html", "-"]) == 0
+    assert capsys.readouterr().out.startswith("<!doctype html>")
+    assert run(["help", "units", "--html", "-"]) == 2
+
+
+@pytest.mark.skipif(browser.found() is None, reason="there is no browser")
+@pytest.mark.parametrize("width", [1200, 380])
+def test_the_page_of_everything_in_a_browser(site, width):
+    made = browser.Browser(width=width)
+    try:
+        made.open(site)
+        assert made.errors == []
+        assert [r for r in made.requests if not r.startswith("file:")] == []
+        assert made.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), "it scrolls sideways"
+    finally:
+        made.close()

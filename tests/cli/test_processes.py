@@ -108,6 +108,15 @@ def test_help_costs_little():
     assert helped - bare < 0.2
 
 
+@pytest.mark.parametrize("command", ["simulate", "verify", "report", "golden", "plot", "diff", "new", "doctor"])
+def test_help_of_a_command_costs_little(command):
+    """Target 0.15 s of CPU over bare Python."""
+    assert not imported(command, "--help") & HEAVY
+    bare = min(cost("pass") for _ in range(3))
+    helped = min(cost(COMMAND, command, "--help") for _ in range(3))
+    assert helped - bare < 0.15
+
+
 def test_fmt_and_plot_import_what_they_need(tmp_path):
     path = write(tmp_path, PENDULUM)
     assert not imported("fmt", "--check", path) & (HEAVY - {"lark"})

@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import sysdyn
@@ -105,3 +106,16 @@ def test_the_package_says_its_version_and_is_the_command():
     command = [sys.executable, "-m", "sysdyn", "--version"]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert ran.stdout.strip() == f"sysdyn, version {sysdyn.__version__}"
+
+
+def test_the_hooks_of_pre_commit_pass_on_a_new_project(tmp_path, monkeypatch, capsys):
+    text = (Path(__file__).resolve().parents[2] / ".pre-commit-hooks.yaml").read_text()
+    entries = re.findall(r"^  entry: sysdyn (.*)$", text, re.M)
+    assert [e.split()[0] for e in entries] == ["fmt", "check"]
+    assert re.findall(r"^  files: (.*)$", text, re.M) == [r"\.sd$"] * 2
+    assert run(["new", "swing", "--quiet"]) == 0
+    monkeypatch.chdir(tmp_path / "swing")
+    before = (tmp_path / "swing" / "swing.sd").read_bytes()
+    for entry in entries:
+        assert run([*entry.split(), "swing.sd"]) == 0
+    assert (tmp_path / "swing" / "swing.sd").read_bytes() == before

@@ -168,3 +168,20 @@ def test_another_module_has_it():
         load.network(document, document.models["m"], None, report)
     ((code, help_),) = [(d.code, d.help) for d in report]
     assert (code, help_) == ("E103", "from std.electrical import resistor")
+
+
+PRIMES = [
+    (("param d = 3 N.s/m", "work -d*x on x"), "x' in place of x?"),
+    (("param k = 3 N/m", "work -k*x' on x"), "x in place of x'?"),
+    (("param d = 3 N.s/m", "param k = 3 N/m", "work -k*x - d*x on x"), "x' in place of x?"),
+    (("energy T* = 1/2*(3 kg)*x^2",), "x' in place of x?"),
+    (("energy V = 1/2*(3 N/m)*x'^2",), "x in place of x'?"),
+    (("coord y: translation = 0 m", "psi tie: x' = 2*y"), "y' in place of y?"),
+]
+
+
+@pytest.mark.parametrize(("lines", "said"), PRIMES, ids=[p[0][-1] for p in PRIMES])
+def test_a_forgotten_prime(lines, said):
+    ((code, _, help_),) = findings(*lines)
+    assert code in ("E203", "E208")
+    assert help_ == said

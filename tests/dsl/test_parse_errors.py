@@ -70,7 +70,7 @@ CASES = [
     ("foo", "E113", 3, "no statement begins with 'foo'", None),
     ("work: mass(m = 1 kg) x", "E113", 3, "cannot be the label", "work_: ..."),
     ("let y = a < b < c", "E113", 17, "found '<'", "do not chain"),
-    ("let y = 1 ** 2", "E113", 14, "expected an expression, found '*'", "a^b"),
+    ("let y = 1 ** 2", "E113", 14, "a power is written with '^'", "a^b"),
     ("let y = .5", "E113", 11, "expected an expression, found '.'", "0.5"),
     ("let y = +5", "E113", 11, "expected an expression, found '+'", "leading '+'"),
     ("let y = 1 +", "E113", 13, "the statement ends with '+'", None),
