@@ -150,13 +150,14 @@ class Sheets:
         """M, Phi_q, Psi_f, Y, Z1, Z2."""
         lines = []
         for matrix in matrices(self.algebra, self.compiled.form):
-            text, latex = (
-                [[w.sum_of([Summed((), t) for t in entry]) for entry in row] for row in matrix.rows] for w in self.writers
-            )
+            text, latex = ([[self._entry(w, e) for e in row] for row in matrix.rows] for w in self.writers)
             texts = (matrix.name, _grid(text)), (_NAMES[matrix.name], _array(latex))
             lines.append(Line("matrix", matrix.name, *texts, ("", ""), None))
         order = ", ".join(self.writers[0].expression(n) for n in unknowns(self.compiled.form, "f"))
         return Sheet((), tuple(lines), ((("f", f"({order})", 0),)))
+
+    def _entry(self, writer: Writer, terms: Sequence[Node]) -> str:
+        return writer.sum_of([Summed((), term) for term in terms])
 
     def energies(self) -> Iterator[Line]:
         """State functions and virtual work."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.joining import joined
+from sysdyn.compiler.equations.joining import joined, shorter
 from sysdyn.compiler.equations.pieces import Piece, pieces
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations
 from sysdyn.compiler.forms.lowering import whole
@@ -103,12 +103,13 @@ def _of_row(algebra: Algebra, row: Equations, found: Sequence[Piece]) -> Iterato
         yield Equation(row.block, row.owner, row.place, left, right, where, fixed, number > 0)
 
 
-def gathered(algebra: Algebra, parts: Sequence[tuple[Nest, Node]]) -> tuple[Summed, ...]:
-    """Terms under one nest joined."""
+def gathered(algebra: Algebra, parts: Sequence[tuple[Nest, Node]], *, whole: bool = False) -> tuple[Summed, ...]:
+    """Terms under one nest joined; whole: squares of differences stay where that is shorter."""
     nests: dict[Nest, list[Node]] = {}
     for over, expression in parts:
         nests.setdefault(over, []).append(expression)
-    return tuple(Summed(over, term) for over, some in nests.items() for term in joined(algebra, add(*some)))
+    join = shorter if whole else joined
+    return tuple(Summed(over, term) for over, some in nests.items() for term in join(algebra, add(*some)))
 
 
 def sides(block: str, terms: Sequence[Summed]) -> tuple[tuple[Summed, ...], tuple[Summed, ...]]:
@@ -150,14 +151,15 @@ def functions(algebra: Algebra, model: EnergyModel) -> Iterator[Function]:
     """State functions in the letters of the reflection, and virtual work as sum of Q_j delta q_j."""
     for name in FUNCTIONS:
         if model.function(name):
-            yield Function(name, gathered(algebra, [(t.loops, t.expression) for t in model.function(name)]))
-    parts: dict[tuple[Nest, Node], list[Node]] = {}
+            parts = [(t.loops, t.expression) for t in model.function(name)]
+            yield Function(name, gathered(algebra, parts, whole=True))
+    works: dict[tuple[Nest, Node], list[Node]] = {}
     for work in model.works:
         for node in sorted(variables(work.on), key=lambda n: n.number):
             if node.op == "var":
                 effort = mul(work.effort, derivative(work.on, node))
-                parts.setdefault((work.loops, node), []).append(effort)
-    efforts = {key: joined(algebra, add(*found)) for key, found in parts.items()}
+                works.setdefault((work.loops, node), []).append(effort)
+    efforts = {key: joined(algebra, add(*found)) for key, found in works.items()}
     if any(efforts.values()):
         yield Function("W", (), tuple(Effort(loops, terms, on) for (loops, on), terms in efforts.items() if terms))
 
