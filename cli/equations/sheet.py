@@ -8,7 +8,17 @@ from dataclasses import dataclass
 from sysdyn.cli.equations.letters import Letters
 from sysdyn.cli.equations.writing import Latex, Text, Writer
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.book import Effort, Equation, Function, Summed, equations, functions
+from sysdyn.compiler.equations.book import (
+    CO_WORDS,
+    REFLECTED,
+    WORDS,
+    Effort,
+    Equation,
+    Function,
+    Summed,
+    equations,
+    functions,
+)
 from sysdyn.compiler.equations.matrices import canonical, matrices, underlying, unknowns
 from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.model.terms import Nest
@@ -17,18 +27,7 @@ from sysdyn.dsl.model.expression import Node, index
 from sysdyn.dsl.text.diagnostics import Place
 
 MOST = 400
-"""Equations that are printed."""
-REFLECTED = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D", "W": "W"}
-WORDS = {
-    "kinematic": "rate of",
-    "dynamics": "balance of",
-    "momentum": "momentum of",
-    "phi": "displacement constraint",
-    "psi": "flow constraint",
-    "gamma": "effort constraint",
-    "lambda": "dynamic of",
-}
-CO_WORDS = {"momentum": "displacement of", "phi": "momentum constraint", "psi": "effort constraint"}
+"""Row families that are printed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +129,10 @@ class Sheets:
 
     def descriptor(self) -> Sheet:
         """Energy functions and every equation of the formulation."""
-        found = list(equations(self.algebra, self.compiled.energies, self.compiled.form))
-        shown = tuple(self.line(e) for e in found[:MOST])
-        return Sheet(tuple(self.energies()), shown, tuple(self.legend()), max(len(found) - MOST, 0))
+        form = self.compiled.form
+        found = tuple(self.line(e) for e in equations(self.algebra, self.compiled.energies, form, MOST))
+        more = sum(r.block in WORDS for r in form.rows) - MOST
+        return Sheet(tuple(self.energies()), found, tuple(self.legend()), max(more, 0))
 
     def underlying(self) -> Sheet:
         """Rates and multipliers solved for."""
@@ -187,7 +187,7 @@ class Sheets:
         words = WORDS | CO_WORDS if self.complementary else WORDS
         pairs = [(w.sum_of(equation.left), w.sum_of(equation.right)) for w in self.writers]
         conditions = [self._condition(w, equation.where, equation.fixed) for w in self.writers]
-        label = f"{words.get(equation.kind, equation.kind)} {equation.owner}".strip()
+        label = f"{words.get(equation.kind, 'rate of')} {equation.owner}".strip()
         if equation.more:
             pairs = [("", right) for _, right in pairs]
         ends = (conditions[0], conditions[1])

@@ -22,6 +22,18 @@ from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, var, va
 from sysdyn.dsl.text.diagnostics import Place
 
 FUNCTIONS = ("T*", "T", "V", "V*", "D", "G")
+REFLECTED = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D", "W": "W"}
+"""Names of state functions in the reflected family."""
+WORDS = {
+    "dynamics": "balance of",
+    "momentum": "momentum of",
+    "phi": "displacement constraint",
+    "psi": "flow constraint",
+    "gamma": "effort constraint",
+    "lambda": "dynamic of",
+}
+CO_WORDS = {"momentum": "displacement of", "phi": "momentum constraint", "psi": "effort constraint"}
+"""What rows are called, and in the complementary family."""
 BLOCKS = ("dynamics", "momentum", "phi", "psi", "gamma", "lambda")
 
 
@@ -72,12 +84,12 @@ class Function:
     efforts: tuple[Effort, ...] = ()
 
 
-def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
-    """Every equation: q' = f, then the rows in their order."""
+def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm, most: int) -> Iterator[Equation]:
+    """Every equation: q' = f, then the rows in their order, of so many families at most."""
     yield from kinematics(model, form)
-    for number, row in enumerate(form.rows):
-        if row.block in BLOCKS:
-            yield from _of_row(algebra, row, pieces(form, number))
+    rows = [(number, row) for number, row in enumerate(form.rows) if row.block in BLOCKS]
+    for number, row in rows[:most]:
+        yield from _of_row(algebra, row, pieces(form, number))
 
 
 def kinematics(model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
