@@ -110,7 +110,8 @@ def _coordinates(settled: System) -> tuple[Floats, Floats, Floats]:
     families, form = settled.description.families, settled.form
     first = {settled.description.rows[k].owner: row for group, k, row in form.groups if group == "dynamics"}
     displacement = {f.owner: int(form.at[k]) for k, f in enumerate(families) if f.kind == "q"}
-    flows, places, rows = [], [], []
+    nothing = np.zeros(0)
+    flows, places, rows = [nothing], [nothing], [nothing]
     for k, family in enumerate(families):
         if family.kind != "f":
             continue

@@ -132,6 +132,24 @@ def test_redundant_constraints_do_not_disturb(capsys):
     assert found[0]["free"] == ["th"]
 
 
+def test_dynamic_variables_alone(tmp_path, capsys):
+    """Van der Pol: 0 is unstable, its eigenvalues are those of s^2 - mu s + 1."""
+    text = """
+    model vdp {
+      param mu = 0.5
+      param tau = 1 s
+      state x: 1 = 0.1
+      state y: 1 = 0
+      dynamic x' = y/tau
+      dynamic y' = (mu*(1 - x^2)*y - x)/tau
+    }
+    """
+    (found,) = rests(capsys, write(tmp_path, text))
+    assert found["stability"] == "unstable"
+    ours = sorted((complex(*v) for v in found["eigenvalues"]), key=lambda v: v.imag)
+    assert ours == pytest.approx(sorted(np.roots([1, -0.5, 1]), key=lambda v: v.imag), rel=1e-10)
+
+
 FREE = """
 model free_mass {
   param m = 1 kg
