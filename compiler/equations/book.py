@@ -13,16 +13,17 @@ from dataclasses import dataclass
 
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.joining import joined, shorter
+from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import Piece, pieces
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations
 from sysdyn.compiler.forms.lowering import whole
 from sysdyn.compiler.model.energies import EnergyModel, Family
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, var, variables
+from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 
 FUNCTIONS = ("T*", "T", "V", "V*", "D", "G")
-REFLECTED = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D", "W": "W"}
+REFLECTED = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D", "W": "W", "H": "H"}
 """Names of state functions in the reflected family."""
 WORDS = {
     "dynamics": "balance of",
@@ -82,6 +83,13 @@ class Function:
     name: str
     terms: tuple[Summed, ...]
     efforts: tuple[Effort, ...] = ()
+
+
+def algebra_of(form: DescriptorForm, parameters: Sequence[str]) -> Algebra:
+    """Symbols for a form: its unknowns as it lists them, parameters as they were declared."""
+    scalars = {owner for owner, shape in form.shapes if not shape} | {o for o, places in form.hulls if not places[0][0]}
+    known = [var(f.owner, f.kind) for f in form.families if f.owner in scalars and f.kind != "audit"]
+    return Algebra(Order(parameters), [*known, *map(param, parameters)])
 
 
 def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm, most: int) -> Iterator[Equation]:

@@ -110,8 +110,10 @@ def _coordinates(settled: System) -> tuple[Floats, Floats, Floats]:
     families, form = settled.description.families, settled.form
     first = {settled.description.rows[k].owner: row for group, k, row in form.groups if group == "dynamics"}
     displacement = {f.owner: int(form.at[k]) for k, f in enumerate(families) if f.kind == "q"}
-    nothing = np.zeros(0)
-    flows, places, rows = [nothing], [nothing], [nothing]
+    nothing = np.zeros(0, dtype=np.int64)
+    flows: list[NDArray[np.integer]] = [nothing]
+    places: list[NDArray[np.integer]] = [nothing]
+    rows: list[NDArray[np.integer]] = [nothing]
     for k, family in enumerate(families):
         if family.kind != "f":
             continue

@@ -197,6 +197,12 @@ def test_latex(capsys):
     assert found.count(r"\begin{align*}") == found.count(r"\end{align*}") == 2
 
 
+def test_a_page(capsys):
+    found = printed(capsys, "pendulum", "--html")
+    assert found.startswith("<!doctype html>")
+    assert found.count("<math>") == found.count("</math>") == 5  # two functions, three rows
+
+
 # -- numbers -----------------------------------------------------------------------------------------------------------
 
 
