@@ -50,11 +50,15 @@ class Verdict:
     energy: Energy | None
 
 
-def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None) -> Verdict:
-    """What both methods say together; loose [unknowns]: what nothing depends on."""
+def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, together: int = 0) -> Verdict:
+    """What both methods say together; loose [unknowns]: what nothing depends on; together: directions in which
+    displacements move without changing anything: so many eigenvalues at zero say nothing.
+    """
     felt = np.flatnonzero((small.places >= 0) & ~loose[small.places])
     values = np.linalg.eigvals(balanced(small.a[np.ix_(felt, felt)])[0]) if felt.size else np.zeros(0)
     near = STILL * float(np.abs(values).max(initial=0.0))
+    values = values[np.argsort(np.abs(values))]
+    values = values[min(together, int((np.abs(values) <= near).sum())) :]
     found = modes(small.a)
     if (values.real > near).any():
         return Verdict("unstable", "linearisation", found, energy)
