@@ -225,9 +225,12 @@ def _of_pencil(found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Redu
 
 
 def _felt_moves(system: System, small: Reduced, found: Found) -> bool:
-    """Whether a state moves that something depends on."""
+    """Whether the motion changes what the matrices say: not where all that moves goes on steadily."""
     state = found.state
     yd = state.yd.copy()
     yd[system.form.k_q] = state.y[system.form.k_f]
-    places = small.places[(np.abs(small.a).max(axis=0, initial=0.0) > 0.0) & (small.places >= 0)]
-    return bool((np.abs(yd[places]) > MOVING * np.maximum(np.abs(state.y[places]), 1.0)).any())
+    rates = np.where(small.places >= 0, yd[small.places], 0.0)
+    size = np.maximum(np.abs(state.y[small.places]), 1.0)
+    rates = np.where(np.abs(rates) > MOVING * size, rates, 0.0)
+    changes = small.a @ rates
+    return bool((np.abs(changes) > MOVING * np.maximum(np.abs(small.a) @ np.abs(rates), 1e-300)).any())

@@ -104,7 +104,7 @@ def _judged(found: Found, rest: Rest) -> Equilibrium:
     primal = found.prepared.formulation in ("lagrangian", "hamiltonian")
     with np.errstate(all="ignore"):
         energy = energy_at(system, rest.state) if primal else None
-    return Equilibrium(rest, names, kinds, verdict(small, loose_of(here), energy), "")
+    return Equilibrium(rest, names, kinds, verdict(small, loose_of(here), energy, rest.together), "")
 
 
 def _complex(value: complex) -> str:

@@ -18,8 +18,9 @@ from sysdyn.cli.run.running import Request
 def command(console: Console, tries: int, no_prune: bool, index: str | None, **options: Any) -> int:
     """States of rest of a model of FILE, from its guesses and from random points around them, and their stability.
 
-    Every rate is zero but those of displacements that nothing depends on: these may go on steadily. Time is held at the
-    scene's start. Stability by eigenvalues and, where the efforts have a potential, by its stiffness.
+    Every rate is zero but those of displacements that nothing depends on, alone or as they move together: these may
+    go on steadily. Time is held at the scene's start. Stability by eigenvalues and, where the efforts have a potential,
+    by its stiffness.
     """
     from sysdyn.cli.analysis.resting import equilibria
     from sysdyn.cli.analysis.states import NO_REST

@@ -1,40 +1,61 @@
-"""Which equations are printed for a --form."""
+"""What a --form consists of."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from sysdyn.cli.analysis.asked import begun
 from sysdyn.cli.analysis.linear import inputs_of, linearised
-from sysdyn.cli.equations.sheet import Sheet, Sheets
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.targets import Target
-from sysdyn.compiler.equations.book import Equation, Summed
-from sysdyn.compiler.equations.matrices import NoSuchEquations
+from sysdyn.compiler.equations.book import WORDS, Equation, Function, Summed, algebra_of, equations, functions
+from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying
 from sysdyn.dsl.model.expression import Node, const, param, scale, var
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.tangent import NoLinearisation
 from sysdyn.runtime.model.system import System
 
+MOST = 400
+"""Row families that are printed."""
 
-def sheet_of(
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a form consists of; more: row families that were left out."""
+
+    functions: tuple[Function, ...] = ()
+    equations: tuple[Equation, ...] = ()
+    matrices: tuple[Matrix, ...] = ()
+    more: int = 0
+
+
+def content_of(
     target: Target, prepared: Prepared, form: str, request: Request, report: Report
-) -> Sheet | None:
-    """The sheet; None where the report says why there is none.  Raises NoSuchEquations."""
-    sheets = Sheets(prepared.compiled, [c.name for c in prepared.network.coordinates])
+) -> Content | None:
+    """The content of a --form; None where the report says why there is none.  Raises NoSuchEquations."""
+    compiled = prepared.compiled
+    algebra = algebra_of(compiled.form, [p.name for p in compiled.network.parameters if not p.shape])
     match form:
         case "matrices":
-            return sheets.matrices()
+            return Content(matrices=matrices(algebra, compiled.form))
         case "canonical":
-            return sheets.canonical()
+            function, found = canonical(algebra, compiled.energies, compiled.form)
+            return Content((function,), tuple(found))
         case "underlying":
-            return sheets.underlying()
+            return Content(equations=tuple(underlying(algebra, compiled.form)))
         case "linear":
-            return _linear(sheets, target, prepared, request, report)
+            return _linear(target, prepared, request, report)
         case _:
-            return sheets.descriptor()
+            more = sum(r.block in WORDS for r in compiled.form.rows) - MOST
+            return Content(
+                tuple(functions(algebra, compiled.energies)),
+                tuple(equations(algebra, compiled.energies, compiled.form, MOST)),
+                more=max(more, 0),
+            )
 
 
-def _linear(sheets: Sheets, target: Target, prepared: Prepared, request: Request, report: Report) -> Sheet | None:
+def _linear(target: Target, prepared: Prepared, request: Request, report: Report) -> Content | None:
     """The equations x' = A x + B u about the start, in numbers; x and u are deviations."""
     found = begun(target, prepared, request, report)
     if found is None:
@@ -54,8 +75,8 @@ def _linear(sheets: Sheets, target: Target, prepared: Prepared, request: Request
         rate = var(node.data[0], node.data[1], *node.args, order=1)
         right = tuple(Summed((), term) for term in terms)
         name = system.name(int(small.places[k]))
-        lines.append(sheets.line(Equation("linear", name, None, (Summed((), rate),), right)))
-    return Sheet((), tuple(lines), ())
+        lines.append(Equation("linear", name, None, (Summed((), rate),), right))
+    return Content(equations=tuple(lines))
 
 
 def unknown_node(system: System, place: int) -> Node:

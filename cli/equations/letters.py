@@ -83,3 +83,8 @@ def named(text: str, order: int = 0) -> Letter:
         return Letter(own, tuple(path), order)
     below = found[2] or found[3]
     return Letter(found[1], (*((below,) if below else ()), *(part for part in path if part)), order)
+
+
+def is_letter(text: str) -> bool:
+    """Whether a name is a letter, with an index or without."""
+    return _NAME.fullmatch(text) is not None

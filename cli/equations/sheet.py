@@ -5,30 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from sysdyn.cli.equations.forms import Content
 from sysdyn.cli.equations.letters import Letters
 from sysdyn.cli.equations.writing import Latex, Text, Writer
-from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.book import Effort, Equation, Function, Summed, equations, functions
-from sysdyn.compiler.equations.matrices import canonical, matrices, underlying, unknowns
+from sysdyn.compiler.equations.book import (
+    CO_WORDS,
+    REFLECTED,
+    WORDS,
+    Effort,
+    Equation,
+    Function,
+    Summed,
+)
+from sysdyn.compiler.equations.matrices import Matrix, unknowns
 from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.compiler.pipeline import CompiledModel
 from sysdyn.dsl.model.expression import Node, index
 from sysdyn.dsl.text.diagnostics import Place
-
-MOST = 400
-"""Equations that are printed."""
-REFLECTED = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D", "W": "W"}
-WORDS = {
-    "kinematic": "rate of",
-    "dynamics": "balance of",
-    "momentum": "momentum of",
-    "phi": "displacement constraint",
-    "psi": "flow constraint",
-    "gamma": "effort constraint",
-    "lambda": "dynamic of",
-}
-CO_WORDS = {"momentum": "displacement of", "phi": "momentum constraint", "psi": "effort constraint"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +66,7 @@ class Sheet:
         parts = [_block(self.functions)] if self.functions else []
         parts.append(_block(self.equations) + (f"\n... {self.more} more" if self.more else ""))
         if self.legend:
-            said = (f"{s} of {owner}, line {line}" if line else f"{s} = {owner}" for s, owner, line in self.legend)
+            said = (f"{s} of {owner}, line {line}" if owner else s for s, owner, line in self.legend)
             parts.append("\n".join(said))
         return "\n\n".join(parts)
 
@@ -125,48 +119,33 @@ class Sheets:
         self.letters = Letters(compiled.form, named)
         order = Order([p.name for p in compiled.network.parameters])
         self.writers: tuple[Writer, Writer] = (Text(self.letters, order), Latex(self.letters, order))
-        self.algebra = Algebra(order)
         self.complementary = compiled.form.formulation.startswith("co_")
 
-    def descriptor(self) -> Sheet:
-        """Energy functions and every equation of the formulation."""
-        found = list(equations(self.algebra, self.compiled.energies, self.compiled.form))
-        shown = tuple(self.line(e) for e in found[:MOST])
-        return Sheet(tuple(self.energies()), shown, tuple(self.legend()), max(len(found) - MOST, 0))
+    def sheet(self, content: Content) -> Sheet:
+        """What is printed, in both alphabets."""
+        lines = [self._matrix(m) for m in content.matrices] + [self.line(e) for e in content.equations]
+        legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
+        return Sheet(tuple(self.named(f) for f in content.functions), tuple(lines), legend, content.more)
 
-    def underlying(self) -> Sheet:
-        """Rates and multipliers solved for."""
-        found = underlying(self.algebra, self.compiled.form)
-        return Sheet((), tuple(self.line(e) for e in found), tuple(self.legend()))
+    def _matrix(self, matrix: Matrix) -> Line:
+        text, latex = ([[self._entry(w, e) for e in row] for row in matrix.rows] for w in self.writers)
+        texts = (matrix.name, _grid(text)), (_NAMES[matrix.name], _array(latex))
+        return Line("matrix", matrix.name, *texts, ("", ""), None)
 
-    def canonical(self) -> Sheet:
-        """Hamilton's equations in q and p."""
-        function, found = canonical(self.algebra, self.compiled.energies, self.compiled.form)
-        texts = tuple(self._function(writer, function) for writer in self.writers)
-        line = Line("function", "H", ("H", texts[0]), ("H", texts[1]), ("", ""), None)
-        return Sheet((line,), tuple(self.line(e) for e in found), tuple(self.legend()))
-
-    def matrices(self) -> Sheet:
-        """M, Phi_q, Psi_f, Y, Z1, Z2."""
-        lines = []
-        for matrix in matrices(self.algebra, self.compiled.form):
-            text, latex = (
-                [[w.sum_of([Summed((), t) for t in entry]) for entry in row] for row in matrix.rows]
-                for w in self.writers
-            )
-            texts = (matrix.name, _grid(text)), (_NAMES[matrix.name], _array(latex))
-            lines.append(Line("matrix", matrix.name, *texts, ("", ""), None))
+    def _flows(self) -> str:
         order = ", ".join(self.writers[0].expression(n) for n in unknowns(self.compiled.form, "f"))
-        return Sheet((), tuple(lines), ((("f", f"({order})", 0),)))
+        return f"f = ({order})"
 
-    def energies(self) -> Iterator[Line]:
-        """State functions and virtual work."""
-        for function in functions(self.algebra, self.compiled.energies):
-            texts = tuple(self._function(writer, function) for writer in self.writers)
-            name = REFLECTED[function.name] if self.complementary else function.name
-            name = f"δ{name}" if function.name == "W" else name
-            latex = name.replace("δ", "\\delta ").replace("*", "^{*}")
-            yield Line("function", name, (name, texts[0]), (latex, texts[1]), ("", ""), None)
+    def _entry(self, writer: Writer, terms: Sequence[Node]) -> str:
+        return writer.sum_of([Summed((), term) for term in terms])
+
+    def named(self, function: Function) -> Line:
+        """A state function or virtual work."""
+        texts = tuple(self._function(writer, function) for writer in self.writers)
+        name = REFLECTED[function.name] if self.complementary else function.name
+        name = f"δ{name}" if function.name == "W" else name
+        latex = name.replace("δ", "\\delta ").replace("*", "^{*}")
+        return Line("function", name, (name, texts[0]), (latex, texts[1]), ("", ""), None)
 
     def _function(self, writer: Writer, function: Function) -> str:
         if function.name != "W":
@@ -187,7 +166,7 @@ class Sheets:
         words = WORDS | CO_WORDS if self.complementary else WORDS
         pairs = [(w.sum_of(equation.left), w.sum_of(equation.right)) for w in self.writers]
         conditions = [self._condition(w, equation.where, equation.fixed) for w in self.writers]
-        label = f"{words.get(equation.kind, equation.kind)} {equation.owner}".strip()
+        label = f"{words.get(equation.kind, 'rate of')} {equation.owner}".strip()
         if equation.more:
             pairs = [("", right) for _, right in pairs]
         ends = (conditions[0], conditions[1])

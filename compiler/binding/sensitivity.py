@@ -2,9 +2,11 @@
 
 A parameter u that moves in time moves the differentiated rows by its rates too: of r(y, t, u) = 0
 
-    d r'/du' = dr/du        d r''/du'' = dr/du        d r''/du' = 2 d/dt (dr/du)        (at u' = u'' = 0)
+    d r'/du' = dr/du        d r''/du'' = dr/du        (at u' = u'' = 0)
 
-A flow constraint that was integrated took u for a constant (q - u t - q0): of a u that moves it is the integral,
+The coefficients dr/du count as held, as those of the linearisation do: their own rates are left out (of a source
+E sin(w t) they would belong to the change of the state's coordinates, not to its motion).  A flow constraint that was
+integrated took u for a constant (q - u t - q0): of a u that moves it is the integral,
 
     dr = dr'/du int du dt        d r''/du' = dr'/du
 
@@ -30,8 +32,6 @@ from sysdyn.dsl.model.expression import (
     differential,
     is_const,
     mul,
-    scale,
-    time_derivative,
     topological,
 )
 from sysdyn.dsl.model.network import Parameter
@@ -70,11 +70,10 @@ class Sensitivity:
         by_u = {b.name: _changed(b, self._slope) for b in form.blocks}
         held, summed = _split(form, by_u)
         yield [_gathered(form, summed, "phi", ("phi_rate",), _same)]
-        yield list(held.values())
+        derived = (*RATES, "phi_acceleration")
+        yield [*(b for name, b in held.items() if name not in derived), *summed.values()]
         rates = [_gathered(form, held, name, base, _same) for name, base in RATES.items()]
-        twice = _gathered(form, held, "phi_acceleration", ("phi",), lambda e: scale(2.0, time_derivative(e)))
-        once = _gathered(form, summed, "phi_acceleration", ("phi_rate",), _same)
-        yield [*rates, Block(twice.name, twice.kernels + once.kernels)]
+        yield [*rates, _gathered(form, summed, "phi_acceleration", ("phi_rate",), _same)]
         yield [_gathered(form, held, "phi_acceleration", ("phi",), _same)]
 
     def _following(self, parameters: Sequence[Parameter]) -> dict[str, Node]:

@@ -6,6 +6,7 @@ Numbers are taken as the decimals they were written as, so that factors stay rea
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from sysdyn.compiler.equations.order import Order
@@ -18,9 +19,11 @@ _NAMES = {
 
 
 class Algebra:
-    """A pair of dictionaries: leaves of ours and symbols of sympy's."""
+    """A pair of dictionaries: leaves of ours and symbols of sympy's, which sort as `leaves` (then as they are met):
+    signs of factors follow that order.
+    """
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: Order, leaves: Iterable[Node] = ()) -> None:
         import sympy
 
         self.sympy: Any = sympy
@@ -28,6 +31,8 @@ class Algebra:
         self.spent = 0  # operations for which shorter forms were looked for
         self._symbols: dict[Node, Any] = {}
         self._nodes: dict[Any, Node] = {}
+        for leaf in leaves:
+            self.symbol(leaf)
 
     def symbol(self, node: Node) -> Any:
         """The symbol that stands for a node."""

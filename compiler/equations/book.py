@@ -12,16 +12,29 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.joining import joined
+from sysdyn.compiler.equations.joining import joined, shorter
+from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import Piece, pieces
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations
 from sysdyn.compiler.forms.lowering import whole
 from sysdyn.compiler.model.energies import EnergyModel, Family
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, var, variables
+from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 
 FUNCTIONS = ("T*", "T", "V", "V*", "D", "G")
+REFLECTED = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D", "W": "W", "H": "H"}
+"""Names of state functions in the reflected family."""
+WORDS = {
+    "dynamics": "balance of",
+    "momentum": "momentum of",
+    "phi": "displacement constraint",
+    "psi": "flow constraint",
+    "gamma": "effort constraint",
+    "lambda": "dynamic of",
+}
+CO_WORDS = {"momentum": "displacement of", "phi": "momentum constraint", "psi": "effort constraint"}
+"""What rows are called, and in the complementary family."""
 BLOCKS = ("dynamics", "momentum", "phi", "psi", "gamma", "lambda")
 
 
@@ -72,12 +85,19 @@ class Function:
     efforts: tuple[Effort, ...] = ()
 
 
-def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
-    """Every equation: q' = f, then the rows in their order."""
+def algebra_of(form: DescriptorForm, parameters: Sequence[str]) -> Algebra:
+    """Symbols for a form: its unknowns as it lists them, parameters as they were declared."""
+    scalars = {owner for owner, shape in form.shapes if not shape} | {o for o, places in form.hulls if not places[0][0]}
+    known = [var(f.owner, f.kind) for f in form.families if f.owner in scalars and f.kind != "audit"]
+    return Algebra(Order(parameters), [*known, *map(param, parameters)])
+
+
+def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm, most: int) -> Iterator[Equation]:
+    """Every equation: q' = f, then the rows in their order, of so many families at most."""
     yield from kinematics(model, form)
-    for number, row in enumerate(form.rows):
-        if row.block in BLOCKS:
-            yield from _of_row(algebra, row, pieces(form, number))
+    rows = [(number, row) for number, row in enumerate(form.rows) if row.block in BLOCKS]
+    for number, row in rows[:most]:
+        yield from _of_row(algebra, row, pieces(form, number))
 
 
 def kinematics(model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
@@ -103,12 +123,13 @@ def _of_row(algebra: Algebra, row: Equations, found: Sequence[Piece]) -> Iterato
         yield Equation(row.block, row.owner, row.place, left, right, where, fixed, number > 0)
 
 
-def gathered(algebra: Algebra, parts: Sequence[tuple[Nest, Node]]) -> tuple[Summed, ...]:
-    """Terms under one nest joined."""
+def gathered(algebra: Algebra, parts: Sequence[tuple[Nest, Node]], *, whole: bool = False) -> tuple[Summed, ...]:
+    """Terms under one nest joined; whole: squares of differences stay where that is shorter."""
     nests: dict[Nest, list[Node]] = {}
     for over, expression in parts:
         nests.setdefault(over, []).append(expression)
-    return tuple(Summed(over, term) for over, some in nests.items() for term in joined(algebra, add(*some)))
+    join = shorter if whole else joined
+    return tuple(Summed(over, term) for over, some in nests.items() for term in join(algebra, add(*some)))
 
 
 def sides(block: str, terms: Sequence[Summed]) -> tuple[tuple[Summed, ...], tuple[Summed, ...]]:
@@ -150,14 +171,15 @@ def functions(algebra: Algebra, model: EnergyModel) -> Iterator[Function]:
     """State functions in the letters of the reflection, and virtual work as sum of Q_j delta q_j."""
     for name in FUNCTIONS:
         if model.function(name):
-            yield Function(name, gathered(algebra, [(t.loops, t.expression) for t in model.function(name)]))
-    parts: dict[tuple[Nest, Node], list[Node]] = {}
+            parts = [(t.loops, t.expression) for t in model.function(name)]
+            yield Function(name, gathered(algebra, parts, whole=True))
+    works: dict[tuple[Nest, Node], list[Node]] = {}
     for work in model.works:
         for node in sorted(variables(work.on), key=lambda n: n.number):
             if node.op == "var":
                 effort = mul(work.effort, derivative(work.on, node))
-                parts.setdefault((work.loops, node), []).append(effort)
-    efforts = {key: joined(algebra, add(*found)) for key, found in parts.items()}
+                works.setdefault((work.loops, node), []).append(effort)
+    efforts = {key: joined(algebra, add(*found)) for key, found in works.items()}
     if any(efforts.values()):
         yield Function("W", (), tuple(Effort(loops, terms, on) for (loops, on), terms in efforts.items() if terms))
 

@@ -49,6 +49,19 @@ def joined(algebra: Algebra, root: Node) -> tuple[Node, ...]:
     return tuple(found)
 
 
+def shorter(algebra: Algebra, root: Node) -> tuple[Node, ...]:
+    """The terms of an expression, as written or joined, whichever is shorter."""
+    plain = algebra.sympy.Add.make_args(algebra.object(root))
+    written = tuple(ordered(algebra, algebra.node(part)) for part in plain if part != 0)
+    found = joined(algebra, root)
+    return min((found, written), key=lambda terms: length(algebra, terms))
+
+
+def length(algebra: Algebra, terms: Sequence[Node]) -> int:
+    """Operations of a sum of terms."""
+    return len(terms) + sum(int(algebra.object(term).count_ops()) for term in terms)
+
+
 def _leading(leaf: Node) -> tuple[int, int]:
     """Rates first, then multipliers, then the rest, as they were made."""
     kind, order = leaf.data[1], leaf.data[2]

@@ -17,7 +17,7 @@ from typing import Any
 
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import Equation, Function, Summed, gathered, sides
-from sysdyn.compiler.equations.joining import joined, ordered, shortest
+from sysdyn.compiler.equations.joining import joined, length, ordered, shortest
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.dsl.model.expression import Node, add, const, derivative, neg, product, substitute, var, variables
@@ -145,11 +145,7 @@ def _quotient(algebra: Algebra, value: Any) -> tuple[Node, ...]:
     terms = joined(algebra, algebra.node(rest))
     parts = ((1.0, algebra.node(factor)), (1.0, add(*terms)), (-1.0, algebra.node(below)))
     whole = ordered(algebra, product(1.0, parts))
-    return apart if _length(algebra, apart) <= _length(algebra, (whole,)) else (whole,)
-
-
-def _length(algebra: Algebra, terms: Sequence[Node]) -> int:
-    return len(terms) + sum(int(algebra.object(term).count_ops()) for term in terms)
+    return apart if length(algebra, apart) <= length(algebra, (whole,)) else (whole,)
 
 
 def _solved(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> list[Any]:

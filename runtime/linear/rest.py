@@ -2,7 +2,9 @@
 
     0 = U - Phi_q^T kappa - Psi_f^T mu   at f' = 0, p' = 0;   Phi = 0, Psi = 0, Gamma = 0, Lambda = 0, momenta
 
-with f = 0 of every coordinate whose displacement something depends on, time held.  Newton's method (least change, see
+with f = 0 of every coordinate whose displacement something depends on, time held; where all rows depend on differences
+of displacements alone (shafts that turn together), f may lie along the directions V in which none changes:
+(1 - V V^T) f = 0.  Newton's method (least change, see
 numerics/least_change.py) from the guesses and from seeded random points around them.
 Receives a System and what of it is tangible.  Hands on states of rest, each once.
 """
@@ -39,11 +41,14 @@ NEAREST, FARTHEST = -1.0, 1.5
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """A state of rest; residual: largest row relative to its terms; free: unknowns that it leaves open, by name."""
+    """A state of rest; residual: largest row relative to its terms; free: unknowns that it leaves open, by name;
+    together: directions in which displacements may move together without changing anything.
+    """
 
     state: ConsistentState
     residual: float
     free: tuple[str, ...]
+    together: int = 0
 
 
 class Resting:
@@ -60,6 +65,33 @@ class Resting:
         self.use = self._use()
         self.turns = np.array([families[int(k)].unit == "rad" for k in system.family_of[: self.n]], dtype=bool)
         self.turns &= system.kinds[: self.n] == "q"
+        self.along = self._together()
+
+    def _together(self) -> Floats:
+        """Orthonormal flows [flows of tangible coordinates, k] along which no row changes, wherever the model is.
+
+        Displacement constraints that are linear may move: their rates are rows of their own.
+        """
+        flows = np.flatnonzero(self.still)
+        at = dict(zip(self.system.form.k_f.tolist(), self.system.form.k_q.tolist(), strict=True))
+        if not flows.size or self.n > DENSE or any(int(k) not in at for k in flows):
+            return np.zeros((flows.size, 0))
+        places = np.array([at[int(k)] for k in flows])
+        random = np.random.default_rng(11)
+        points = [self.first, *(self.first + self._spread() * random.standard_normal(self.n) for _ in range(2))]
+        with np.errstate(all="ignore"):
+            matrices = [self.rows.dense(self.jacobian(y)) for y in points]
+        if not all(np.isfinite(m).all() for m in matrices):
+            return np.zeros((flows.size, 0))
+        linear = np.all([(m == matrices[0]).all(axis=1) for m in matrices], axis=0) & self.starter.groups("phi")
+        stacked = np.vstack([m[self.use & ~linear][:, places] for m in matrices])
+        row, _ = factors(stacked)
+        return null_space(row[:, None] * stacked) if stacked.size else np.eye(flows.size)
+
+    def _spread(self) -> Floats:
+        """How far points lie from the guess."""
+        x = np.concatenate([self.first, np.zeros(self.starter.first - self.n)])
+        return 0.3 * self.starter.scale(self.t, x)[: self.n]
 
     def _use(self) -> Mask:
         """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
@@ -79,8 +111,14 @@ class Resting:
         return slice(first, first + families[k].size)
 
     def residual(self, y: Floats) -> Floats:
-        """All rows at rest [rows]."""
-        return self.rows.residual(self.t, y, self.rates(y))
+        """All rows at rest [rows], then those of the flows that may not go on [flows of tangible coordinates]."""
+        rows = self.rows.residual(self.t, y, self.rates(y))
+        return np.concatenate([rows, self._held @ y[self.still]]) if self.along.size else rows
+
+    @property
+    def _held(self) -> Floats:
+        """1 - V V^T."""
+        return np.eye(self.along.shape[0]) - self.along @ self.along.T
 
     def rates(self, y: Floats) -> Floats:
         """Rates at rest: displacements go on with their flows."""
@@ -89,8 +127,12 @@ class Resting:
         return yd
 
     def jacobian(self, y: Floats) -> Floats:
-        """Values by y on the pattern of the rows."""
+        """Values by y on the pattern of the rows alone."""
         return self.rows.jacobian(self.t, y, self.rates(y))[0]
+
+    def _slopes(self, y: Floats) -> Floats:
+        values = self.jacobian(y)
+        return np.concatenate([values, self._held.ravel()]) if self.along.size else values
 
     def problem(self, guess: Floats) -> Problem:
         """Rest nearest to a guess."""
@@ -98,14 +140,21 @@ class Resting:
         scale = self.starter.scale(self.t, x)[: self.n]
         follows = np.isin(self.system.kinds[: self.n], ("kappa", "mu", "e"))
         pattern = self.rows.pattern
+        rows, columns = pattern.row.astype(np.int64), pattern.columns_of().astype(np.int64)
+        use, free = self.use, ~self.still
+        if self.along.size:
+            flows = np.flatnonzero(self.still)
+            rows = np.concatenate([rows, self.rows.rows + np.repeat(np.arange(flows.size), flows.size)])
+            columns = np.concatenate([columns, np.tile(flows, flows.size)])
+            use, free = np.append(use, np.ones(flows.size, dtype=bool)), np.ones_like(free)
         return Problem(
             residual=self.residual,
-            jacobian=self.jacobian,
-            rows=pattern.row.astype(np.int64),
-            columns=pattern.columns_of().astype(np.int64),
-            number=self.rows.rows,
-            use=self.use,
-            free=~self.still,
+            jacobian=self._slopes,
+            rows=rows,
+            columns=columns,
+            number=use.size,
+            use=use,
+            free=free,
             guess=guess,
             scale=scale,
             weight=np.where(follows, 1e-3, 1.0),
@@ -114,7 +163,8 @@ class Resting:
 
     def found(self, guess: Floats) -> Rest | None:
         """The state of rest that Newton's method comes to from a guess."""
-        guess = np.where(self.still, 0.0, guess)
+        guess = guess.copy()
+        guess[self.still] = self.along @ (self.along.T @ guess[self.still])
         problem = self.problem(guess)
         for folds in (0, FOLDS):
             best = solve(problem, guess, folds=folds)
@@ -134,7 +184,7 @@ class Resting:
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         largest = np.abs(null).max(axis=1, initial=0.0)
         free = tuple(self.system.name(int(k)) for k in np.flatnonzero(told & (largest > SAME)))
-        return Rest(state, own.residual, free)
+        return Rest(state, own.residual, free, self.along.shape[1])
 
     def _met(self, y: Floats) -> bool:
         return solve(self.problem(y), y, 1).residual < MET
@@ -160,9 +210,13 @@ class Resting:
 
     def _null(self, y: Floats, problem: Problem) -> Floats:
         """Directions along which the rows of rest do not change [unknowns, k]."""
-        full = self.rows.dense(self.jacobian(y))[self.use][:, problem.free]
+        full = self.rows.dense(self.jacobian(y))[self.use]
+        if self.along.size:
+            held = np.zeros((self.along.shape[0], self.n))
+            held[:, self.still] = self._held
+            full = np.vstack([full, held])
+        full = full[:, problem.free]
         row, column = factors(full)
-        found = np.zeros((self.n, 0))
         null = null_space(row[:, None] * full * column)
         found = np.zeros((self.n, null.shape[1]))
         found[problem.free] = column[:, None] * null

@@ -50,11 +50,15 @@ class Verdict:
     energy: Energy | None
 
 
-def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None) -> Verdict:
-    """What both methods say together; loose [unknowns]: what nothing depends on."""
+def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, together: int = 0) -> Verdict:
+    """What both methods say together; loose [unknowns]: what nothing depends on; together: directions in which
+    displacements move without changing anything: so many eigenvalues at zero say nothing.
+    """
     felt = np.flatnonzero((small.places >= 0) & ~loose[small.places])
     values = np.linalg.eigvals(balanced(small.a[np.ix_(felt, felt)])[0]) if felt.size else np.zeros(0)
     near = STILL * float(np.abs(values).max(initial=0.0))
+    values = values[np.argsort(np.abs(values))]
+    values = values[min(together, int((np.abs(values) <= near).sum())) :]
     found = modes(small.a)
     if (values.real > near).any():
         return Verdict("unstable", "linearisation", found, energy)
@@ -110,7 +114,10 @@ def _coordinates(settled: System) -> tuple[Floats, Floats, Floats]:
     families, form = settled.description.families, settled.form
     first = {settled.description.rows[k].owner: row for group, k, row in form.groups if group == "dynamics"}
     displacement = {f.owner: int(form.at[k]) for k, f in enumerate(families) if f.kind == "q"}
-    flows, places, rows = [], [], []
+    nothing = np.zeros(0, dtype=np.int64)
+    flows: list[NDArray[np.integer]] = [nothing]
+    places: list[NDArray[np.integer]] = [nothing]
+    rows: list[NDArray[np.integer]] = [nothing]
     for k, family in enumerate(families):
         if family.kind != "f":
             continue

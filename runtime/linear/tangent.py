@@ -87,11 +87,6 @@ class Rows:
     jacobian: Floats
     holds: Mask
 
-    @property
-    def rates(self) -> NDArray[np.int32]:
-        """Places of y whose rates the rows read."""
-        return self.starter.rates
-
 
 def rows_at(system: System, state: ConsistentState) -> Rows:
     """Every row that holds at consistent states, linearised; system: the form as written."""

@@ -132,6 +132,56 @@ def test_redundant_constraints_do_not_disturb(capsys):
     assert found[0]["free"] == ["th"]
 
 
+def test_dynamic_variables_alone(tmp_path, capsys):
+    """Van der Pol: 0 is unstable, its eigenvalues are those of s^2 - mu s + 1."""
+    text = """
+    model vdp {
+      param mu = 0.5
+      param tau = 1 s
+      state x: 1 = 0.1
+      state y: 1 = 0
+      dynamic x' = y/tau
+      dynamic y' = (mu*(1 - x^2)*y - x)/tau
+    }
+    """
+    (found,) = rests(capsys, write(tmp_path, text))
+    assert found["stability"] == "unstable"
+    ours = sorted((complex(*v) for v in found["eigenvalues"]), key=lambda v: v.imag)
+    assert ours == pytest.approx(sorted(np.roots([1, -0.5, 1]), key=lambda v: v.imag), rel=1e-10)
+
+
+SHAFT = """
+model drive {
+  param J1 = 0.2 kg.m^2
+  param J2 = 0.5 kg.m^2
+  param k = 30 N.m/rad
+  param b = 0.4 N.m.s/rad
+  param M = 6 N.m
+  coord a, c: rotation
+  energy T* = 1/2*J1*a'^2 + 1/2*J2*c'^2
+  energy V = 1/2*k*(a - c)^2
+  content D = 1/2*b*c'^2
+  work M on a
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_two_wheels_turn_together(formulation, tmp_path, capsys):
+    """A driven shaft: speed M/b, twist M/k; one eigenvalue at zero is its angle's, the others decide."""
+    (found,) = rests(capsys, write(tmp_path, SHAFT), "--formulation", formulation)
+    assert [found["values"][n] for n in ("a'", "c'")] == pytest.approx([15.0, 15.0], rel=1e-10)
+    assert found["values"]["a"] - found["values"]["c"] == pytest.approx(0.2, rel=1e-10)
+    assert found["stability"] == "asymptotically stable"
+    assert found["free"] == ["a", "c"]
+    # J1 s^2 a = -k (a - c),  J2 s^2 c = k (a - c) - b s c
+    expected = np.roots([0.2 * 0.5, 0.2 * 0.4, 30 * 0.7, 30 * 0.4])
+    ours = [complex(*v) for v in found["eigenvalues"] if abs(complex(*v)) > 1e-9]
+    assert len(ours) == 3
+    for value in expected:
+        assert min(abs(v - value) for v in ours) < 1e-9
+
+
 FREE = """
 model free_mass {
   param m = 1 kg

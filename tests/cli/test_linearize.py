@@ -287,6 +287,13 @@ def test_a_nonholonomic_sleigh_moves_straight(tmp_path, capsys):
     assert not found["moving"]  # nothing depends on x
 
 
+def frozen_values(e, a):
+    """Finite eigenvalues of a frozen pencil of index 3: chains of infinite ones of length 3 stand near 1e-5."""
+    shift = 0.7391
+    mu = np.linalg.eigvals(np.linalg.solve(a - shift * e, e))
+    return shift + 1.0 / mu[np.abs(mu) > 1e-3]
+
+
 def test_an_input_that_is_differentiated(tmp_path, capsys):
     """A given current through a coil: v = L du/dt."""
     text = """
@@ -306,9 +313,20 @@ def test_an_input_that_is_differentiated(tmp_path, capsys):
         assert (v["gain"], v["improper"][0]) == (pytest.approx(0.0, abs=1e-12), pytest.approx(0.25, rel=CLOSE))
 
 
-def test_about_a_moving_pendulum(tmp_path, capsys):
+def test_an_amplitude_is_held_at_its_instant(capsys):
+    """E sin(w t) at 0.05 s: the filter's own transfer function times sin(w t), in either family."""
+    for formulation in ALL:
+        options = ("--inputs", "E", "--outputs", "e_o", "--at", "0.05", "--formulation", formulation)
+        (t,) = linear(capsys, SEED / "lead_filter.sd", *options)["transfer"]
+        assert t["gain"] == pytest.approx(np.sin(12.566370614359172 * 0.05), rel=1e-9), formulation
+        alike(values(t["zeros"]), [-10.0])
+        alike(values(t["poles"]), [-50.0])
+
+
+@pytest.mark.parametrize(("formulation", "mass"), [("lagrangian", 1.0), ("hamiltonian", 1.13)])
+def test_about_a_moving_pendulum(formulation, mass, capsys):
     """In q1 along the motion: the slopes of q1'' as the constraint gives it, not those of the frozen pencil."""
-    found = linear(capsys, SEED / "pendulum.sd", "--set", "th_0=0.9", "--at", "0.7", "--formulation", "lagrangian")
+    found = linear(capsys, SEED / "pendulum.sd", "--set", "th_0=0.9", "--at", "0.7", "--formulation", formulation)
     length, g = 2.34, 9.81
     q, f = sp.symbols("q f")
     y = -sp.sqrt(length**2 - q**2)
@@ -317,8 +335,12 @@ def test_about_a_moving_pendulum(tmp_path, capsys):
     acceleration = length * (sp.cos(th) * (-g / length * sp.sin(th)) - sp.sin(th) * rate**2)
     at = {q: found["point"]["q1"], f: found["point"]["q1'"]}
     slopes = [float(sp.diff(acceleration, v).subs(at)) for v in (q, f)]
-    assert found["reduced"]["states"] == ["q1", "q1'"]
-    assert np.array(found["reduced"]["A"]) == pytest.approx(np.array([[0, 1], slopes]), rel=1e-8, abs=1e-9)
+    assert found["reduced"]["states"] == ["q1", "q1'" if formulation == "lagrangian" else "q1.p"]
+    expected = np.array([[0, 1 / mass], [mass * slopes[0], slopes[1]]])
+    assert np.array(found["reduced"]["A"]) == pytest.approx(expected, rel=1e-8, abs=1e-9)
+    frozen = frozen_values(np.array(found["E"]), np.array(found["A"]))
+    own = np.linalg.eigvals(expected)
+    assert min(abs(frozen - own[0])) > 0.01 * abs(own[0])  # what the form's pencil says of a moving state
     assert float(y.subs(at)) == pytest.approx(found["point"]["q2"], rel=1e-10)
     assert found["moving"]
 
