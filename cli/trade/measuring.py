@@ -27,6 +27,8 @@ from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.trace.trace import Trace
 
 METHODS = ("dopri", "radau", "bdf")
+LARGE = 20_000
+"""Unknowns of a model of which other formulations are not kept beside its own: gigabytes each."""
 GRID = 200
 """Intervals of the trace where the scene leaves them to the solver."""
 
@@ -68,9 +70,15 @@ class Bench:
         if not self._carry(asked, self.report):
             return False
         first = next(iter(self.carried))
+        unknowns = self.carried[first].started.system.unknowns
         if asked in (None, "auto"):
             for name in FORMULATIONS:
-                if name not in ("auto", first):
+                if name in ("auto", first):
+                    continue
+                if unknowns > LARGE:
+                    why = f"the model has {unknowns} unknowns: only the formulation of the scene is measured"
+                    self.refusals.append(Refusal(name, f"{why}; --formulation {name}"))
+                else:
                     self._carry(name, Report())
         return True
 
