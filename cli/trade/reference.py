@@ -74,13 +74,13 @@ def reference(bench: Bench, budget: float | None) -> tuple[Trace, Reference]:
 
 def _ways(bench: Bench) -> Iterator[Combination]:
     """Ways to the reference: cheap and different ones first."""
-    names = list(bench.carried)
+    names, level = bench.names, bench.full
     other = names[1] if len(names) > 1 else names[0]
-    yield Combination(names[0], "0", "dopri")
-    yield Combination(other, "2", "radau")
-    yield Combination(names[0], "2", "bdf")
+    yield Combination(names[0], "0", "dopri", level)
+    yield Combination(other, "2", "radau", level)
+    yield Combination(names[0], "2", "bdf", level)
     if other != names[0]:
-        yield Combination(names[0], "2", "radau")
+        yield Combination(names[0], "2", "radau", level)
 
 
 def _finest(
