@@ -249,6 +249,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         discretes=frozenset(parts.discretes),
         events=tuple(parts.events),
         switches=tuple(parts.switches),
+        levels=tuple(elaborator.choices.values()),
         read=nodes_read(parts),
     )
 

@@ -108,7 +108,7 @@ def _lock(request: Request, found: Traded, best: Measured) -> Path:
     scene = targets.one(document, request.file, request.model, request.scene, report)
     assert scene is not None
     c = best.combination
-    held = lock.Lock(c.formulation, c.index, c.method, request.levels, best.tolerance, found.accuracy)
+    held = lock.Lock(c.formulation, c.index, c.method, c.levels, best.tolerance, found.accuracy)
     return lock.write(request.file, scene, held, version())
 
 
@@ -135,7 +135,7 @@ def command_of(request: Request, best: Measured, name: str) -> str:
     for option, value in (("--scene", scene), ("--model", request.model), ("--until", request.until)):
         words += [option, value] if value is not None else []
     words += ["--formulation", c.formulation, "--index", c.index, "--method", c.method, "--rtol", f"{best.tolerance:g}"]
-    for option, pairs in (("--set", request.settings), ("--level", request.levels)):
+    for option, pairs in (("--set", request.settings), ("--level", c.levels)):
         for key, value in pairs:
             words += [option, f"{key}={value}"]
     words += ["--redundancy", request.redundancy] if request.redundancy else []

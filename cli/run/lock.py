@@ -144,9 +144,16 @@ def _scene(held: Mapping[str, Any], target: Target) -> Lock | None:
 
 
 def taken(
-    lock: Lock, target: Target, formulation: str | None, index: str | None, method: str | None, levels: tuple[str, ...]
+    lock: Lock,
+    target: Target,
+    formulation: str | None,
+    index: str | None,
+    method: str | None,
+    levels: tuple[tuple[str, str], ...],
 ) -> Taken:
-    """What is left of a lock beside the command line (its options, paths of its levels) and the scene."""
+    """What is left of a lock beside the command line and the scene; nothing where that names another level."""
+    if any(dict(levels).get(path, name) != name for path, name in lock.levels):
+        return Taken(None, None, None, (), None, lock.accuracy, "")
     body = target.scene.body if target.scene else ()
     scene = next((s.name.name for s in body if isinstance(s, syntax.Formulation)), None)
     solver = next((s for s in body if isinstance(s, syntax.Solver)), None)
@@ -156,7 +163,8 @@ def taken(
     both = same and index in (None, lock.index) and method in (None, lock.method)
     both = both and not by_scene and (solver is None or method is not None)
     source = target.document.file.source
-    above = {*levels, *(_path(source, s.target) for s in body if isinstance(s, syntax.SceneLevel))}
+    above = {path for path, _ in levels}
+    above |= {_path(source, s.target) for s in body if isinstance(s, syntax.SceneLevel)}
     rest = tuple((path, name) for path, name in lock.levels if path not in above)
     parts = [f"formulation {lock.formulation}"] if here is None else []
     parts += [f"index {lock.index}", f"method {lock.method}", f"tolerance {lock.tolerance:g}"] if both else []

@@ -119,8 +119,7 @@ def _locked(request: Request, target: Target, report: Report) -> tuple[Request, 
     held = None if request.no_lock else lock.read(request.file, target, version(), report)
     if held is None:
         return request, None
-    given = (request.formulation, request.index, request.method)
-    found = lock.taken(held, target, *given, tuple(path for path, _ in request.levels))
+    found = lock.taken(held, target, request.formulation, request.index, request.method, request.levels)
     return replace(
         request,
         formulation=request.formulation or found.formulation,

@@ -167,6 +167,7 @@ HEADS = (
     "", "formulation", "index", "method", "tolerance", "error", "work", "of the least", "CPU, ms", "steps", "energy, J",
     "constraints", "",
 )  # fmt: skip
+"""The last column: the level where there are several, and why a run may not be chosen."""
 
 
 def cells(found: Traded, m: Measured) -> list[str]:
@@ -178,6 +179,7 @@ def cells(found: Traded, m: Measured) -> list[str]:
     meters = ["-" if x is None else f"{x:.1e}" for x in (m.energy, m.constraints)]
     c = m.combination
     reason = m.reason if len(m.reason) <= 60 else m.reason[:57] + "..."
+    reason = ", ".join(filter(None, (c.level, reason)))
     return [mark, c.formulation, c.index, c.method, *numbers, str(m.steps), *meters, reason]
 
 

@@ -22,12 +22,12 @@ FINEST = {"bdf": 1e-13, "radau": 1e-14, "dopri": 3e-14}
 """Tolerances of the runs; finer ones meet round-off."""
 SURE = 0.1
 """Of the accuracy: what two runs may be apart."""
-ENOUGH = 1e-3
+ENOUGH = 0.03
 """Of the accuracy: the error of the coarsest reference that is tried, by the law of its method."""
 STEPS = 200_000
 """Of a reference's run: more, and a coarser one will do."""
-PART = 0.2
-"""Of the budget of wall time, for one run."""
+PART, SECONDS = 0.15, 120.0
+"""Of the budget of wall time, for one run; without a budget, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +74,13 @@ def reference(bench: Bench, budget: float | None) -> tuple[Trace, Reference]:
 
 def _ways(bench: Bench) -> Iterator[Combination]:
     """Ways to the reference: cheap and different ones first."""
-    names = list(bench.carried)
+    names, level = bench.names, bench.full
     other = names[1] if len(names) > 1 else names[0]
-    yield Combination(names[0], "0", "dopri")
-    yield Combination(other, "2", "radau")
-    yield Combination(names[0], "2", "bdf")
+    yield Combination(names[0], "0", "dopri", level)
+    yield Combination(other, "2", "radau", level)
+    yield Combination(names[0], "2", "bdf", level)
     if other != names[0]:
-        yield Combination(names[0], "2", "radau")
+        yield Combination(names[0], "2", "radau", level)
 
 
 def _finest(
@@ -89,16 +89,16 @@ def _finest(
     """A run at the finest tolerance that ends in time; None where none does."""
     law, tolerance = LAWS[combination.method], FINEST[combination.method]
     coarsest = max(law.tolerance(ENOUGH * bench.accuracy), tolerance)
+    wall = SECONDS if budget is None else max(PART * budget, 1e-3)
     while True:
-        limits = Limits(STEPS, None if budget is None else max(PART * budget, 1e-3))
         began = time.monotonic()
-        ran, reason = bench.trace(combination, tolerance, limits, name=f"reference{number}")
+        ran, reason = bench.trace(combination, tolerance, Limits(STEPS, wall), name=f"reference{number}")
         if ran is not None and ran.outcome.final:
             counts = ran.outcome.statistics
             steps = counts["steps"], counts["residual_evaluations"]
             return _Run(f"{combination.name} at {tolerance:.0e}", ran.outcome.traced, steps)
-        late = budget is not None and time.monotonic() - began >= PART * budget
-        if ran is None or tolerance >= coarsest or late:
+        if ran is None or tolerance >= coarsest:
             reasons.append(f"{combination.name}: {reason}")
             return None
-        tolerance = min(100.0 * tolerance, coarsest)
+        late = time.monotonic() - began >= 0.5 * wall
+        tolerance = coarsest if late else min(100.0 * tolerance, coarsest)

@@ -25,6 +25,10 @@ JUMP = 8
 """Tolerances passed over at once, at most."""
 TRIES = 3
 """Runs that fail in a row before a combination is left."""
+UNLIKE = 0.2
+"""Of the work foreseen of its like: what a combination may hope for that has not been run."""
+FLAT = (4, 0.02)
+"""Numbers of tolerances over which errors that change by less than a part of themselves are none of the solver's."""
 PATIENCE = 3.0
 """Of the best work: a run that takes more is stopped."""
 
@@ -52,7 +56,9 @@ class Climb:
 
 @dataclass(slots=True)
 class Search:
-    """The measurements of one scene.  limit: monotonic instant at which it ends, None: none."""
+    """The measurements of one scene.  limit: monotonic instant at which it ends, None: none; flat: levels whose errors
+    no tolerance changes any more.
+    """
 
     accuracy: float
     uncertainty: float
@@ -60,6 +66,7 @@ class Search:
     limit: float | None = None
     advance: Advance | None = None
     climbs: list[Climb] = field(default_factory=list)
+    flat: dict[str, float] = field(default_factory=dict)
     ended: bool = True
     began: float = field(default_factory=time.monotonic)
 
@@ -99,8 +106,7 @@ class Search:
             planned = [(self._foreseen(climb), n, climb) for n, climb in enumerate(open_)]
             if not planned or self._late():
                 return
-            fresh = [p for p in planned if not p[2].runs]
-            _, _, climb = min(fresh or planned, key=lambda p: p[:2])
+            _, _, climb = min(planned, key=lambda p: p[:2])
             k = self._next(climb)
             if k is None:
                 continue
@@ -113,11 +119,27 @@ class Search:
     def _next(self, climb: Climb) -> int | None:
         """The number of the next tolerance; None where the combination is closed."""
         if not climb.runs:
-            return FIRST
+            return FIRST if self._worth_a_run(climb) else None
         enough = [k for k, m in climb.runs.items() if meets(m, self.accuracy, self.uncertainty)]
         if enough:
             return self._looser(climb, min(enough))
         return self._tighter(climb)
+
+    def _worth_a_run(self, climb: Climb) -> bool:
+        """Whether a combination that has not been run may win; closes it where its level or its like say no."""
+        level, best = climb.combination.level, self.best
+        if level in self.flat:
+            climb.closed = f"errors of its level stay at {self.flat[level]:.1e}"
+        elif UNLIKE * self._like(climb) > HOPE * best:
+            climb.closed = f"not run: its like take more than {HOPE / UNLIKE:.2g} times the best work"
+        return not climb.closed
+
+    def _like(self, climb: Climb) -> float:
+        """The least work foreseen of its like: in its formulation at its level, else at its level; 0 before any."""
+        a = climb.combination
+        usable = [c for c in self.climbs if any(m.usable for m in c.runs.values()) and c.combination.level == a.level]
+        same = [c for c in usable if c.combination.formulation == a.formulation]
+        return min((self._foreseen(c) for c in same or usable), default=0.0)
 
     def _looser(self, climb: Climb, k: int) -> int | None:
         """Between a tolerance that meets the accuracy and a looser one that does not."""
@@ -149,6 +171,13 @@ class Search:
             error = climb.runs[last].error
             climb.closed = f"dominated: {climb.runs[last].work / self.best:.2g} of the best work at error {error:.1e}"
             return None
+        if len(usable) > 1 and last - usable[-2] >= FLAT[0]:
+            one, two = (climb.runs[k].error or 0.0 for k in usable[-2:])
+            if abs(one - two) <= FLAT[1] * two:
+                climb.closed = f"its errors stay at {two:.1e}"
+                if climb.combination.level:
+                    self.flat[climb.combination.level] = two
+                return None
         over = math.log10(max(self._over(climb.runs[last]), 1.0))
         step = math.ceil(2.0 * over / self._power(climb, usable)) if math.isfinite(over) else 2
         return min(last + min(max(step, 1), JUMP), TIGHTEST)
@@ -170,8 +199,10 @@ class Search:
     def _foreseen(self, climb: Climb) -> float:
         """The work with which a combination is hoped to reach the accuracy."""
         usable = [climb.runs[k] for k in sorted(climb.runs) if climb.runs[k].usable]
+        if not climb.runs:
+            return self._like(climb)
         if not usable:
-            return 0.0 if not climb.runs else min(m.work for m in climb.runs.values())
+            return min(m.work for m in climb.runs.values())
         last = usable[-1]
         order = ORDER[climb.combination.method]
         steps = last.work - last.fixed
@@ -190,8 +221,8 @@ class Search:
             theirs = other.runs.get(FIRST)
             if other is climb or theirs is None or other.closed.startswith("the same"):
                 continue
-            same = other.combination.formulation, other.combination.method
-            if same == (climb.combination.formulation, climb.combination.method) and (
+            a, b = other.combination, climb.combination
+            if (a.formulation, a.method, a.level) == (b.formulation, b.method, b.level) and (
                 (mine.error, mine.statistics) == (theirs.error, theirs.statistics)
             ):
                 climb.closed = f"the same as index {other.combination.index}"

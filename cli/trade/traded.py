@@ -27,6 +27,11 @@ class Combination:
         level = f" {self.level}" if self.level else ""
         return f"{self.formulation} index {self.index} {self.method}{level}"
 
+    @property
+    def levels(self) -> tuple[tuple[str, str], ...]:
+        """(path, name) of each component whose level is chosen."""
+        return tuple((path, name) for path, _, name in (pair.partition("=") for pair in self.level.split()))
+
 
 @dataclass(frozen=True, slots=True)
 class Measured:

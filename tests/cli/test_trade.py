@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from schema import NUMBER, conforms, envelope
+from sysdyn import api
 from sysdyn.cli.main import run
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.running import run as simulate
@@ -54,6 +55,32 @@ model lorenz {
 scene chaos of lorenz {
   time 0 s to 60 s
   trace x, y, z every 100 ms
+}
+"""
+
+
+LEVELS = """\
+component bearing {
+  port a: translation
+  level plain { s: potential(e = 4 N/m*q) a -> ground }
+  level full default {
+    s: potential(e = 4 N/m*q + 0.02 N/m^3*q^3) a -> ground
+    d: dissipator(e = 1e-3 N.s/m*f) a -> ground
+    node b[1..4]: translation = 1 m
+    k0: potential(e = 90 N/m*q) a -> b[1]
+    for i in 1..4 { m[i]: kinetic(p = 1e-3 kg*f) b[i] }
+    for i in 1..3 { k[i]: potential(e = 90 N/m*q) b[i] -> b[i+1] }
+  }
+}
+model osc {
+  node x: translation = 1 m
+  body: kinetic(p = 1 kg*f) x
+  B: bearing() a = x
+  init body.f = 0 m/s
+}
+scene run of osc {
+  time 0 s to 3 s
+  trace x.q as q every 10 ms
 }
 """
 
@@ -171,6 +198,26 @@ def test_a_chaotic_scene_counts_errors_as_far_as_its_finest_runs_agree(tmp_path,
     assert 10.0 < known["until"] < 50.0
     assert known["error"] <= 1e-3
     assert found["result"]["chosen"]["error"] <= 1e-3
+
+
+@pytest.mark.parametrize(("accuracy", "levels"), [(1e-1, {"plain"}), (1e-4, {"full"})])
+def test_the_accuracy_chooses_the_level(tmp_path, capsys, accuracy, levels):
+    """The cheap one where it will do; both against the full model."""
+    file = write(tmp_path, LEVELS)
+    code, found = run_json(capsys, "trade", file, "--accuracy", str(accuracy), "--lock")
+    assert code == 0
+    best = found["result"]["chosen"]
+    assert best["level"].removeprefix("B=") in levels
+    assert "B=full" in found["result"]["reference"]["first"]
+    assert {s["level"] for s in found["result"]["settings"] if s["error"] is not None} == {"B=plain", "B=full"}
+    full = api.simulate(file, accuracy=1e-9, level={"B": "full"}, output="full.h5")
+    chosen = api.simulate(file, accuracy=accuracy, output="chosen.h5")  # by the lock
+    assert f"level B = {best['level'][2:]}" in chosen.attributes["lock"]
+    assert np.abs(chosen["q"].values - full["q"].values).max() <= accuracy * full["q"].nominal
+    # another level on the command line: nothing of the lock was measured there
+    other = {"plain": "full", "full": "plain"}[best["level"][2:]]
+    again = api.simulate(file, accuracy=accuracy, level={"B": other}, output="again.h5")
+    assert "lock" not in again.attributes
 
 
 def test_pictures(tmp_path, capsys):
