@@ -88,7 +88,7 @@ def _sharpened(values: Complexes, a: Floats) -> Complexes:
     if not np.abs(inverse).min() > 0.0 or not size.min() > 0.0:
         return values
     other = 1.0 / inverse
-    one, two = (_by_size(v) for v in (values, other))
+    one, two = (_by_size(v.astype(complex)) for v in (values, other))
     found = values.astype(complex)
     small = size[one] < np.sqrt(size.max() * max(size.min(), 1e-300))
     near = np.abs(other[two] - values[one]) <= 1e-3 * size.max() * APART**-1
