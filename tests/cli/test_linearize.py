@@ -101,7 +101,7 @@ def test_a_series_circuit_in_every_formulation(formulation, tmp_path, capsys):
 
 @pytest.mark.parametrize("formulation", PRIMAL)
 def test_contrasts_of_many_decades(formulation, tmp_path, capsys):
-    """Each eigenvalue to 1e-10 of itself, the slow one beside one that is up to 1e13 times as fast; gain and zeros too."""
+    """Each eigenvalue to 1e-10 of itself, the slow one beside one up to 1e13 times as fast; gain and zeros too."""
     path = write(tmp_path, RLC)
     random = np.random.default_rng(0)
     for _ in range(12):
