@@ -44,6 +44,8 @@ from sysdyn.runtime.model.system import System
 Array = NDArray[np.float64]
 Input = tuple[str, tuple[int, ...]]
 _INPUT = re.compile(r"(.+?)(?:\[\s*(-?\d+(?:\s*,\s*-?\d+)*)\s*\])?")
+COUNTED = 200
+"""Unknowns up to which the states are counted twice."""
 MOVING = 1e-9
 """Largest rate of a state, in its size a second, that counts as rest."""
 
@@ -122,12 +124,16 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
     loose = loose_of(found)
+    still = constant(system, state) or not moving(system, state)  # the pencil of the form as written is right too
     try:
         small = reduced(rows, system, state, by_input, out, labels, loose)
     except NoLinearisation:
-        if not constant(system, state) and moving(system, state):
+        if not still:
             raise
+        small = None
+    if still and (small is None or _fewer(found, small)):
         small = _of_pencil(found, _descriptor(system, found, slopes, out, labels), loose)
+    assert small is not None
     form = system if index == "3" else system.another(index)
     descriptor = _descriptor(form, found, slopes, out, labels)
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
@@ -208,6 +214,19 @@ def _outputs(found: Found, slopes: Sequence[Sensitivity]) -> tuple[tuple[str, ..
 
 def _reads_ledger(expression: object) -> bool:
     return any(n.op == "var" and n.data[1] == "audit" for n in variables(expression))  # type: ignore[arg-type]
+
+
+def _fewer(found: Found, small: Reduced) -> bool:
+    """Whether the pencil, in the unit of time in which its ranks are plainest, has another number of states."""
+    y, yd = found.state.for_form(found.system)
+    jy, jyd = found.system.jacobian(found.state.t, y, yd)
+    if found.system.unknowns > COUNTED:
+        return False
+    try:
+        space = motions(found.system.dense(jyd), -found.system.dense(jy))[0]
+    except NoLinearisation:
+        return False
+    return int(space.shape[1]) != int((small.places >= 0).sum())
 
 
 def _of_pencil(found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Reduced:

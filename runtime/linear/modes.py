@@ -21,6 +21,10 @@ from sysdyn.runtime.numerics.rank import count, decomposed
 Complexes = NDArray[np.complex128]
 VANISHING = 1e-11
 """A Markov parameter below this part of its factors' size is zero."""
+FAINT = 1e-24
+"""The same beside the largest of its factors: a product of two round-offs."""
+APART = 1e3
+"""Ratio of the largest to the smallest eigenvalue from which the small ones are taken of the inverse."""
 DEFECTIVE = 1e11
 """Condition of the eigenvectors from which they count as dependent: participation is then by right vectors alone."""
 
@@ -66,13 +70,36 @@ def modes(a: Floats) -> tuple[Mode, ...]:
         return ()
     inner = balanced(a)[0]
     values, right = np.linalg.eig(inner)
-    values = _resolved(values, inner)
+    values = _resolved(_sharpened(values, inner), inner)
     share = np.abs(right) ** 2
     if np.linalg.cond(right) < DEFECTIVE:
         share = np.abs(right * np.linalg.inv(right).T)
     share = share / share.sum(axis=0)
     order = sorted(range(values.size), key=lambda k: (round(float(values[k].real), 12), float(values[k].imag)))
     return tuple(_mode(complex(values[k]), share[:, k]) for k in order)
+
+
+def _sharpened(values: Complexes, a: Floats) -> Complexes:
+    """Eigenvalues whose round-off is that of the largest: small ones from the inverse, where that is to be trusted."""
+    size = np.abs(values)
+    if values.size < 2 or not size.max() > APART * size.min() or not regular(a):
+        return values
+    inverse = np.linalg.eigvals(np.linalg.inv(a))
+    if not np.abs(inverse).min() > 0.0 or not size.min() > 0.0:
+        return values
+    other = 1.0 / inverse
+    one, two = (_by_size(v.astype(complex)) for v in (values, other))
+    found = values.astype(complex)
+    small = size[one] < np.sqrt(size.max() * max(size.min(), 1e-300))
+    near = np.abs(other[two] - values[one]) <= 1e-3 * size.max() * APART**-1
+    found[one] = np.where(small & near, other[two], values[one])
+    return found
+
+
+def _by_size(values: Complexes) -> NDArray[np.intp]:
+    """Places by rising size, of pairs the lower half plane first."""
+    size = np.abs(values)
+    return np.lexsort((np.sign(np.round(values.imag / size, 9)), np.round(np.log(size), 6)))
 
 
 def _resolved(values: Complexes, a: Floats) -> Complexes:
@@ -96,7 +123,8 @@ def transfer(
     inner = inner.T
     zeros, gain = _zeros(inner, b, c, d)
     zeros = _at_origin(inner, b, c, d, zeros)
-    poles = _resolved(np.linalg.eigvals(inner).astype(complex), inner) if inner.size else np.zeros(0, complex)
+    poles = np.linalg.eigvals(inner).astype(complex) if inner.size else np.zeros(0, complex)
+    poles = _resolved(_sharpened(poles, inner), inner)
     poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
     return Transfer(*place, poles, zeros, gain, _static(poles, zeros, gain), improper)
 
@@ -129,7 +157,8 @@ def _zeros(a: Floats, b: Floats, c: Floats, d: float) -> tuple[Complexes, float]
     kept, size = [c], np.abs(c)
     for _ in range(n):
         markov = float(kept[-1] @ b)
-        if abs(markov) > VANISHING * float(size @ np.abs(b)):
+        faint = FAINT * float(np.abs(kept[-1]).max() * np.abs(b).max())
+        if abs(markov) > max(VANISHING * float(size @ np.abs(b)), faint):
             break
         kept.append(kept[-1] @ a)
         size = size @ np.abs(a)

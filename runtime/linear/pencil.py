@@ -16,29 +16,45 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import TOLERANCE, count, decomposed, null_space
 
+CLOCKS = (0, 3, 6, 9, 12, -3, -6)
+"""Powers of ten of the units of time that are tried, 1/s."""
 Choice = NDArray[np.int64]
 
 
-def _image(matrix: Floats) -> Floats:
+class _Ranks:
+    """Decides ranks, and remembers the narrowest gap (in powers of ten) between what counts and what does not."""
+
+    def __init__(self) -> None:
+        self.gap = 16.0
+
+    def of(self, sigma: Floats) -> int:
+        """How many singular values of a matrix of size one are not zero."""
+        rank = int((sigma > TOLERANCE).sum())
+        above = sigma[rank - 1] if rank else 1.0
+        below = max(float(sigma[rank]) if rank < sigma.size else 0.0, 1e-16)
+        self.gap = min(self.gap, float(np.log10(above / below)))
+        return rank
+
+
+def _image(matrix: Floats, ranks: _Ranks) -> Floats:
     """Orthonormal columns that span the columns of a matrix."""
     if not matrix.size:
         return np.zeros((matrix.shape[0], 0))
     u, sigma, _ = decomposed(matrix)
-    rank = int((sigma > TOLERANCE).sum())
-    return u[:, :rank]
+    return u[:, : ranks.of(sigma)]
 
 
-def _preimage(matrix: Floats, image: Floats) -> Floats:
+def _preimage(matrix: Floats, image: Floats, ranks: _Ranks) -> Floats:
     """Orthonormal columns that span what a matrix maps into the span of orthonormal columns."""
     outside = matrix - image @ (image.T @ matrix)
     _, sigma, vt = decomposed(outside)
-    return np.asarray(vt[int((sigma > TOLERANCE).sum()) :].T)
+    return np.asarray(vt[ranks.of(sigma) :].T)
 
 
-def _sequence(into: Floats, by: Floats, space: Floats) -> Floats:
+def _sequence(into: Floats, by: Floats, space: Floats, ranks: _Ranks) -> Floats:
     """The limit of space := into^-1(by space)."""
     for _ in range(into.shape[0] + 1):
-        following = _preimage(into, _image(by @ space))
+        following = _preimage(into, _image(by @ space, ranks), ranks)
         if following.shape[1] == space.shape[1]:
             return following
         space = following
@@ -46,16 +62,28 @@ def _sequence(into: Floats, by: Floats, space: Floats) -> Floats:
 
 
 def motions(e: Floats, a: Floats) -> tuple[Floats, Floats, Floats]:
-    """V [n, states], W [n, rest] and the factors of the unknowns [n] of a regular pencil, in scaled unknowns."""
+    """V [n, states], W [n, rest] and the factors of the unknowns [n] of a regular pencil, in scaled unknowns.
+
+    In the unit of time in which ranks are plainest: where a second is 1e9 time constants, potentials that differ by the
+    effort of a microhenry would pass for equal.
+    """
+    found = [part for power in CLOCKS if (part := _motions(10.0**power * e, a)) is not None]
+    if not found:
+        raise NoLinearisation("the equations do not determine every unknown")
+    return max(found, key=lambda part: part[0])[1]
+
+
+def _motions(e: Floats, a: Floats) -> tuple[float, tuple[Floats, Floats, Floats]] | None:
+    """The narrowest gap of the ranks, and the spaces; None where they do not fill the whole."""
     row, column = factors(e, a)
     e, a = (row[:, None] * part * column for part in (e, a))
     size = max(float(np.linalg.norm(e, 2)), 1e-300), max(float(np.linalg.norm(a, 2)), 1e-300)
-    e, a = e / size[0], a / size[1]
-    v = _sequence(a, e, np.eye(e.shape[0]))
-    w = _sequence(e, a, null_space(e) if e.any() else np.eye(e.shape[0]))
+    e, a, ranks = e / size[0], a / size[1], _Ranks()
+    v = _sequence(a, e, np.eye(e.shape[0]), ranks)
+    w = _sequence(e, a, null_space(e) if e.any() else np.eye(e.shape[0]), ranks)
     if v.shape[1] + w.shape[1] != e.shape[0] or not _regular(np.hstack([e @ v, a @ w])):
-        raise NoLinearisation("the equations do not determine every unknown")
-    return v, w, column
+        return None
+    return ranks.gap, (v, w, column)
 
 
 def _regular(matrix: Floats) -> bool:

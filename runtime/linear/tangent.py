@@ -26,7 +26,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import TOLERANCE, decomposed, least_squares, null_space
+from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, least_squares
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 
@@ -109,13 +109,19 @@ def _tangent(g: Floats, by_column: Floats) -> tuple[Floats, Floats]:
     Where a farad counts in millionths, charges would pass for at rest beside voltages.
     """
     by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
-    tangent = null_space(by_row[:, None] * g * by_column)
+    tangent = _null_space(by_row[:, None] * g * by_column)
     for _ in range(PASSES):
         size = np.linalg.norm(tangent, axis=1)
         by_column = by_column * np.where(size > MOVES, size, 1.0)
         by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
-        tangent = null_space(by_row[:, None] * g * by_column)
+        tangent = _null_space(by_row[:, None] * g * by_column)
     return tangent, by_column
+
+
+def _null_space(matrix: Floats) -> Floats:
+    """Orthonormal columns that a matrix maps to zero, to round-off: a fast mode is no constraint."""
+    _, sigma, vt = decomposed(matrix)
+    return np.asarray(vt[count(sigma, CERTAIN) :].T)
 
 
 def candidates_of(system: System, state: ConsistentState, n: int) -> NDArray[np.int64]:
@@ -139,8 +145,8 @@ def _pivots(matrix: Floats, number: int) -> NDArray[np.int64]:
 
 
 def _rank(part: Floats) -> int:
-    """Rank of rows of orthonormal columns."""
-    return int((decomposed(part)[1] > TOLERANCE).sum()) if part.size else 0
+    """Rank of rows of orthonormal columns: potentials that differ little from each other are two."""
+    return int((decomposed(part)[1] > CERTAIN).sum()) if part.size else 0
 
 
 def chosen_states(
@@ -193,33 +199,54 @@ def reduced(
     """
     starter, n = rows.starter, rows.starter.n
     g = rows.jacobian[rows.holds]
-    by_row, by_column = factors(g)
-    scaled = by_row[:, None] * g * by_column
-    tangent, moves = _tangent(g, by_column)
+    tangent, moves = _tangent(g, factors(g)[1])
     candidates = candidates_of(system, state, n)
     part = tangent[candidates]
     rank = _rank(part)
     chosen = chosen_states(system, tangent, moves, candidates, loose)
     rates = _rates(starter, system, chosen)
-    _refuse_undetermined(system, tangent, part, chosen, rates, by_column, rank)
+    _refuse_undetermined(system, tangent, part, chosen, rates, rank)
     inputs = len(names)
-    pick = np.zeros((chosen.size, starter.first))
-    pick[np.arange(chosen.size), chosen] = 1.0
-    pick = pick * by_column
-    own = np.abs(pick).max(axis=1, initial=0.0)[:, None]
-    right = np.zeros((g.shape[0] + chosen.size, chosen.size + ORDERS * inputs))
-    right[g.shape[0] :, : chosen.size] = np.eye(chosen.size) / own
-    right[: g.shape[0], chosen.size :] = -by_row[:, None] * starter.with_sums(np.hstack(by_input))[rows.holds]
-    moved = (by_column / moves)[:, None] * _refined(np.vstack([scaled, pick / own]), right)
-    moved = moves[:, None] * np.where(np.abs(moved) > NOISE * np.abs(moved).max(axis=0, initial=0.0), moved, 0.0)
+    right = np.zeros((g.shape[0], chosen.size + ORDERS * inputs))
+    right[:, chosen.size :] = -starter.with_sums(np.hstack(by_input))[rows.holds]
+    moved = _moved(g, right, chosen, moves)
     return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose)
 
 
-def _refined(matrix: Floats, right: Floats) -> Floats:
-    """The solution of consistent equations, its residual small beside the terms of each row (Skeel 1980)."""
-    found = least_squares(matrix, right, 1e-14)
+def _moved(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -> Floats:
+    """The variations [z, k] with G dz = right, dz = 1 in the chosen places of the first columns, each in its own.
+
+    With rows and unknowns in units in which what moves moves alike, as many rows as unknowns are taken and eliminated:
+    zeros stay zeros.  Where rows leave more open than the chosen (redundant multipliers), the least variation is.
+    """
+    states, rest = chosen.size, np.setdiff1d(np.arange(moves.size), chosen)
+    scaled = g * moves
+    size = np.abs(scaled).max(axis=1, initial=0.0)
+    row = 1.0 / np.where(size > 0.0, size, 1.0)
+    scaled, aim = row[:, None] * scaled, row[:, None] * right
+    aim[:, :states] -= scaled[:, chosen] / moves[chosen]
+    matrix = scaled[:, rest]
+    kept = _pivots(matrix, rest.size) if matrix.shape[0] >= rest.size else np.zeros(0, dtype=np.int64)
+    found = np.zeros((moves.size, right.shape[1]))
+    found[rest] = _eliminated(matrix, aim, kept)
+    found[rest] = np.where(np.abs(found[rest]) > NOISE * np.abs(found[rest]).max(axis=0, initial=0.0), found[rest], 0.0)
+    found[chosen, np.arange(states)] = 1.0 / moves[chosen]
+    return moves[:, None] * found
+
+
+def _eliminated(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> Floats:
+    """The solution of consistent equations by rows that determine it, its residual small beside the terms of each row
+    (Skeel 1980); by singular values where none do.
+    """
+    square = matrix[kept]
+    if kept.size and count(decomposed(square)[1], CERTAIN) == kept.size:
+        found = np.linalg.solve(square, aim[kept])
+        for _ in range(2):
+            found = found + np.linalg.solve(square, aim[kept] - square @ found)
+        return np.asarray(found)
+    found = least_squares(matrix, aim, 1e-14)
     for _ in range(2):
-        found = found + least_squares(matrix, right - matrix @ found, 1e-14)
+        found = found + least_squares(matrix, aim - matrix @ found, 1e-14)
     return found
 
 
@@ -237,7 +264,6 @@ def _refuse_undetermined(
     part: Floats,
     chosen: NDArray[np.int64],
     rates: NDArray[np.int64],
-    by_column: Floats,
     rank: int,
 ) -> None:
     """NoLinearisation where rates of states move though no state does: constraints are hidden deeper than the rows."""

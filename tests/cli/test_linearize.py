@@ -99,6 +99,26 @@ def test_a_series_circuit_in_every_formulation(formulation, tmp_path, capsys):
     assert by_output["v"]["static"] == pytest.approx(1.0, rel=CLOSE)
 
 
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_contrasts_of_many_decades(formulation, tmp_path, capsys):
+    """Each eigenvalue to 1e-10 of itself, the slow one beside one up to 1e13 times as fast; gain and zeros too."""
+    path = write(tmp_path, RLC)
+    random = np.random.default_rng(0)
+    for _ in range(12):
+        r, l_, c = (10 ** random.uniform(*decades) for decades in ((-3, 6), (-9, 0), (-12, -3)))
+        values_ = (f"R={r!r}", f"L={l_!r}", f"C={c!r}")
+        options = [part for v in values_ for part in ("--set", v)]
+        found = linear(capsys, path, *options, "--formulation", formulation, "--outputs", "v", "--equilibrium")
+        root = np.sqrt(complex((r / l_ / 2) ** 2 - 1 / (l_ * c)))
+        fast = -r / l_ / 2 - root
+        (t,) = found["transfer"]
+        for expected in (fast, 1 / (l_ * c) / fast):
+            for ours in (values(found["eigenvalues"]), values(t["poles"])):
+                assert np.abs(ours - expected).min() <= CLOSE * abs(expected), (r, l_, c)
+        assert t["gain"] * l_ * c == pytest.approx(1.0, rel=CLOSE)
+        assert t["zeros"] == []
+
+
 def test_the_reduction_is_a_state_space_of_scipy(tmp_path, capsys):
     found = linear(capsys, write(tmp_path, RLC), "--equilibrium", "--outputs", "c.e")
     small = found["reduced"]
