@@ -321,6 +321,29 @@ class Trace:
             store.append(rows)
             store.close_with({**nominal, **energy, "/": last}, self.events)
 
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset over `time`: quantities and the audit with units and nominal magnitudes, attributes of the run.
+
+        Needs xarray, which sysdyn itself does not.
+        """
+        import xarray
+
+        data = {
+            name: ("time", q.values, {"units": q.units} | ({} if q.nominal is None else {"nominal": q.nominal}))
+            for name, q in self._data.items()
+        }
+        time = ("time", self.time, {"units": "s", "long_name": "time"})
+        return xarray.Dataset(data, coords={"time": time}, attrs=dict(self.attributes))
+
+    def to_pandas(self) -> Any:
+        """A pandas.DataFrame over `time` [s]; `attrs["units"]` holds the unit of each column.  Needs pandas."""
+        import pandas
+
+        index = pandas.Index(self.time, name="time")
+        frame = pandas.DataFrame({name: q.values for name, q in self._data.items()}, index=index)
+        frame.attrs["units"] = {name: q.units for name, q in self._data.items()}
+        return frame
+
     @property
     def names(self) -> tuple[str, ...]:
         """Traced quantities (without the audit)."""

@@ -112,6 +112,19 @@ def test_a_trace_in_memory_is_saved_as_the_command_writes_it(masses, tmp_path):
     assert again.timings["cpu_integrate_s"] > 0.0
 
 
+def test_a_trace_as_xarray_and_pandas(masses):
+    pytest.importorskip("xarray")
+    held = load(masses).run({"k": 2.0})
+    data, frame = held.to_xarray(), held.to_pandas()
+    assert data["a"].dims == ("time",)
+    assert data["a"].attrs["units"] == "m"
+    assert float(data["a"].sel(time=1.0, method="nearest")) == held["a"].values[np.abs(held.time - 1.0).argmin()]
+    assert data.attrs["met"] == 1
+    assert np.array_equal(frame["b"].to_numpy(), held["b"])
+    assert frame.index.name == "time"
+    assert frame.attrs["units"]["audit.energy"] == "J"
+
+
 def test_check_of_a_text():
     assert check(ARRAY) == []
     found = check("model m {\n  coord x: translation\n  energy T* = 1/2*y*x'^2\n}\n", "mine.sd")
