@@ -163,8 +163,8 @@ def taken(
     both = same and index in (None, lock.index) and method in (None, lock.method)
     both = both and not by_scene and (solver is None or method is not None)
     source = target.document.file.source
-    above = {path for path, _ in levels}
-    above |= {_path(source, s.target) for s in body if isinstance(s, syntax.SceneLevel)}
+    said = [_path(source, s.target) for s in body if isinstance(s, syntax.SceneLevel)]
+    above = {*(path for path, _ in levels), *said}
     rest = tuple((path, name) for path, name in lock.levels if path not in above)
     parts = [f"formulation {lock.formulation}"] if here is None else []
     parts += [f"index {lock.index}", f"method {lock.method}", f"tolerance {lock.tolerance:g}"] if both else []

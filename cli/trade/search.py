@@ -18,7 +18,9 @@ from sysdyn.cli.trade.traded import Combination, Measured, cheapest, meets
 LOOSEST, FIRST, TIGHTEST = 2, 4, 24
 """Numbers of the tolerances 1e-1, 1e-2, 1e-12."""
 ORDER = {"bdf": 4.0, "radau": 5.0, "dopri": 8.0}
-"""Error ~ work^-order at best: what a combination of one or two runs may still hope for."""
+"""Error ~ work^-order at best: what a combination of two runs may still hope for."""
+EARLY = 1.6
+"""Times that order for one with a single run: loose ones take steps for kinks and corners that tight ones need too."""
 HOPE = 1.5
 """Times the best work that a forecast may be: forecasts are rough."""
 JUMP = 8
@@ -204,7 +206,7 @@ class Search:
         if not usable:
             return min(m.work for m in climb.runs.values())
         last = usable[-1]
-        order = ORDER[climb.combination.method]
+        order = ORDER[climb.combination.method] * (EARLY if len(usable) == 1 else 1.0)
         steps = last.work - last.fixed
         if len(usable) > 2 and usable[-2].error and last.error and steps > usable[-2].work - usable[-2].fixed > 0.0:
             grown = steps / (usable[-2].work - usable[-2].fixed)

@@ -322,7 +322,7 @@ class Trace:
             store.close_with({**nominal, **energy, "/": last}, self.events)
 
     def to_xarray(self) -> Any:
-        """An xarray.Dataset over `time`: quantities and the audit with units and nominal magnitudes, attributes of the run.
+        """An xarray.Dataset over `time`: quantities and the audit with units and nominal magnitudes.
 
         Needs xarray, which sysdyn itself does not.
         """
