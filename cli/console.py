@@ -14,6 +14,8 @@ from sysdyn.cli.failures import envelope, plain, shown
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report, shortened
 
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
+ALWAYS = ("W921",)
+"""Shown under --quiet too: a file that somebody relies on is not read."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -79,7 +81,7 @@ class Console:
     def _render(self, found: Iterable[Diagnostic]) -> None:
         from sysdyn.dsl.text.render import render
 
-        shown = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
+        shown = [d for d in found if d.severity == "error" or d.code in ALWAYS or not (self.quiet or self._routine(d))]
         for diagnostic in shown:
             print(render(diagnostic, color=self.color), file=sys.stderr)
         errors = sum(d.severity == "error" for d in self.report)

@@ -88,6 +88,7 @@ def solved(function: Callable[..., Any]) -> Callable[..., Any]:
                 "--rtol", type=float, metavar="R", help="The solver's own relative tolerance (no accuracy control)."
             ),
             click.option("--atol", type=float, metavar="A", help="The solver's own absolute tolerance."),
+            click.option("--no-lock", is_flag=True, help="Leave the setting of FILE.lock aside."),
             click.option("--max-steps", type=click.IntRange(min=1), metavar="N"),
             click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s."),
             click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto"),

@@ -98,15 +98,17 @@ def network(
     *,
     levels: Sequence[tuple[str, str]] = (),
     required: bool = True,
+    outputs: Sequence[str] | None = None,
 ) -> Network | None:
-    """The network of a model under a scene; settings are (name, value), levels (path, name) of the command line.
+    """The network of a model under a scene; settings are (name, value), levels (path, name) of the command line;
+    outputs: names of traced quantities or expressions, observed in the place of what the scene traces.
 
     None where the report has errors, or N608: a network that lacks a part of the text is none, and where a statement
     could not be read only names and units are judged.  required: parameters and inputs must have values.
     """
     with _deep(), budget.drawn():
         try:
-            return _network(document, model, scene, report, settings, levels, required=required)
+            return _network(document, model, scene, report, settings, levels, required=required, outputs=outputs)
         except budget.SpentError as spent:
             report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
             return None
@@ -121,21 +123,31 @@ def _network(
     levels: Sequence[tuple[str, str]],
     *,
     required: bool,
+    outputs: Sequence[str] | None,
 ) -> Network | None:
     elaborator, reader = _elaborated(document, model, scene, report, settings, levels)
     try:
-        return _judged(elaborator, reader, scene, report, required=required)
+        return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
     finally:
         report.retold(lambda found: told(elaborator, found))
 
 
 def _judged(
-    elaborator: Elaborator, reader: SceneReader, scene: syntax.Scene | None, report: Report, *, required: bool
+    elaborator: Elaborator,
+    reader: SceneReader,
+    scene: syntax.Scene | None,
+    report: Report,
+    *,
+    required: bool,
+    outputs: Sequence[str] | None,
 ) -> Network | None:
     """The network of an elaborated model, after every check."""
     read_scene: Scene | None = None
     if scene is not None:
         read_scene = reader.read(scene, Place(elaborator.source, scene.name.span))
+    if outputs is not None:
+        for source, trace in reader.only(outputs, lambda text: _trace(text, report)):
+            reader.command(source, trace, SceneReader.trace)
     if _unread(elaborator, scene):
         return None  # what is missing would be found missing again, in other words
     elaborator.quadratures()
@@ -254,6 +266,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         discretes=frozenset(parts.discretes),
         events=tuple(parts.events),
         switches=tuple(parts.switches),
+        levels=tuple(elaborator.choices.values()),
         read=nodes_read(parts),
     )
 
@@ -313,6 +326,19 @@ def _set(name: str, value: str, report: Report) -> list[tuple[SourceText, syntax
             report.error("E910", f"--set {name}={value} is not NAME=VALUE", source.place(0, 0))
         return []
     return [(source, statements[0])]
+
+
+def _trace(expression: str, report: Report) -> tuple[SourceText, syntax.Trace] | None:
+    """One `--outputs` of the command line, read as the statement of a scene; None after reporting."""
+    source = SourceText("--outputs", f"scene command_line of model {{\n  trace {expression}\n}}\n")
+    inner = Report()
+    statements = [s for scene in document(source, inner).scenes.values() for s in scene.body]
+    if len(inner) or "\n" in expression or len(statements) != 1 or not isinstance(statements[0], syntax.Trace):
+        report.extend(inner)
+        if not inner.failed:
+            report.error("E905", f"--outputs {expression[:40]}: one expression is wanted", source.place(0, 0))
+        return None
+    return source, statements[0]
 
 
 def _space(document: Document, source: SourceText) -> Space:

@@ -122,7 +122,7 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
 
 
 def _achieved(runs: Runs, options: Options, *, doubted: bool = False) -> Achieved:
-    return control(runs.sampled, _targets(runs, options), LAWS[runs.method], doubted=doubted)
+    return control(runs.sampled, _targets(runs, options), LAWS[runs.method], doubted=doubted, first=options.first)
 
 
 def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:

@@ -47,7 +47,7 @@ def picture(traces: Sequence[tuple[str, Trace]], names: Sequence[str], kind: str
     panels = panels_of([t for _, t in traces], names)
     columns = 1 if len(panels) <= 6 else 2
     rows = -(-len(panels) // columns)
-    with warnings.catch_warnings(), mpl.rc_context(_style(mpl.rcParamsDefault)):
+    with warnings.catch_warnings(), mpl.rc_context(style(mpl.rcParamsDefault)):
         warnings.simplefilter("ignore")  # names in scripts that the font lacks
         height = 1.0 + rows * max(1.9 if rows > 1 else 3.2, 2.6 - 0.2 * rows)
         figure = Figure(figsize=(7.2 * columns if columns == 1 else 11.0, height), layout="constrained")
@@ -71,7 +71,7 @@ def picture(traces: Sequence[tuple[str, Trace]], names: Sequence[str], kind: str
     return data.getvalue()
 
 
-def _style(defaults: Any) -> Any:
+def style(defaults: Any) -> Any:
     """Matplotlib's own settings under ours: a person's configuration does not change a picture."""
     return {**defaults, **STYLE, "backend": "agg"}
 

@@ -41,7 +41,7 @@
     }
     const largest = Math.max(...found.map(Math.abs), step);
     const digits = Math.min(Math.floor(Math.log10(Math.max(largest / step, 1)) + 1e-9) + 2, 15);
-    return found.map(v => [v, number(v, digits)]);
+    return found.map(v => [v, data.lg ? number(10 ** v, 2) : number(v, digits)]);
   };
 
   class Group {
@@ -143,7 +143,7 @@
         element(svg, 'line', {class: 'grid', x1: LEFT, x2: width - RIGHT, y1: y, y2: y});
         element(svg, 'text', {x: LEFT - 6, y: y + 4, 'text-anchor': 'end'}, text);
       }
-      element(svg, 'text', {x: width - RIGHT, y: this.height - 4, 'text-anchor': 'end'}, `time, ${data.unit}`);
+      element(svg, 'text', {x: width - RIGHT, y: this.height - 4, 'text-anchor': 'end'}, data.across || `time, ${data.unit}`);
       element(svg, 'text', {class: 'name', x: 4, y: 11}, [this.name, this.unit].filter(Boolean).join(', '));
       const clip = `clip${this.group.panels.indexOf(this)}`;
       const path = element(element(svg, 'defs', {}), 'clipPath', {id: clip});
@@ -157,7 +157,12 @@
         }
         const shape = {d, fill: 'none', stroke: this.curves[k].colour, 'stroke-width': 1.6, 'clip-path': `url(#${clip})`};
         if (this.curves[k].dash) shape['stroke-dasharray'] = '6 4';
-        if (d) element(svg, 'path', shape);
+        if (d && !this.curves[k].dots) element(svg, 'path', shape);
+        for (const [t, v] of this.curves[k].marks || this.curves[k].dots ? line : []) {
+          if (!(t >= group.low && t <= group.high)) continue;
+          const size = this.curves[k].dots || 3;
+          element(svg, 'circle', {cx: this.across(t), cy: down(v), r: size, fill: size > 3 ? 'none' : this.curves[k].colour, stroke: this.curves[k].colour, 'stroke-width': 1.6});
+        }
       });
       this.mark = element(svg, 'line', {class: 'mark', y1: TOP, y2: base, visibility: 'hidden'});
       this.box = element(svg, 'rect', {class: 'box', y: TOP, height: base - TOP, visibility: 'hidden'});
@@ -174,7 +179,8 @@
         const k = place(time, t);
         if (!inside || k === 0 && time[0] > t || k >= time.length) { output.textContent = ''; continue; }
         const j = Math.max(k - 1, 0), h = time[k] - time[j];
-        output.textContent = number(h > 0 ? values[j] + (values[k] - values[j]) * (t - time[j]) / h : values[k], 6);
+        const value = h > 0 ? values[j] + (values[k] - values[j]) * (t - time[j]) / h : values[k];
+        output.textContent = data.lg ? '' : number(value, 6);
       }
     }
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from sysdyn.cli.equations.mathml import Typesetter, math, mi, mo, row
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.balance import shown
-from sysdyn.cli.report.mathml import Typesetter, math, mi, mo, row
 from sysdyn.cli.report.study import Study
 from sysdyn.dsl.model.expression import var
 from sysdyn.dsl.model.network import Branch

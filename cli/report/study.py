@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sysdyn.cli.equations.mathml import Typesetter
 from sysdyn.cli.report.balance import Share
-from sysdyn.cli.report.mathml import Typesetter
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import Ran
 from sysdyn.cli.run.starting import Started

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run import targets
+from sysdyn.cli.run import lock, targets
 from sysdyn.cli.run.events import plan, zeno
 from sysdyn.cli.run.expectations import Claim, judge, watch
 from sysdyn.cli.run.module_check import check_module
@@ -73,6 +73,7 @@ class Request:
     max_wall: str | None = None
     timings: bool = True
     no_prune: bool = False
+    no_lock: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +105,35 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     output = request.output or _default_output(request.file, target.scene.name.name if target.scene else "")
     if Path(output).is_file() and not replaceable(output):
         raise UsageError(f"-o {output} exists and is no trace of sysdyn: give another name, or remove it")
+    request, locked = _locked(request, target, report)
     with ex.fresh():
         prepared = ready(request, target, report)
         options = None if prepared is None else options_of(request, target, prepared, report, began, progress)
+        if options is not None and locked is not None:
+            options = _under(options, locked)
         return None if prepared is None or options is None else integrate(target, prepared, options, report)
+
+
+def _locked(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
+    """The request with what the file's lock says where neither it nor the scene does."""
+    held = None if request.no_lock else lock.read(request.file, target, version(), report)
+    if held is None:
+        return request, None
+    found = lock.taken(held, target, request.formulation, request.index, request.method, request.levels)
+    return replace(
+        request,
+        formulation=request.formulation or found.formulation,
+        index=request.index or found.index,
+        method=request.method or found.method,
+        levels=(*request.levels, *found.levels),
+    ), found if found.text else None
+
+
+def _under(options: Options, found: lock.Taken) -> Options:
+    """Options that name the lock, and begin at its tolerance where the accuracy asked is that of its measurement."""
+    asked = min([a for a in (options.accuracy, *(a for _, a in options.accuracy_on)) if a is not None], default=None)
+    first = found.tolerance if asked == found.accuracy else None
+    return replace(options, first=first, attributes={**options.attributes, "lock": found.text})
 
 
 def check_tolerances(request: Request) -> None:
@@ -139,21 +165,32 @@ def ready(request: Request, target: Target, report: Report) -> Prepared | None:
 def integrate(
     target: Target, prepared: Prepared, options: Options, report: Report, *, checked: bool = False
 ) -> Ran | None:
-    """From the consistent start to the trace; None where the report says why not.
+    """From the consistent start to the trace; None where the report says why not; checked: see begin."""
+    started = begin(prepared, options, report, checked=checked)
+    return None if started is None else run_from(target, prepared, started, options, report)
 
-    checked: the module of this model was compared with its text before, with other numbers.
+
+def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool = False) -> Started | None:
+    """The consistent start, the compiled rows compared with the text there; None where the report says why not.
+
+    checked: they were compared before, with other numbers.
     """
     started = start(prepared, options.t_start, report, options.redundancy)
     if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
         return None
     if not checked:
         check_module(prepared, started, options.t_end)
-    events = plan(prepared, started.system, rest=_rest(options))
-    options = replace(options, stops=_stops(prepared, options, report), events=events)
+    return started
+
+
+def run_from(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
+    """From a start to the trace; None where the report says why not.  One without events may serve several runs."""
+    events = plan(prepared, started.system, rest=rest(options))
+    options = replace(options, stops=stops(prepared, options, report), events=events)
     return _ran(target, prepared, started, options, report)
 
 
-def _rest(options: Options) -> float:
+def rest(options: Options) -> float:
     """The part of the fastest impact of a contact below which it is the last."""
     asked = [options.accuracy, options.rtol, *(a for _, a in options.accuracy_on)]
     return 0.1 * min((a for a in asked if a is not None), default=ACCURACY)
@@ -187,7 +224,7 @@ def options_of(
         t1 = instant(request.until, "--until")
     elif t1 is None:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
-    at = [instant(text, "--at") for text in _separate(request.at)] if request.at else []
+    at = [instant(text, "--at") for text in separate(request.at)] if request.at else []
     wall = instant(request.max_wall, "--max-wall") if request.max_wall else None
     if t1 is None or None in at or report.failed:
         return None
@@ -239,7 +276,7 @@ def options_of(
     )
 
 
-def _stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
+def stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
     """Instants at which the text jumps or has kinks in time, and those of pulses that steps would pass over."""
     text = prepared.compiled.form, prepared.binding, options.t_start, options.t_end, prepared.network.tables
     found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
@@ -261,7 +298,7 @@ def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float
     return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
 
 
-def _separate(text: str) -> list[str]:
+def separate(text: str) -> list[str]:
     """The parts between commas outside brackets."""
     parts, depth = [""], 0
     for character in text:
@@ -279,22 +316,27 @@ def _default_output(file: str, scene: str) -> str:
 
 
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
-    text = target.document.file.source.text
     left_out = {"pruned": listed(prepared.left_out)} if prepared.left_out else {}
     return {
         "Conventions": "CF-1.11",
         "title": target.name,
-        "source": f"sysdyn {_version()}",
+        "source": f"sysdyn {version()}",
         "model": prepared.network.model,
         "scene": prepared.network.scene.name if prepared.network.scene else "",
         "formulation": prepared.formulation,
-        "model_sha256": hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest(),
+        "model_sha256": model_digest(target),
         **left_out,
     }
 
 
+def model_digest(target: Target) -> str:
+    """SHA-256 of the model's text."""
+    return hashlib.sha256(target.document.file.source.text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
 @functools.cache
-def _version() -> str:
+def version() -> str:
+    """Of the package."""
     try:
         return metadata.version("sysdyn")
     except metadata.PackageNotFoundError:  # run from a folder that is not installed

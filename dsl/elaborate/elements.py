@@ -92,6 +92,10 @@ class Elements(Connections):
             self.enter(symbol)
             return
         assert isinstance(before, (BranchSymbol, TwoPortSymbol))
+        declared = before if isinstance(before, BranchSymbol) else before.branches[0]
+        if len(declared.family.shape) != len(first.family.shape):  # an element and an array of one label
+            self.enter(symbol)
+            return
         if isinstance(before, BranchSymbol) and isinstance(symbol, BranchSymbol):
             self.scope.symbols[symbol.name] = _hull(before, symbol)
         elif isinstance(before, TwoPortSymbol) and isinstance(symbol, TwoPortSymbol):

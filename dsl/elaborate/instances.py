@@ -20,6 +20,7 @@ from sysdyn.dsl.elaborate.unit_variables import solve_units
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import LevelChoice
 from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS, own_variables
 from sysdyn.dsl.names.symbols import (
@@ -57,6 +58,7 @@ class Instances(Elements):
         super().__init__(report)
         self.files: FileScope
         self.bodies: list[tuple[Space, list[Nested]]] = []
+        self.choices: dict[str, LevelChoice] = {}
         self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
         self._waiting: dict[int, list[Callable[[], None]]] = {}  # instances not yet elaborated, by their symbol
         self.resolver.awaken = self._awaken

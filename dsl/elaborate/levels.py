@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sysdyn.dsl.elaborate.level_ports import level_ports
+from sysdyn.dsl.model.network import LevelChoice
 from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.symbols import ComponentSymbol
 from sysdyn.dsl.text.diagnostics import Place
@@ -23,6 +24,7 @@ def choose_level(
     chosen, place = frame.levels.get(path, (None, None))
     if chosen is None and len(s.component.names) > 1:
         chosen, place = s.component.names[1], frame.place(s.component.span)
+    free = chosen is None
     if chosen is None:
         chosen = next((n for n, level in levels.items() if level.default), None)
     if chosen is None:
@@ -35,6 +37,8 @@ def choose_level(
         message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
         frame.report.error("E802", message, place or frame.place(s.component.span))
         raise Failed
+    if len(levels) > 1:
+        frame.choices[path] = LevelChoice(path, chosen, tuple(levels), free)
     bodies = {name: _extended(frame, component, levels, level, ()) for name, level in levels.items()}
     described = {name: (level, bodies[name]) for name, level in levels.items()}
     level_ports(component.name, described, component.source, frame.report)

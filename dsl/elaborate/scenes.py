@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.elaborate import Elaborator
@@ -20,6 +21,7 @@ from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, SourceText
 from sysdyn.dsl.tree import syntax
 
+_Said = TypeVar("_Said", syntax.Set, syntax.Trace)
 RESERVED = ("time", "audit", "parameters", "events", "derivatives")
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "auto")
 SOLVERS = ("auto", "bdf", "radau", "dopri", "euler")
@@ -68,8 +70,8 @@ class SceneReader:
                 elif type(statement) in table:
                     self.guarded(lambda s: table[type(s)](self, s), statement)
 
-    def command(self, source: SourceText, s: syntax.Set, do: Callable[[SceneReader, syntax.Set], None]) -> None:
-        """A `--set` of the command line."""
+    def command(self, source: SourceText, s: _Said, do: Callable[[SceneReader, _Said], None]) -> None:
+        """A `--set` or `--outputs` of the command line."""
         with self.model.entering(self.model.space), self.resolver.within(self.model.space.scope, source):
             self.guarded(lambda statement: do(self, statement), s)
 
@@ -225,7 +227,16 @@ class SceneReader:
 
     # -- traces --------------------------------------------------------------------------------------------
 
-    def _trace(self, s: syntax.Trace) -> None:
+    def only(
+        self, wanted: Sequence[str], read: Callable[[str], tuple[SourceText, syntax.Trace] | None]
+    ) -> list[tuple[SourceText, syntax.Trace]]:
+        """Forget what is traced but for the wanted names; statements for those that are not traced yet."""
+        known = {o.name: o for o in self.observations}
+        self.observations = [known[name] for name in wanted if name in known]
+        return [found for name in wanted if name not in known and (found := read(name)) is not None]
+
+    def trace(self, s: syntax.Trace) -> None:
+        """`trace`: quantities by name, and how often."""
         if s.every is not None:
             every = self._constant(s.every, dim.TIME, "the interval of a trace")
             self._once("every", every, s.every.span)
@@ -321,7 +332,7 @@ def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
 
 _STATEMENTS: dict[type, Callable[..., None]] = {
     syntax.Time: SceneReader._time,
-    syntax.Trace: SceneReader._trace,
+    syntax.Trace: SceneReader.trace,
     syntax.Formulation: SceneReader._formulation,
     syntax.Solver: SceneReader._solver,
     syntax.Redundancy: SceneReader._redundancy,

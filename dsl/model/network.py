@@ -376,6 +376,18 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
+class LevelChoice:
+    """A component with several levels of detail.  chosen: one of names; free: neither scene, command line nor the
+    instance itself says which.
+    """
+
+    path: str
+    chosen: str
+    names: tuple[str, ...]
+    free: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Network:
     """A model under a scene, checked: names bound, dimensions agree, SI units everywhere."""
 
@@ -405,6 +417,7 @@ class Network:
     discretes: frozenset[str] = frozenset()  # parameters that events assign
     events: tuple[Event, ...] = ()
     switches: tuple[Switch, ...] = ()
+    levels: tuple[LevelChoice, ...] = ()
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
 
 

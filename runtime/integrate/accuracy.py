@@ -218,15 +218,18 @@ class _Estimate:
         return max(float(np.clip(drop, least, 0.2)) * tolerance, self.law.finest)
 
 
-def control(run: Run, target: Floats, law: Law, *, doubted: bool = False) -> Achieved:
+def control(
+    run: Run, target: Floats, law: Law, *, doubted: bool = False, first: float | None = None
+) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
 
-    doubted: another method failed here, and the first pair of runs is not believed on its own.
+    doubted: another method failed here, and the first pair of runs is not believed on its own; first: the tolerance
+    of the run behind the draft, where one is known that does.
 
     Raises SolverFailure where the first runs fail.
     """
     wanted = float(np.min(target, initial=1.0))
-    tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4)
+    tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, tolerance, law.finest)
     estimate, longest = _Estimate(law, target), LONGEST
     tolerance = max(min(tolerance, RATIO * last.tolerance), law.finest)

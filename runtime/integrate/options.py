@@ -29,10 +29,11 @@ class Options:
     further instants of the trace; sampled_at: instants of samples alone; accuracy relative to the largest value of
     each traced quantity, accuracy_on: (name, accuracy) of single ones (the others are then free if `accuracy` is
     None); rtol, atol: the solver's own, switch the control off; accuracy_check: a second run by another method must
-    agree; euler_step: of method "euler"; longest: step [s]; stops: ascending instants at which the text jumps or has
-    kinks: a step ends and the integration restarts there; redundancy: what becomes of redundant constraints: drop (the
-    last written of each dependent group is left out), minimum_norm (the least multipliers), error (the caller has seen
-    to it); sample_steps: the watcher sees accepted steps too; watch: what of a run the samples are to hold.
+    agree; first: tolerance with which the control of the accuracy begins; euler_step: of method "euler"; longest:
+    step [s]; stops: ascending instants at which the text jumps or has kinks: a step ends and the integration restarts
+    there; redundancy: what becomes of redundant constraints: drop (the last written of each dependent group is left
+    out), minimum_norm (the least multipliers), error (the caller has seen to it); sample_steps: the watcher sees
+    accepted steps too; watch: what of a run the samples are to hold.
     """
 
     output: str | Path | None
@@ -46,6 +47,7 @@ class Options:
     rtol: float | None = None
     atol: float | None = None
     accuracy_check: bool = False
+    first: float | None = None
     method: str = "auto"
     index: str = "auto"
     euler_step: float | None = None

@@ -171,6 +171,14 @@ class Starter:
         values[self._sums.entries] = 0.0
         return np.concatenate([values, summed.ravel()])
 
+    def with_sums(self, values: Floats) -> Floats:
+        """Values of all rows [rows, k] with the sums of rows in their places."""
+        if self._sums is None:
+            return values
+        values = values.copy()
+        values[self._sums.rows] = self._sums.weights @ values[self._sums.of]
+        return values
+
     @property
     def summed(self) -> bool:
         """Whether rows hold sums of rows (balances of what floats)."""

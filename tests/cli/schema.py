@@ -66,6 +66,49 @@ PARAMETER = {"name": str, "unit": str, "value": (*NUMBER, list)}
 CHECK = {"files": list}
 TARGET = {"scene": (str, type(None)), "model": str, "ok": bool}
 FMT = {"changed": list}
+LINEARIZE = {
+    "E": list,
+    "A": list,
+    "B": list,
+    "C": list,
+    "D": list,
+    "states": list,
+    "inputs": list,
+    "outputs": list,
+    "eigenvalues": list,
+    "participation": list,
+    "modes": list,
+    "reduced": dict,
+    "transfer": list,
+    "t": NUMBER,
+    "point": dict,
+    "moving": bool,
+    "formulation": str,
+    "index": str,
+}
+MODE = {"eigenvalue": list, "frequency": NUMBER, "damping": (*NUMBER, type(None)), "participation": dict}
+EQUILIBRIUM = {"t": NUMBER, "formulation": str, "equilibria": list}
+REST = {
+    "values": dict,
+    "stability": (str, type(None)),
+    "by": (str, type(None)),
+    "why": (str, type(None)),
+    "eigenvalues": list,
+    "energy": (str, type(None)),
+    "stiffness": (list, type(None)),
+    "conservative": (bool, type(None)),
+    "residual": NUMBER,
+    "free": list,
+}
+EQUATIONS = {"formulation": str, "form": str, "functions": list, "equations": list, "multipliers": list}
+EQUATION = {
+    "kind": str,
+    "label": str,
+    "text": str,
+    "latex": str,
+    "file": (str, type(None)),
+    "line": (int, type(None)),
+}
 EXPLAIN = {"code": str, "text": str}
 PLOT = {"picture": str, "traces": list, "quantities": list}
 

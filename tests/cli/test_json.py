@@ -3,12 +3,18 @@
 import pytest
 from schema import (
     CHECK,
+    EQUATION,
+    EQUATIONS,
+    EQUILIBRIUM,
     EXPECT,
     EXPLAIN,
     FMT,
+    LINEARIZE,
     MANIFEST,
+    MODE,
     PARAMETER,
     PLOT,
+    REST,
     ROW,
     SIMULATE,
     STATISTICS,
@@ -31,6 +37,36 @@ def test_check(tmp_path, capsys):
     for target in file["targets"]:
         conforms(target, TARGET)
         assert (target["dof"], target["m1"], target["index"]) == (1, 1, 3)
+
+
+def test_linearize(tmp_path, capsys):
+    code, found = run_json(capsys, "linearize", write(tmp_path, PENDULUM))
+    assert code == 0
+    envelope(found, "linearize", LINEARIZE)
+    result = found["result"]
+    n, modes = len(result["states"]), len(result["eigenvalues"])
+    assert [len(result[k]) for k in "EA"] == [n, n]
+    assert all(len(row) == n for k in "EAC" for row in result[k])
+    assert [len(row) for row in result["participation"]] == [n] * modes
+    for mode in result["modes"]:
+        conforms(mode, MODE)
+
+
+def test_equilibrium(tmp_path, capsys):
+    code, found = run_json(capsys, "equilibrium", write(tmp_path, PENDULUM))
+    assert code == 0
+    envelope(found, "equilibrium", EQUILIBRIUM)
+    assert len(found["result"]["equilibria"]) == 2
+    for rest in found["result"]["equilibria"]:
+        conforms(rest, REST)
+
+
+def test_equations(tmp_path, capsys):
+    code, found = run_json(capsys, "equations", write(tmp_path, PENDULUM))
+    assert code == 0
+    envelope(found, "equations", EQUATIONS)
+    for line in (*found["result"]["functions"], *found["result"]["equations"]):
+        conforms(line, EQUATION)
 
 
 def test_check_with_errors(tmp_path, capsys):

@@ -10,10 +10,10 @@ import h5py
 import numpy as np
 import pytest
 from pages import read
+from sysdyn.cli.equations.mathml import Typesetter, math, number
 from sysdyn.cli.main import run
 from sysdyn.cli.page.plots import thinned
 from sysdyn.cli.report.layout import places
-from sysdyn.cli.report.mathml import Typesetter, math, number
 from sysdyn.dsl.model import expression as ex
 from texts import ARRAY, BROKEN, FAILING, PENDULUM, ROOT, write
 

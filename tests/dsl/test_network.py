@@ -215,3 +215,12 @@ def test_circular_lets_are_reported_once():
     text = "model m {\n  coord x: translation = 0 m\n"
     text += "  let a = b\n  let b = a\n  energy V = a*1 J\n  energy T* = 1/2*1 kg*x'^2\n}\n"
     assert codes_of(text) == ["E105"]
+
+
+def test_a_label_is_an_element_or_an_array_of_elements():
+    text = (
+        "model m {\n  node a, b[1..3]: translation = 1 m\n  k: potential(e = 9 N/m*q) a -> b[1]\n"
+        "  for i in 1..3 { w[i]: kinetic(p = 1 kg*f) b[i] }\n"
+        "  for i in 1..2 { k[i]: potential(e = 9 N/m*q) b[i] -> b[i+1] }\n}\n"
+    )
+    assert codes_of(text) == ["E106"]

@@ -11,12 +11,13 @@ from sysdyn.runtime.trace.trace import Trace
 
 @dataclass(frozen=True)
 class Ran:
-    """refused: why there is no complete trace, "" where there is one; met: by the run's own estimate."""
+    """refused: why there is no complete trace, "" where there is one; met: by the run's own estimate; notes: codes."""
 
     refused: str
     met: bool
     outcome: object = None
     trace: object = None
+    notes: frozenset = frozenset()
 
     def at(self, name, times):
         """Values at instants of the trace [s]; after a jump where one is there twice."""
@@ -38,4 +39,5 @@ def ran(folder, text, **options):
     outcome = found.outcome
     if outcome.failure is not None:
         return Ran(str(outcome.failure), False, outcome)
-    return Ran("", outcome.met, outcome, Trace.open(outcome.trace))
+    notes = frozenset(d.code for d in report.diagnostics)
+    return Ran("", outcome.met, outcome, Trace.open(outcome.trace), notes)

@@ -5,10 +5,10 @@ Nodes share subexpressions, text does not: a node that would be larger than LARG
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
+from sysdyn.cli.equations.letters import GREEK, SHORT, is_letter, named
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.network import Loop
 
@@ -17,15 +17,7 @@ LARGEST = 500
 SUM, PRODUCT, POWER, ATOM = range(4)
 """How strongly a piece holds together."""
 
-_GREEK = dict(
-    zip(
-        ["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu"]
-        + ["xi", "omicron", "pi", "rho", "sigmaf", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega"],
-        "αβγδεζηθικλμνξοπρςστυφχψω",
-        strict=True,
-    )
-) | {"th": "θ", "om": "ω"}
-_NAME = re.compile(rf"({'|'.join(sorted(_GREEK, key=len, reverse=True))}|[^\W\d_])(?:_(\w+)|(\d+))?")
+_GREEK = dict(zip(GREEK, "αβγδεζηθικλμνξοπρστυφχψω", strict=True))
 _COUNTERS = "ijklmn"
 _SIGNS = {"==": "=", "!=": "≠", "<": "&lt;", "<=": "≤", ">": "&gt;", ">=": "≥"}
 
@@ -52,23 +44,16 @@ def row(*pieces: str) -> str:
 
 def name(text: str, index: Sequence[str] = (), order: int = 0) -> str:
     """A name, dotted as a rate, with what stands below it: `q1`, `tau_m` and `M.R` are q, tau and R with an index."""
-    *path, own = text.split(".")
-    found = _NAME.fullmatch(own)
-    below = [mi(".".join(path))] if any(path) else []
-    if found:
-        base = mi(_GREEK.get(found[1], found[1]))
-        lower = found[2] or found[3]
-        below = [*([f"<mn>{lower}</mn>" if lower.isdigit() else mi(lower)] if lower else []), *below]
-    else:
-        base = mi(own)
+    letter = named(text)
+    below = [f"<mn>{part}</mn>" if part.isdigit() else mi(part) for part in letter.below]
+    base = _dotted(mi(_GREEK.get(SHORT.get(letter.base, letter.base), letter.base)), order)
     below += index
-    base = _dotted(base, order)
     return base if not below else f"<msub>{base}{row(*_separated(below))}</msub>"
 
 
 def coordinate(text: str, index: Sequence[str] = (), order: int = 0) -> str:
     """A displacement coordinate: its own name where that is a symbol, else q with the name below."""
-    return name(text, index, order) if _NAME.fullmatch(text) else _of("q", text, index, order)
+    return name(text, index, order) if is_letter(text) else _of("q", text, index, order)
 
 
 def _separated(pieces: Sequence[str]) -> list[str]:

@@ -1,0 +1,1 @@
+"""Linear analysis: a model about a state, its states of rest."""

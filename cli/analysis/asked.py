@@ -1,0 +1,105 @@
+"""What an analysis is asked of: the target compiled, its state at the start or at an instant."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.cli.run.running import Request, options_of, rest, stops
+from sysdyn.cli.run.starting import Started, start
+from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.verdict import stopped
+from sysdyn.compiler.binding.binding import Binding
+from sysdyn.dsl import load
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.arrival import arrival
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A model at a state: system as written, its numbers there (events may have changed some)."""
+
+    target: Target
+    prepared: Prepared
+    system: System
+    state: ConsistentState
+    binding: Binding
+    started: Started | None = None
+
+
+def compiled(
+    request: Request, report: Report, outputs: tuple[str, ...] | None = None
+) -> tuple[Target, Prepared] | None:
+    """The target, compiled whole: what a scene does not need may be unstable all the same.
+
+    outputs: names or expressions in the place of the scene's traces.  None where the report says why not.
+    """
+    document = targets.read(request.file, report)
+    target = targets.one(document, request.file, request.model, request.scene, report)
+    if target is None:
+        return None
+    inner = Report()
+    network = load.network(
+        document, target.model, target.scene, inner, request.settings, levels=request.levels, outputs=outputs
+    )
+    prepared = None
+    if network is not None:
+        network = replace(network, statics=(), expectations=(), goldens=())
+        prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend)
+    report.extend(inner if prepared else targets.unsupported(inner))
+    return None if prepared is None else (target, prepared)
+
+
+def begun(target: Target, prepared: Prepared, request: Request, report: Report) -> Found | None:
+    """The model at its start; None where the report says what is in the way."""
+    scene = prepared.network.scene
+    t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
+    started = start(prepared, t0, report, request.redundancy)
+    if started is None or report.failed:
+        return None
+    return Found(target, prepared, started.system, started.state, prepared.binding, started)
+
+
+def arrived(found: Found, request: Request, report: Report) -> tuple[Found | None, str | None]:
+    """The model at the instant `request.until`, and why its run did not come there (exit 3)."""
+    asked = load.constant(found.target.document, request.until or "", dim.TIME, "--at", report)
+    if asked is None:
+        return None, None
+    if asked < found.state.t:
+        raise UsageError(f"--at {asked:g} s lies before the start, {found.state.t:g} s")
+    if asked == found.state.t:
+        return found, None
+    options = options_of(request, found.target, found.prepared, report, time.monotonic(), None)
+    if options is None:
+        return None, None
+    options = replace(options, stops=stops(found.prepared, options, report))
+    options = replace(options, events=plan(found.prepared, found.system, rest=rest(options)))
+    assert found.started is not None
+    try:
+        system, state = arrival(found.system, found.state, found.started.facts, options)
+    except NoSuchForm as error:
+        report.error("E607", str(error), found.prepared.network.place)
+        return None, None
+    except WrongOption as error:
+        raise UsageError(str(error)) from error
+    except SolverFailure as failure:
+        return None, stopped(found.target, found.prepared, found.started, failure, report)
+    return replace(found, system=system, state=state, binding=_now(found.prepared, system)), None
+
+
+def _now(prepared: Prepared, system: System) -> Binding:
+    """The binding with the discrete variables as the run left them."""
+    scalars = prepared.compiled.program.scalars
+    held: dict[str | tuple[Any, ...], Any] = {
+        n: float(system.description.p[scalars.index(n)]) for n in prepared.network.discretes if n in scalars
+    }
+    return prepared.compiled.bind(held) if held else prepared.binding

@@ -1,0 +1,112 @@
+"""States of rest of a model, each with its stability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.analysis.asked import Found, compiled
+from sysdyn.cli.analysis.linear import linearised, loose_of
+from sysdyn.cli.analysis.states import at, resting
+from sysdyn.cli.run.running import Request
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.linear.rest import Rest
+from sysdyn.runtime.linear.stability import Verdict, energy_at, verdict
+from sysdyn.runtime.linear.tangent import NoLinearisation
+
+SHOWN = ("q", "f", "s", "e")
+"""Kinds of unknowns that a table shows, flows where they are not zero."""
+MOST = 24
+"""Values of a state that a table shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Equilibrium:
+    """A state of rest; values: of y by name; outputs: what the scene traces; judged: None where there is no
+    linearisation, for the reason `why`.
+    """
+
+    rest: Rest
+    values: dict[str, float]
+    kinds: tuple[str, ...]
+    judged: Verdict | None
+    why: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of --json."""
+        judged = self.judged
+        energy = judged.energy if judged is not None else None
+        return {
+            "values": self.values,
+            "stability": judged.stability if judged is not None else None,
+            "by": judged.by if judged is not None else None,
+            "why": self.why or None,
+            "eigenvalues": [[m.eigenvalue.real, m.eigenvalue.imag] for m in judged.modes] if judged else [],
+            "energy": energy.kind if energy is not None else None,
+            "stiffness": list(energy.stiffness) if energy is not None else None,
+            "conservative": energy.conservative if energy is not None else None,
+            "residual": self.rest.residual,
+            "free": list(self.rest.free),
+        }
+
+    def to_text(self, number: int) -> str:
+        """A few lines for the terminal."""
+        lines = [f"{number}  {self._judgement()}"]
+        shown = [
+            f"{name} = {value:.9g}"
+            for (name, value), kind in zip(self.values.items(), self.kinds, strict=True)
+            if kind in SHOWN and (kind != "f" or value != 0.0)
+        ]
+        more = [f"... {len(shown) - MOST} more"] if len(shown) > MOST else []
+        lines += [f"   {text}" for text in [*shown[:MOST], *more]]
+        if self.rest.free:
+            lines.append(f"   left open: {', '.join(self.rest.free[:6])}")
+        if self.judged is not None and self.judged.modes:
+            modes = sorted(self.judged.modes, key=lambda m: -m.eigenvalue.real)[:6]
+            rest = [f"... {len(self.judged.modes) - 6} more"] if len(self.judged.modes) > 6 else []
+            lines.append(f"   eigenvalues {', '.join([*(_complex(m.eigenvalue) for m in modes), *rest])} 1/s")
+        return "\n".join(lines)
+
+    def _judgement(self) -> str:
+        if self.judged is None:
+            return f"stability unknown: {self.why}"
+        by = {"linearisation": "by the eigenvalues (Lyapunov's indirect method)", "energy": "by the energy test"}
+        energy = self.judged.energy if self.judged.stability != "asymptotically stable" else None
+        kind = "" if energy is None else f"; the potential has a {energy.kind}" if energy.kind != "flat" else (
+            "; the potential is flat in a direction"
+        )
+        said = "not decided by the eigenvalues" if self.judged.stability == "undecided" else (
+            f"{self.judged.stability} {by[self.judged.by]}"
+        )
+        return said + kind
+
+
+def equilibria(request: Request, tries: int, report: Report) -> tuple[Found, tuple[Equilibrium, ...]] | None:
+    """The model and its states of rest; None where the report says why it has none to be asked of."""
+    made = compiled(request, report, ())
+    if made is None:
+        return None
+    found, states = resting(*made, tries)
+    return found, tuple(_judged(found, rest) for rest in states)
+
+
+def _judged(found: Found, rest: Rest) -> Equilibrium:
+    here = at(found, rest)
+    system = here.system
+    n = system.form.written
+    names = dict(zip(system.unknown_names[:n], map(float, rest.state.y), strict=True))
+    kinds = tuple(map(str, system.kinds[:n]))
+    try:
+        small = linearised(here, ()).reduced
+    except NoLinearisation as error:
+        return Equilibrium(rest, names, kinds, None, str(error))
+    primal = found.prepared.formulation in ("lagrangian", "hamiltonian")
+    with np.errstate(all="ignore"):
+        energy = energy_at(system, rest.state) if primal else None
+    return Equilibrium(rest, names, kinds, verdict(small, loose_of(here), energy, rest.together), "")
+
+
+def _complex(value: complex) -> str:
+    value = complex(value.real if abs(value.real) > 1e-12 * abs(value) else 0.0, value.imag)
+    return f"{value.real:.6g}" if value.imag == 0.0 else f"{value.real:.6g}{value.imag:+.6g}i"

@@ -1,0 +1,66 @@
+"""The state that an analysis is about: the start, an instant of a run, or rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from sysdyn.cli.analysis.asked import Found, arrived, begun, compiled
+from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.targets import Target
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.events.start import eventful_start
+from sysdyn.runtime.linear.rest import Rest, Resting, rests
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import InconsistentStart
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.start.starter import Starter
+
+NO_REST = "no state of rest was found from the guesses{}: every rate zero, time held at {:g} s"
+"""Said with what else was tried, and the instant."""
+TRIES = 20
+"""Random points that are tried where the guesses lead nowhere."""
+
+
+def state_of(
+    request: Request, outputs: tuple[str, ...] | None, report: Report, *, rest: bool
+) -> tuple[Found | None, str | None]:
+    """The model at the state asked; else None, the report says why, and what stopped a run or a search."""
+    made = compiled(request, report, outputs)
+    if made is None:
+        return None, None
+    if rest:
+        found, states = resting(*made, TRIES, most=1)
+        return (found, None) if states else (None, NO_REST.format("", found.state.t))
+    found_ = begun(*made, request, report)
+    return (found_, None) if found_ is None or request.until is None else arrived(found_, request, report)
+
+
+def resting(target: Target, prepared: Prepared, tries: int, most: int | None = None) -> tuple[Found, tuple[Rest, ...]]:
+    """The model at its first state of rest, and all of them; the guess where there is none."""
+    scene = prepared.network.scene
+    t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
+    system = System(prepared.manifest, prepared.arrays, prepared.carrier)
+    guess = _guess(prepared, system, t0)
+    tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
+    states = rests(Resting(system, tangible, t0, guess), tries, most)
+    state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf, 0, ())
+    return Found(target, prepared, system, state, prepared.binding), states
+
+
+def at(found: Found, rest: Rest) -> Found:
+    """The model at another state of rest."""
+    return replace(found, state=rest.state)
+
+
+def _guess(prepared: Prepared, system: System, t0: float) -> Floats:
+    """The consistent start, which also says what holds of the constraints that hold at times; else what is written."""
+    try:
+        with np.errstate(all="ignore"):
+            return eventful_start(system, t0, plan(prepared, system)).y
+    except (InconsistentStart, NotFiniteError):
+        return Starter(system).given.guess

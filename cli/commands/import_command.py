@@ -1,0 +1,39 @@
+"""`sysdyn import`: a SPICE netlist as the text of a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.spice.circuit import Reader
+from sysdyn.cli.spice.model_text import Writer
+from sysdyn.dsl.format.format import format_text
+from sysdyn.dsl.text.diagnostics import SourceText
+
+
+@with_console("import")
+@click.argument("file")
+@click.option("-o", "output", metavar="FILE.sd", help="Default: standard output.")
+def command(console: Console, file: str, output: str | None) -> int:
+    """Write the SPICE netlist FILE as a model text: components for subcircuits, a scene for .tran.
+
+    R, C, L, K, V, I (DC, SIN, PULSE, PWL, EXP), D, Q, M of level 1, E, F, G, H, X; .param, .model, .subckt, .ic, and
+    .include of its own folder. What cannot be said is an error with its line; what a model has beyond it a warning.
+    """
+    if output is not None and not output.endswith(".sd"):
+        raise UsageError(f"-o {output}: a model's text ends in .sd")
+    source = SourceText.read(file)
+    reader = Reader(source, console.report)
+    text = Writer(reader.netlist, source, console.report).text()
+    if console.report.failed:
+        return console.finish(1)
+    text = format_text(text)
+    console.result = {"text": text, "output": output}
+    if output is None:
+        console.data(text, verbatim=True)
+    else:
+        Path(output).write_text(text, encoding="utf-8")
+        console.say(f"{output}: {reader.netlist.title or file}")
+    return console.finish()

@@ -1,0 +1,1 @@
+"""Equations written for a reader."""

@@ -1,0 +1,90 @@
+"""What a --form consists of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysdyn.cli.analysis.asked import begun
+from sysdyn.cli.analysis.linear import inputs_of, linearised
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.targets import Target
+from sysdyn.compiler.equations.book import WORDS, Equation, Function, Summed, algebra_of, equations, functions
+from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying
+from sysdyn.dsl.model.expression import Node, const, param, scale, var
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.linear.tangent import NoLinearisation
+from sysdyn.runtime.model.system import System
+
+MOST = 400
+"""Row families that are printed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a form consists of; more: row families that were left out."""
+
+    functions: tuple[Function, ...] = ()
+    equations: tuple[Equation, ...] = ()
+    matrices: tuple[Matrix, ...] = ()
+    more: int = 0
+
+
+def content_of(
+    target: Target, prepared: Prepared, form: str, request: Request, report: Report
+) -> Content | None:
+    """The content of a --form; None where the report says why there is none.  Raises NoSuchEquations."""
+    compiled = prepared.compiled
+    algebra = algebra_of(compiled.form, [p.name for p in compiled.network.parameters if not p.shape])
+    match form:
+        case "matrices":
+            return Content(matrices=matrices(algebra, compiled.form))
+        case "canonical":
+            function, found = canonical(algebra, compiled.energies, compiled.form)
+            return Content((function,), tuple(found))
+        case "underlying":
+            return Content(equations=tuple(underlying(algebra, compiled.form)))
+        case "linear":
+            return _linear(target, prepared, request, report)
+        case _:
+            more = sum(r.block in WORDS for r in compiled.form.rows) - MOST
+            return Content(
+                tuple(functions(algebra, compiled.energies)),
+                tuple(equations(algebra, compiled.energies, compiled.form, MOST)),
+                more=max(more, 0),
+            )
+
+
+def _linear(target: Target, prepared: Prepared, request: Request, report: Report) -> Content | None:
+    """The equations x' = A x + B u about the start, in numbers; x and u are deviations."""
+    found = begun(target, prepared, request, report)
+    if found is None:
+        return None
+    inputs = inputs_of(target, prepared, None)
+    try:
+        linear = linearised(found, inputs)
+    except NoLinearisation as error:
+        raise NoSuchEquations(str(error)) from error
+    small, system = linear.reduced, found.system
+    nodes = [unknown_node(system, int(k)) for k in small.places]
+    controls = [param(name, *map(const, at)) for name, at in inputs]
+    lines = []
+    for k, node in enumerate(nodes):
+        values = (*small.a[k], *small.b[k])
+        terms = [scale(float(v), n) for v, n in zip(values, (*nodes, *controls), strict=True) if v != 0.0]
+        rate = var(node.data[0], node.data[1], *node.args, order=1)
+        right = tuple(Summed((), term) for term in terms)
+        name = system.name(int(small.places[k]))
+        lines.append(Equation("linear", name, None, (Summed((), rate),), right))
+    return Content(equations=tuple(lines))
+
+
+def unknown_node(system: System, place: int) -> Node:
+    """The unknown at a place as a node."""
+    family = system.description.families[int(system.family_of[place])]
+    position = place - int(system.form.at[int(system.family_of[place])])
+    index: list[Node] = []
+    for first, last in reversed(family.shape):
+        position, rest = divmod(position, last - first + 1)
+        index.insert(0, const(float(first + rest)))
+    return var(family.owner, family.kind, *index)

@@ -1,0 +1,194 @@
+"""What is printed: energy functions, equations and what their letters stand for, in text and LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from sysdyn.cli.equations.forms import Content
+from sysdyn.cli.equations.letters import Letters
+from sysdyn.cli.equations.writing import Latex, Text, Writer
+from sysdyn.compiler.equations.book import (
+    CO_WORDS,
+    REFLECTED,
+    WORDS,
+    Effort,
+    Equation,
+    Function,
+    Summed,
+)
+from sysdyn.compiler.equations.matrices import Matrix, unknowns
+from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.model.terms import Nest
+from sysdyn.compiler.pipeline import CompiledModel
+from sysdyn.dsl.model.expression import Node, index
+from sysdyn.dsl.text.diagnostics import Place
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """left = right, in text and LaTeX; condition: for which indices; label: of the row; place: in the author's
+    text; more: added to the right side of the line before.
+    """
+
+    kind: str
+    label: str
+    text: tuple[str, str]
+    latex: tuple[str, str]
+    condition: tuple[str, str]
+    place: Place | None
+    more: bool = False
+
+    def to_json(self) -> dict[str, object]:
+        """The object of --json."""
+        for_, in_latex = (f", {c}" if c else "" for c in self.condition)
+        return {
+            "kind": self.kind,
+            "label": self.label,
+            "text": f"{self.text[0]} {'+' if self.more else '='} {self.text[1]}{for_}".strip(),
+            "latex": f"{self.latex[0]} {'+' if self.more else '='} {self.latex[1]}{in_latex}".strip(),
+            "file": self.place.file if self.place else None,
+            "line": self.place.start[0] if self.place else None,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """Everything printed; legend: what multipliers belong to; more: equations that were left out."""
+
+    functions: tuple[Line, ...]
+    equations: tuple[Line, ...]
+    legend: tuple[tuple[str, str, int], ...]
+    more: int = 0
+
+    def to_text(self) -> str:
+        """For a terminal."""
+        parts = [_block(self.functions)] if self.functions else []
+        parts.append(_block(self.equations) + (f"\n... {self.more} more" if self.more else ""))
+        if self.legend:
+            said = (f"{s} of {owner}, line {line}" if owner else s for s, owner, line in self.legend)
+            parts.append("\n".join(said))
+        return "\n\n".join(parts)
+
+    def to_latex(self) -> str:
+        """Two align environments."""
+        groups = [g for g in (self.functions, self.equations) if g]
+        return "\n\n".join(
+            "\\begin{align*}\n" + " \\\\\n".join(_latex(line) for line in group) + "\n\\end{align*}" for group in groups
+        )
+
+
+_NAMES = {"M": "M", "Φ_q": "\\Phi_q", "Ψ_f": "\\Psi_f", "Y": "Y", "U": "U", "Z1": "Z_1", "Z2": "Z_2"}
+"""In LaTeX."""
+
+
+def _grid(entries: Sequence[Sequence[str]]) -> str:
+    """A matrix as text: a row a line."""
+    wide = [max(len(row[k]) for row in entries) for k in range(len(entries[0]))]
+    rows = ("[ " + "   ".join(text.ljust(n) for text, n in zip(row, wide, strict=True)) + " ]" for row in entries)
+    return "\n".join(rows)
+
+
+def _array(entries: Sequence[Sequence[str]]) -> str:
+    return "\\begin{bmatrix} " + " \\\\ ".join(" & ".join(row) for row in entries) + " \\end{bmatrix}"
+
+
+def _block(lines: Sequence[Line]) -> str:
+    wide = max(len(line.text[0]) for line in lines)
+    return "\n".join(_row(line, wide) for line in lines)
+
+
+def _row(line: Line, wide: int) -> str:
+    """One line; a matrix takes several."""
+    head = f"{line.text[0].rjust(wide)} {'+' if line.more else '='} "
+    text = line.text[1].replace("\n", "\n" + " " * len(head))
+    return head + text + (f"    {line.condition[0]}" if line.condition[0] else "")
+
+
+def _latex(line: Line) -> str:
+    condition = f" \\qquad {line.condition[1]}" if line.condition[1] else ""
+    sign = "&\\quad {} + " if line.more else "&= "
+    return f"  {line.latex[0]} {sign}{line.latex[1]}{condition}"
+
+
+class Sheets:
+    """Writes the forms of one compiled model."""
+
+    def __init__(self, compiled: CompiledModel, named: Sequence[str]) -> None:
+        self.compiled = compiled
+        self.letters = Letters(compiled.form, named)
+        order = Order([p.name for p in compiled.network.parameters])
+        self.writers: tuple[Writer, Writer] = (Text(self.letters, order), Latex(self.letters, order))
+        self.complementary = compiled.form.formulation.startswith("co_")
+
+    def sheet(self, content: Content) -> Sheet:
+        """What is printed, in both alphabets."""
+        lines = [self._matrix(m) for m in content.matrices] + [self.line(e) for e in content.equations]
+        legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
+        return Sheet(tuple(self.named(f) for f in content.functions), tuple(lines), legend, content.more)
+
+    def _matrix(self, matrix: Matrix) -> Line:
+        text, latex = ([[self._entry(w, e) for e in row] for row in matrix.rows] for w in self.writers)
+        texts = (matrix.name, _grid(text)), (_NAMES[matrix.name], _array(latex))
+        return Line("matrix", matrix.name, *texts, ("", ""), None)
+
+    def _flows(self) -> str:
+        order = ", ".join(self.writers[0].expression(n) for n in unknowns(self.compiled.form, "f"))
+        return f"f = ({order})"
+
+    def _entry(self, writer: Writer, terms: Sequence[Node]) -> str:
+        return writer.sum_of([Summed((), term) for term in terms])
+
+    def named(self, function: Function) -> Line:
+        """A state function or virtual work."""
+        texts = tuple(self._function(writer, function) for writer in self.writers)
+        name = REFLECTED[function.name] if self.complementary else function.name
+        name = f"δ{name}" if function.name == "W" else name
+        latex = name.replace("δ", "\\delta ").replace("*", "^{*}")
+        return Line("function", name, (name, texts[0]), (latex, texts[1]), ("", ""), None)
+
+    def _function(self, writer: Writer, function: Function) -> str:
+        if function.name != "W":
+            return writer.sum_of(function.terms)
+        return _added([self._effort(writer, effort) for effort in function.efforts], writer.minus)
+
+    def _effort(self, writer: Writer, effort: Effort) -> str:
+        """Q delta q, summed."""
+        text = writer.sum_of([Summed((), term) for term in effort.terms])
+        single = len(effort.terms) == 1 and (effort.terms[0].op != "sum" or len(effort.terms[0].args) == 1)
+        text = writer.joined([text if single else writer.held(text), writer.varied(effort.on)])
+        for loop in reversed(effort.over):
+            text = writer.total("sum", loop, text)
+        return text
+
+    def line(self, equation: Equation) -> Line:
+        """An equation in both alphabets."""
+        words = WORDS | CO_WORDS if self.complementary else WORDS
+        pairs = [(w.sum_of(equation.left), w.sum_of(equation.right)) for w in self.writers]
+        conditions = [self._condition(w, equation.where, equation.fixed) for w in self.writers]
+        label = f"{words.get(equation.kind, 'rate of')} {equation.owner}".strip()
+        if equation.more:
+            pairs = [("", right) for _, right in pairs]
+        ends = (conditions[0], conditions[1])
+        return Line(equation.kind, label, pairs[0], pairs[1], ends, equation.place, equation.more)
+
+    def _condition(self, writer: Writer, where: Nest, fixed: Sequence[tuple[int, Node]]) -> str:
+        pieces = []
+        for loop in where:
+            first, last = writer.expression(loop.first), writer.expression(loop.last)
+            ends = first if loop.first is loop.last else f"{first}..{last}"
+            pieces.append(f"{writer.counter(loop.index)} = {ends}")
+        pieces += [f"{writer.expression(index(f'#{d}'))} = {writer.expression(at)}" for d, at in fixed]
+        return ", ".join(pieces)
+
+    def legend(self) -> Iterator[tuple[str, str, int]]:
+        """Multipliers with the constraints whose they are."""
+        for kind, number, owner, line in self.letters.legend(self.compiled.form):
+            yield {"kappa": "κ", "mu": "μ"}[kind] + str(number), owner, line
+
+
+def _added(pieces: Sequence[str], minus: str) -> str:
+    found = list(pieces[:1])
+    for piece in pieces[1:]:
+        found.append(f"{minus} {piece.removeprefix(minus)}" if piece.startswith(minus) else f"+ {piece}")
+    return " ".join(found) or "0"

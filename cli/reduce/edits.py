@@ -1,0 +1,149 @@
+"""Changes of an author's text: an element left out, or what it stands between joined.
+
+An element that hardly takes part either lets nothing pass (it is left out: no current, no force), or nothing stands
+across it (a wire, a rigid link): a source of effort or flow zero takes its place.  What only served it goes too: its
+initial values, parameters that nothing reads any more.
+
+Received: a document's text and its syntax; handed back: texts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from sysdyn.cli.reduce.activity import Activity
+from sysdyn.cli.run.targets import Target
+from sysdyn.dsl.model.network import Branch, Network
+from sysdyn.dsl.text.diagnostics import SourceText
+from sysdyn.dsl.tree import syntax
+
+Cut = tuple[int, int, str]
+"""Code points first..last-1 of a text, and what stands there instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A statement of the model that may go.  label: of the element or statement; activity [J], share: of all its
+    parts; span: of the statement; name: that it declares; joined: an element that joins its ends, "" where it has none.
+    """
+
+    label: str
+    activity: float
+    share: float
+    span: tuple[int, int]
+    name: str
+    joined: str
+
+
+def candidates(target: Target, network: Network, found: Sequence[Activity]) -> tuple[Candidate, ...]:
+    """Statements of the author's own model with their activities, the least active first; sources are none."""
+    source = target.document.file.source
+    groups: dict[tuple[int, int], list[Activity]] = {}
+    owners: dict[tuple[int, int], syntax.Statement] = {}
+    for activity in found:
+        statement = _statement(target, activity)
+        if statement is not None:
+            key = (statement.span.start, statement.span.end)
+            groups.setdefault(key, []).append(activity)
+            owners[key] = statement
+    made = []
+    for key, group in groups.items():
+        statement = owners[key]
+        if all(a.role in ("in", "through") for a in group):
+            continue
+        name = statement.decl.name if isinstance(statement, syntax.Instance) else ""
+        value, share = sum(a.activity for a in group), sum(a.share for a in group)
+        label = name or group[0].label
+        made.append(Candidate(label, value, share, key, name, _joined(source, statement, network)))
+    return tuple(sorted(made, key=lambda c: (c.activity, c.span)))
+
+
+def _statement(target: Target, activity: Activity) -> syntax.Statement | None:
+    """The statement of the model that makes an element, or that is one; None inside components and loops."""
+    if activity.name and not activity.label.startswith(("T*", "V", "T ", "D ", "G ", "work")):
+        first = re.split(r"[.\[#]", activity.name, maxsplit=1)[0]
+        for s in target.model.body:
+            if isinstance(s, syntax.Instance) and s.decl.name == first:
+                return s
+        return None
+    place = activity.place
+    if place.file != target.document.file.source.name:
+        return None
+    return next((s for s in target.model.body if s.span.start == place.span.start), None)
+
+
+def _joined(source: SourceText, statement: syntax.Statement, network: Network) -> str:
+    """`label: effort(e = 0 V) a -> b`, or of zero flow where nodes have a common flow."""
+    if not isinstance(statement, syntax.Instance) or statement.decl.indices or len(statement.connections) != 1:
+        return ""
+    connection = statement.connections[0]
+    branch = next((b for b in network.branches if b.name.partition(".")[0] == statement.decl.name), None)
+    if branch is None or not isinstance(connection, syntax.Across | syntax.Single):
+        return ""
+    ends = source.text[connection.span.start : connection.span.end]
+    ends = ends if isinstance(connection, syntax.Across) else f"{ends} -> ground"
+    return f"{statement.decl.name}: {_source(branch)} {ends}"
+
+
+def _source(branch: Branch) -> str:
+    domain = branch.domain
+    if domain.common == "effort":
+        return f"effort(e = 0 {domain.effort.text})"
+    return f"flow(f = 0 {domain.flow.text})"
+
+
+def without(target: Target, text: str, candidate: Candidate) -> str:
+    """The text without a statement, and without the initial values of what it declares."""
+    cuts = [(*candidate.span, ""), *((*span, "") for span in _initials(target, candidate.name))]
+    return changed(text, cuts)
+
+
+def joined(target: Target, text: str, candidate: Candidate) -> str:
+    """The text with a source of zero in the element's place."""
+    cuts = [(*candidate.span, candidate.joined), *((*span, "") for span in _initials(target, candidate.name))]
+    return changed(text, cuts)
+
+
+def _initials(target: Target, name: str) -> Iterator[tuple[int, int]]:
+    """Spans of `init` statements of the model and the scene whose target begins with a name."""
+    source = target.document.file.source
+    if not name:
+        return
+    for s in (*target.model.body, *(target.scene.body if target.scene else ())):
+        if isinstance(s, syntax.Init):
+            words = re.split(r"[.'\[\s]", source.text[s.target.span.start : s.target.span.end], maxsplit=1)
+            if words[0] == name:
+                yield s.span.start, s.span.end
+
+
+def changed(text: str, cuts: Sequence[Cut]) -> str:
+    """The text after cuts; a line of which nothing is left goes with its comment."""
+    for first, last, instead in sorted(cuts, reverse=True):
+        if not instead:
+            start = text.rfind("\n", 0, first) + 1
+            end = text.find("\n", last)
+            end = len(text) if end < 0 else end + 1
+            rest = text[start:first].strip() + text[last:end].partition("#")[0].strip().removeprefix(";")
+            if not rest:
+                first, last = start, end
+        text = text[:first] + instead + text[last:]
+    return text
+
+
+def unread(target: Target, text: str, before: str) -> str:
+    """The text without scalar parameters of the model that nothing reads any more, but something read before."""
+    cuts = []
+    for s in target.model.body:
+        if isinstance(s, syntax.Param):
+            name = s.decl.name
+            if _read(before, name) > 1 and _read(text, name) == 1:
+                cuts.append((s.span.start, s.span.end, ""))
+    return changed(text, cuts)
+
+
+def _read(text: str, name: str) -> int:
+    """How often a name stands in a text, comments apart."""
+    plain = re.sub(r"#[^\n]*", "", text)
+    return len(re.findall(rf"(?<![\w.]){re.escape(name)}(?!\w)", plain))

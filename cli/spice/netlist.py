@@ -1,0 +1,129 @@
+"""A netlist's lines: cards with their places, numbers, expressions of parameters."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from sysdyn.dsl.text.source import SourceText
+
+SCALES = {
+    "t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12, "f": 1e-15,
+}  # fmt: skip
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)([a-z]*)", re.IGNORECASE)
+_WORD = re.compile(r"\{[^{}]*\}|'[^']*'|[^\s(),={}']+|[(),=]")
+_SCALED = re.compile(r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(t|g|meg|k|mil|m|u|n|p|f)?[a-z]*(?![\w.(])")
+MOST = 400
+"""Characters of an expression."""
+
+
+class Unreadable(Exception):  # noqa: N818 (a finding)
+    """What a card says cannot be read; str: the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One statement: words (names in small letters, expressions in their brackets), and its first line's span."""
+
+    words: tuple[str, ...]
+    start: int
+    end: int
+    text: str
+
+    @property
+    def head(self) -> str:
+        """The first word: a name, or a command with its dot."""
+        return self.words[0]
+
+
+def cards(source: SourceText) -> tuple[str, list[Card]]:
+    """The title and the statements of a text; lines that begin with '+' go on."""
+    joined: list[tuple[int, int, str]] = []
+    for number in range(2, len(source.line_starts) + 1):
+        line, start = source.line(number), source.line_starts[number - 1]
+        plain = re.split(r";|\$\s|//", line, maxsplit=1)[0].rstrip()
+        if not plain.strip() or plain.lstrip().startswith("*"):
+            continue
+        if plain.lstrip().startswith("+") and joined:
+            first, end, text = joined[-1]
+            joined[-1] = first, end, f"{text} {plain.lstrip()[1:]}"
+        else:
+            joined.append((start + len(plain) - len(plain.lstrip()), start + len(plain), plain.strip()))
+    found = [Card(tuple(w.lower() for w in _WORD.findall(text)), a, b, text) for a, b, text in joined]
+    return source.line(1).strip(), [card for card in found if card.words]
+
+
+def number(text: str) -> float | None:
+    """`4.7k`, `10meg`, `100nF`, `1e-3`; None where it is none."""
+    found = _NUMBER.fullmatch(text)
+    if found is None:
+        return None
+    suffix = found[2].lower()
+    scale = next((s for s in ("meg", "mil", *SCALES) if suffix.startswith(s)), "")
+    return scaled(found[1], scale)
+
+
+def scaled(text: str, scale: str) -> float:
+    """A number with the letters of a scale; one of ten as if it were written out, so that 0.1n is 1e-10."""
+    if scale == "mil":
+        return float(text) * SCALES[scale]
+    digits, _, power = text.lower().partition("e")
+    return float(f"{digits}e{int(power or '0') + (round(math.log10(SCALES[scale])) if scale else 0)}")
+
+
+_OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv, ast.Pow: math.pow,
+    ast.USub: operator.neg, ast.UAdd: operator.pos,
+}  # fmt: skip
+_FUNCTIONS: dict[str, Callable[..., float]] = {
+    "sqrt": math.sqrt, "exp": math.exp, "ln": math.log, "log": math.log, "log10": math.log10, "sin": math.sin,
+    "cos": math.cos, "tan": math.tan, "atan": math.atan, "abs": abs, "min": min, "max": max, "pow": math.pow,
+}  # fmt: skip
+CONSTANTS = {"pi": math.pi}
+
+
+def value(text: str, known: Mapping[str, float]) -> float:
+    """A number, the name of a parameter, or an expression in brackets.  Unreadable.
+
+    The expression is parsed and walked: numbers, names of parameters, + - * / ** ^ and a few functions, nothing else.
+    """
+    plain = text.strip("{}'").strip()
+    found = number(plain)
+    if found is not None:
+        return found
+    if plain in known:
+        return known[plain]
+    if len(plain) > MOST:
+        raise Unreadable(f"an expression of more than {MOST} characters")
+
+    def written(match: re.Match[str]) -> str:
+        return repr(scaled(match[1], match[2] or ""))
+
+    try:
+        tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
+        return _walk(tree.body, {**CONSTANTS, **known})
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise Unreadable(f"'{text}' is no number and no expression of parameters") from None
+    except (ZeroDivisionError, OverflowError, TypeError):
+        raise Unreadable(f"'{text}' has no value") from None
+
+
+def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+        return float(node.value)
+    if isinstance(node, ast.Name):
+        if node.id not in known:
+            raise Unreadable(f"there is no parameter '{node.id}'")
+        return known[node.id]
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](_walk(node.left, known), _walk(node.right, known))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](_walk(node.operand, known))
+    called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+    if isinstance(node, ast.Call) and called in _FUNCTIONS and not node.keywords:
+        return float(_FUNCTIONS[called](*(_walk(a, known) for a in node.args)))
+    raise Unreadable("an expression of numbers, parameters, + - * / ** and functions is wanted")

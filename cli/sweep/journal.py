@@ -1,0 +1,63 @@
+"""The journal of a sweep: one line of JSON a run, beside the result, written at once.
+
+A kill loses the runs under way and no more: the same command reads the journal and goes on.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.sweep.one_run import Kept
+
+
+class Journal:
+    """`.NAME.runs` beside the result; done: what it holds already, by number of the run."""
+
+    def __init__(self, output: Path, digest: str) -> None:
+        self.path = output.with_name(f".{output.name}.runs")
+        self.done: dict[int, Kept] = {}
+        self._read(digest)
+        self._file = self.path.open("a", encoding="utf-8")
+        if not self.path.stat().st_size:
+            self._line({"study": digest})
+
+    def _read(self, digest: str) -> None:
+        """Takes in what is there; a line that a kill cut short is taken away."""
+        if not self.path.exists():
+            return
+        text = self.path.read_text(encoding="utf-8")
+        whole = text[: text.rfind("\n") + 1]
+        lines = [json.loads(line) for line in whole.splitlines()]
+        if lines and lines[0].get("study") != digest:
+            raise UsageError(
+                f"{self.path} holds runs of another study, or of another text: remove it, or give -o another name"
+            )
+        if whole != text:
+            self.path.write_text(whole, encoding="utf-8")
+        self.done = {line["run"]: Kept(**line) for line in lines[1:]}
+
+    def _line(self, item: dict[str, object]) -> None:
+        self._file.write(json.dumps(item) + "\n")
+        self._file.flush()
+
+    def take(self, kept: Kept) -> None:
+        """Keeps a result."""
+        self.done[kept.run] = kept
+        self._line(kept.to_json())
+
+    def remove(self) -> None:
+        """All runs stand in the result."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()

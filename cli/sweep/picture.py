@@ -1,0 +1,77 @@
+"""A sweep as a picture: bands over time where there are traces, end values over what varied."""
+
+from __future__ import annotations
+
+import io
+import logging
+import warnings
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.page.panels import COLOURS
+from sysdyn.cli.sweep.sweeping import Swept
+
+MOST = 4
+"""Quantities, and names that vary, in one picture."""
+
+
+def picture(found: Swept, kind: str) -> bytes:
+    """PNG or SVG: a row a traced quantity; runs that are not met in red crosses."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from sysdyn.cli.page.picture import style
+
+    names = list(next((k.end for k in found.kept if k.end), {}) or {})[:MOST]
+    over = list(found.cases[0])[:MOST]
+    bands = any(k.traces for k in found.kept)
+    columns = len(over) + bands
+    with warnings.catch_warnings(), mpl.rc_context(style(mpl.rcParamsDefault)):
+        warnings.simplefilter("ignore")
+        size = (2.4 + 3.1 * columns, 1.0 + 2.2 * max(len(names), 1))
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(max(len(names), 1), columns, squeeze=False, sharex="col")
+        for row, name in enumerate(names):
+            if bands:
+                _bands(axes[row, 0], found, name)
+            for k, varied in enumerate(over):
+                _scatter(axes[row, k + bands], found, name, varied)
+            axes[row, 0].set_ylabel(_labelled(found, name))
+        for k, varied in enumerate(over):
+            axes[-1, k + bands].set_xlabel(_labelled(found, varied))
+        if bands:
+            axes[-1, 0].set_xlabel("time, s")
+        axes[0, 0].set_title(f"{len(found.cases)} runs" + (", median, 80 % and all" if bands else ": at the end"))
+        if bands:
+            axes[0, 1].set_title("at the end")
+        data = io.BytesIO()
+        figure.savefig(data, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
+    return data.getvalue()
+
+
+def _labelled(found: Swept, name: str) -> str:
+    unit = found.units.get(name, "")
+    return name if unit in ("", "1") else f"{name}, {unit}"
+
+
+def _bands(axis: Any, found: Swept, name: str) -> None:
+    some = [k for k in found.kept if k.met and k.time and k.traces]
+    if not some:
+        return
+    time = max((k.time or [] for k in some), key=len)
+    table = np.array([k.traces[name] for k in some if k.traces and k.time == time])
+    low, ten, middle, ninety, high = np.quantile(table, [0.0, 0.1, 0.5, 0.9, 1.0], axis=0)
+    axis.fill_between(time, low, high, color=COLOURS[0], alpha=0.15, linewidth=0)
+    axis.fill_between(time, ten, ninety, color=COLOURS[0], alpha=0.3, linewidth=0)
+    axis.plot(time, middle, color=COLOURS[0])
+
+
+def _scatter(axis: Any, found: Swept, name: str, varied: str) -> None:
+    """End values; bands stand beside them, so that these share the scale of their quantity alone."""
+    for met, marker, colour in ((True, "o", COLOURS[0]), (False, "x", "#c2334d")):
+        some = [k for k in found.kept if k.met is met and k.end]
+        if some:
+            x: list[Any] = [found.cases[k.run][varied] for k in some]
+            axis.plot(x, [(k.end or {})[name] for k in some], marker, color=colour, markersize=3.0, alpha=0.7)

@@ -1,0 +1,153 @@
+"""A sweep: cases to workers, what comes back into the journal and the file.
+
+The file is written anew every REFRESH seconds and at the end, also of a run that was interrupted.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sysdyn.cli.run import lock
+from sysdyn.cli.run.running import Request, model_digest, version
+from sysdyn.cli.sweep import results
+from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
+from sysdyn.cli.sweep.journal import Journal
+from sysdyn.cli.sweep.one_run import Kept, Runner
+from sysdyn.cli.sweep.study import Case, Study
+from sysdyn.cli.sweep.workers import results as worked
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.units import si_text
+from sysdyn.dsl.text.diagnostics import Report
+
+REFRESH = 10.0
+"""Seconds between two versions of the file, at least ten times what writing one takes."""
+
+FORETOLD = 16
+"""Runs after which the time left is said: workers begin slowly."""
+
+Progress = Callable[[float, float | None], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """What came of a sweep.  cases and kept [runs]; resumed: runs that stood in the journal."""
+
+    output: Path
+    study: Study
+    cases: tuple[Case, ...]
+    kept: tuple[Kept, ...]
+    units: dict[str, str]
+    resumed: int
+
+    @property
+    def failed(self) -> tuple[Kept, ...]:
+        """Runs that did not end as asked, were not met, or whose expectations failed."""
+        return tuple(k for k in self.kept if k.exit)
+
+
+def axes_of(runner: Runner, texts: tuple[str, ...]) -> list[Axis]:
+    """The axes of `--over`, values in SI units.  UsageError; ModelError where a value is none of its parameter."""
+    return [axis(text, _evaluate(runner)) for text in texts]
+
+
+def _evaluate(runner: Runner) -> Evaluate:
+    loaded = runner.loaded()
+    known = {p.name: p.unit.dimension for p in loaded.first.prepared.network.parameters}
+
+    def value(name: str, text: str) -> float | None:
+        plain = name.partition("[")[0]
+        if plain not in known:
+            return None
+        report = Report()
+        with ex.fresh():
+            found = load.constant(loaded.target.document, text, known[plain], f"--over {name}", report)
+        report.raise_if_failed()
+        return found
+
+    return value
+
+
+def sweep(request: Request, study: Study, output: Path, jobs: int, progress: Progress, *, timings: bool) -> Swept:
+    """Runs what the journal does not hold yet."""
+    runner = Runner(request)
+    cases = tuple(study.cases())
+    first = cases[0]
+    runner.loaded().bound({n: v for n, v in first.items() if n not in CHOICES and not n.startswith("level ")})
+    target = runner.loaded().target
+    sha = model_digest(target)
+    texts = lock.hashes(target.document.file.source, target.document.file.items)
+    digest = study.digest(request=replace(request, output=None), texts=texts, version=version())
+    units = _units(runner)
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": f"sweep of {target.name}",
+        "source": f"sysdyn {version()}",
+        "model": target.model.name.name,
+        "scene": target.scene.name.name if target.scene else "",
+        "model_sha256": sha,
+        "sample": study.sample if study.runs else "product",
+        "seed": study.seed,
+    }
+    with Journal(output, digest) as journal:
+        resumed = len(journal.done)
+        tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
+        left = len(cases) - resumed
+        began = written = time.monotonic()
+        cost = 0.0
+        try:
+            for kept in worked(request, tasks, min(jobs, max(left, 1))):
+                journal.take(kept)
+                now = time.monotonic()
+                number = len(journal.done) - resumed
+                ahead = (now - began) / number * (left - number) if number > FORETOLD else None
+                progress(len(journal.done) / len(cases), ahead)
+                if now - written > max(REFRESH, 10.0 * cost):
+                    results.write(output, cases, journal.done, units, attributes, timings=timings)
+                    written = time.monotonic()
+                    cost = written - now
+        finally:
+            results.write(output, cases, journal.done, units, attributes, timings=timings)
+        kept_ = tuple(journal.done[k] for k in range(len(cases)))
+        journal.remove()
+    return Swept(output, study, cases, kept_, units, resumed)
+
+
+def _units(runner: Runner) -> dict[str, str]:
+    """Of parameters and traced quantities by name."""
+    prepared = runner.loaded().first.prepared
+    known = {p.name: si_text(p.unit.dimension) for p in prepared.network.parameters}
+    rows = [row for row in prepared.manifest["structure"]["rows"] if row.get("stored")]
+    return known | {str(row["name"]): str(row["unit"]) for row in rows}
+
+
+def summary(found: Swept) -> dict[str, dict[str, float]]:
+    """Least, median and largest end value of each traced quantity, over the runs that are met."""
+    good = [k.end for k in found.kept if k.exit in (0, 1) and k.met and k.end]
+    names = list(good[0]) if good else []
+    table: dict[str, dict[str, float]] = {}
+    for name in names:
+        values = sorted(end[name] for end in good if not math.isnan(end[name]))
+        if values:
+            middle = 0.5 * (values[(len(values) - 1) // 2] + values[len(values) // 2])
+            table[name] = {"least": values[0], "median": middle, "largest": values[-1]}
+    return table
+
+
+def to_json(found: Swept) -> dict[str, Any]:
+    """The result of `--json`."""
+    return {
+        "output": str(found.output),
+        "runs": len(found.cases),
+        "resumed": found.resumed,
+        "over": list(found.cases[0]),
+        "failed": [
+            {"run": k.run, "exit": k.exit, "reason": k.reason, "settings": found.cases[k.run]} for k in found.failed
+        ],
+        "end": summary(found),
+    }

@@ -1,0 +1,1 @@
+"""The measured trade of speed for accuracy of one scene."""

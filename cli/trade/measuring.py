@@ -1,0 +1,289 @@
+"""Settings of one scene, run: each formulation compiled once, its start found once.
+
+Received: a request, its target; handed back: combinations that exist, and a `Measured` of each that is run.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import FORMULATIONS
+from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.running import ACCURACY, Ran, Request, begin, options_of, ready, run_from
+from sysdyn.cli.run.starting import Started
+from sysdyn.cli.run.targets import Target
+from sysdyn.cli.trade.errors import error_of
+from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
+from sysdyn.cli.trade.work import counted, of_rows
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.integrate.options import Options, choose_index
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.trace.trace import Trace
+
+METHODS = ("dopri", "radau", "bdf")
+LARGE = 20_000
+"""Unknowns of a model of which other formulations are not kept beside its own: gigabytes each."""
+MOST = 32
+"""Combinations of levels that are measured."""
+GRID = 200
+"""Intervals of the trace where the scene leaves them to the solver."""
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """A formulation at its start.  again: it has events, and every run finds its own start; sizes: (unknowns, entries)
+    by index form.
+    """
+
+    prepared: Prepared
+    options: Options
+    started: Started
+    again: bool
+    sizes: dict[str, tuple[int, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Of one run: steps, and wall time [s]; None: none."""
+
+    steps: int | None = None
+    wall: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Carrying:
+    """What is to be compiled; formulation None: the scene's."""
+
+    formulation: str | None
+    level: str
+    levels: tuple[tuple[str, str], ...]
+
+
+class Bench:
+    """The settings of one scene.  Traces go to `folder`.
+
+    carried: by formulation and level; names: formulations that can express the scene; full: the level with the most
+    unknowns, which the reference has.
+    """
+
+    def __init__(self, request: Request, target: Target, report: Report, folder: Path, began: float) -> None:
+        self.request, self.target, self.report, self.folder, self.began = request, target, report, folder, began
+        self.carried: dict[tuple[str, str], Carried] = {}
+        self.refusals: list[Refusal] = []
+        self.levels: dict[str, tuple[tuple[str, str], ...]] = {}
+        self.names: list[str] = []
+        self.missing: set[tuple[str, str]] = set()
+        self.full = ""
+
+    # --- formulations -------------------------------------------------------------------------------------------
+
+    def prepare(self) -> bool:
+        """Every formulation that can express the scene, its own first, and every level in that one (in the others when
+        it is run); False where the report says why there is none.
+        """
+        asked = self.request.formulation
+        own = Carrying(asked, _text(self.request.levels), self.request.levels)
+        first = self._carry(own, self.report)
+        if first is None:
+            return False
+        unknowns = self._unknowns(first)
+        self.names, self.full = [first[0]], first[1]
+        self.levels = _levels(self.carried[first].prepared.network, self.request.levels, first[1])
+        for name in FORMULATIONS if asked in (None, "auto") else []:
+            if name in ("auto", first[0]):
+                continue
+            if unknowns > LARGE:
+                why = f"the model has {unknowns} unknowns: only the formulation of the scene is measured"
+                self.refusals.append(Refusal(name, f"{why}; --formulation {name}"))
+            elif self._carry(Carrying(name, first[1], self.levels[first[1]]), Report()):
+                self.names.append(name)
+        for text, levels in self.levels.items():
+            key = self._carry(Carrying(first[0], text, levels), Report()) if text != first[1] else None
+            if key is not None and self._unknowns(key) > unknowns:
+                self.full, unknowns = text, self._unknowns(key)
+        return True
+
+    def _unknowns(self, key: tuple[str, str]) -> int:
+        return self.carried[key].started.system.unknowns
+
+    def _carry(self, what: Carrying, report: Report) -> tuple[str, str] | None:
+        """A formulation at a level, at its start; None where it cannot be run."""
+        request = replace(self.request, formulation=what.formulation, levels=what.levels)
+        with ex.fresh():
+            prepared = ready(request, self.target, report)
+            options = options_of(request, self.target, prepared, report, self.began, None) if prepared else None
+            started = begin(prepared, options, report) if prepared and options and not report.failed else None
+        if prepared is None or options is None or started is None:
+            reasons = [d for d in report if d.severity == "error"] or list(report)
+            if what.formulation is not None and reasons:
+                self.refusals.append(
+                    Refusal(what.formulation, reasons[0].message, reasons[0].code, level=what.level)
+                )  # fmt: skip
+            return None
+        every = options.every or (options.t_end - options.t_start) / GRID
+        options = replace(options, every=every, watch=None, sampled_at=(), sample_steps=False)
+        again = bool(prepared.network.events or prepared.network.switches)
+        level = _text((*what.levels, *_chosen(prepared.network)))
+        self.carried[prepared.formulation, level] = Carried(prepared, options, started, again, {})
+        return prepared.formulation, level
+
+    def carry(self, combination: Combination) -> Carried | None:
+        """A formulation at a level, compiled once; None where it cannot be run, which is a refusal."""
+        key = combination.formulation, combination.level
+        if key not in self.carried and key not in self.missing:
+            made = self._carry(Carrying(*key, self.levels[combination.level]), Report())
+            self.missing |= {key} if made is None else set()
+        return self.carried.get(key)
+
+    @property
+    def options(self) -> Options:
+        """Those of the scene's own formulation."""
+        return next(iter(self.carried.values())).options
+
+    @property
+    def accuracy(self) -> float:
+        """Asked of the judged quantities."""
+        return min([self.options.accuracy or ACCURACY, *(wanted for _, wanted in self.options.accuracy_on)])
+
+    def judged(self, trace: Trace) -> tuple[str, ...]:
+        """Quantities whose errors count."""
+        on = [name for name, _ in self.options.accuracy_on]
+        return tuple(name for name in trace.names if not on or name in on)
+
+    def combinations(self) -> Iterator[Combination]:
+        """Every formulation x index x method that exists; forms that are one appear once."""
+        own = next(iter(self.levels))
+        for formulation, level in itertools.product(self.names, self.levels):
+            carried = self.carried.get((formulation, level)) or self.carried[formulation, own]
+            seen = set()
+            for index in INDICES:
+                form = choose_index(index, carried.started.facts)[0]
+                if form in seen or (self.request.index not in (None, "auto", index)):
+                    continue
+                seen.add(form)
+                for method in METHODS:
+                    fits = self.request.method in (None, "auto", method)
+                    if fits and (method != "dopri" or index == "0"):
+                        yield Combination(formulation, index, method, level)
+
+    # --- runs ---------------------------------------------------------------------------------------------------
+
+    def trace(
+        self, combination: Combination, tolerance: float, limits: Limits, *, name: str = "run"
+    ) -> tuple[Ran | None, str]:
+        """One run at the solver's own tolerance: what came of it, and why it may not be used."""
+        carried, report = self.carry(combination), Report()
+        if carried is None:
+            return None, f"{combination.formulation} cannot express {combination.level}"
+        most = [n for n in (carried.options.max_steps, limits.steps) if n is not None]
+        options = replace(
+            carried.options,
+            output=self.folder / f"{name}.h5",
+            accuracy=None,
+            accuracy_on=(),
+            rtol=tolerance,
+            method=combination.method,
+            index=combination.index,
+            max_steps=min(most, default=None),
+            max_wall=limits.wall,
+        )
+        try:
+            started = begin(carried.prepared, options, report) if carried.again else carried.started
+            ran = run_from(self.target, carried.prepared, started, options, report) if started else None
+        except UsageError as error:
+            return None, error.format_message()
+        except SolverFailure as failure:
+            return None, str(failure)
+        except (ArithmeticError, ValueError, MemoryError) as error:  # one setting's fault ends no other
+            return None, f"{type(error).__name__}: {error}"
+        return (ran, _reason(ran, report)) if ran else (None, _reason(None, report))
+
+    def measure(
+        self, combination: Combination, tolerance: float, reference: Trace, until: float, limits: Limits
+    ) -> Measured | str:
+        """One run, compared with the reference; a sentence where there is no such setting."""
+        ran, reason = self.trace(combination, tolerance, limits)
+        if ran is None:
+            return reason
+        outcome = ran.outcome
+        found = outcome.traced
+        error = None
+        if outcome.final:
+            error = error_of(found, reference, self.judged(reference), self.accuracy, until)
+            if not math.isfinite(error):
+                reason = reason or "a quantity is no number"
+        fixed = of_rows(found.time.size, self.size(combination), combination.method)
+        numbers = {key: n for key, n in outcome.statistics.items() if isinstance(n, int)}
+        return Measured(
+            combination,
+            tolerance,
+            error,
+            outcome.timings["cpu_integrate_s"],
+            outcome.statistics["steps"],
+            fixed + self._work(combination, numbers),
+            fixed,
+            float(np.max(np.abs(found["audit.energy"].values), initial=0.0)),
+            float(np.max(found["audit.constraints"].values, initial=0.0)),
+            reason,
+            tuple(numbers.items()),
+        )
+
+    def _work(self, combination: Combination, statistics: dict[str, int]) -> float:
+        facts = self.carried[combination.formulation, combination.level].started.facts
+        projected = combination.index in ("0", "1") and (facts.index or 0) > 1
+        return counted(statistics, self.size(combination), combination.method, projected=projected)
+
+    def size(self, combination: Combination) -> tuple[int, int]:
+        """Rows and entries of the Jacobian's pattern in a combination's form."""
+        carried = self.carry(combination)
+        if carried is None:
+            return 1, 1
+        form = choose_index(combination.index, carried.started.facts)[0]
+        if form not in carried.sizes:
+            system = carried.started.system
+            system = system if system.form.name == form else system.another(form)
+            carried.sizes[form] = system.rows, system.pattern.entries
+        return carried.sizes[form]
+
+
+def _levels(
+    network: Network, given: tuple[tuple[str, str], ...], own: str
+) -> dict[str, tuple[tuple[str, str], ...]]:
+    """Levels by their text, those of the scene first: what is left open in every combination,
+    those with few changes first, MOST at most.
+    """
+    free = [choice for choice in network.levels if choice.free]
+    found = {own: (*given, *_chosen(network))}
+    mine = tuple(choice.chosen for choice in free)
+    every = itertools.islice(itertools.product(*(choice.names for choice in free)), 64 * MOST)
+    for names in sorted(every, key=lambda names: sum(a != b for a, b in zip(names, mine, strict=True)))[:MOST]:
+        pairs = tuple((choice.path, name) for choice, name in zip(free, names, strict=True))
+        found.setdefault(_text((*given, *pairs)), (*given, *pairs))
+    return found
+
+
+def _chosen(network: Network) -> tuple[tuple[str, str], ...]:
+    """The choices that nobody made."""
+    return tuple((choice.path, choice.chosen) for choice in network.levels if choice.free)
+
+
+def _text(levels: tuple[tuple[str, str], ...]) -> str:
+    return " ".join(f"{path}={name}" for path, name in levels)
+
+
+def _reason(ran: Ran | None, report: Report) -> str:
+    """Why a run may not be chosen; "" where it may."""
+    if ran is not None and ran.failure:
+        return ran.failure
+    errors = [d.message for d in report if d.severity == "error" and d.code not in ("E907", "E909")]
+    if ran is not None and ran.outcome.met:
+        return ""
+    return errors[0] if errors else "not met"

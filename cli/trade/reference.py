@@ -1,0 +1,104 @@
+"""What errors of a scene are taken from: a run at the finest tolerance, and another way's beside it.
+
+The second is by another method, in another formulation where there is one.  How far they are apart is what is known of
+either; where that is more than a tenth of the accuracy a third run decides between them, and where the best pair is
+still apart, errors are taken up to the instant until which it is not (the horizon, as in `verify`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sysdyn.cli.trade.errors import error_of
+from sysdyn.cli.trade.measuring import Bench, Limits
+from sysdyn.cli.trade.traded import Combination, Reference
+from sysdyn.cli.verify.agreement import horizon
+from sysdyn.runtime.integrate.accuracy import LAWS
+from sysdyn.runtime.trace.trace import Trace
+
+FINEST = {"bdf": 1e-13, "radau": 1e-14, "dopri": 3e-14}
+"""Tolerances of the runs; finer ones meet round-off."""
+SURE = 0.1
+"""Of the accuracy: what two runs may be apart."""
+ENOUGH = 0.03
+"""Of the accuracy: the error of the coarsest reference that is tried, by the law of its method."""
+STEPS = 200_000
+"""Of a reference's run: more, and a coarser one will do."""
+PART, SECONDS = 0.15, 120.0
+"""Of the budget of wall time, for one run; without a budget, seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    name: str
+    trace: Trace
+    steps: tuple[int, int]
+
+
+class NoReference(Exception):  # noqa: N818 (a name of the house)
+    """No two runs agree anywhere; the message says how far they are apart, or why there are none."""
+
+
+def reference(bench: Bench, budget: float | None) -> tuple[Trace, Reference]:
+    """The reference's trace and what is known of it.  budget [s] of wall time.  Raises NoReference."""
+    runs: list[_Run] = []
+    reasons: list[str] = []
+    best: tuple[float, _Run, _Run] | None = None
+    sure = SURE * bench.accuracy
+    for combination in _ways(bench):
+        run = _finest(bench, combination, budget, len(runs), reasons)
+        if run is None:
+            continue
+        for other in runs:
+            apart = error_of(run.trace, other.trace, bench.judged(other.trace), bench.accuracy, bench.options.t_end)
+            if run.steps != other.steps and (best is None or apart < best[0]):  # equal steps are no second opinion
+                best = apart, other, run
+        runs.append(run)
+        if best is not None and (best[0] <= sure or len(runs) == 3):
+            break
+    if best is None:
+        raise NoReference("; ".join(dict.fromkeys(reasons)) or "there is but one way to run this scene")
+    uncertainty, first, second = best
+    until = bench.options.t_end
+    if uncertainty > sure:
+        until, _ = horizon(first.trace, second.trace, dict.fromkeys(bench.judged(first.trace), sure))
+        if not until > bench.options.t_start:
+            text = f"{first.name} and {second.name} at their finest are {uncertainty:.1e} apart"
+            raise NoReference(f"{text}: too much for an accuracy of {bench.accuracy:.0e}")
+        judged = bench.judged(first.trace)
+        uncertainty = error_of(second.trace, first.trace, judged, bench.accuracy, until)
+    return first.trace, Reference(first.name, second.name, uncertainty, until)
+
+
+def _ways(bench: Bench) -> Iterator[Combination]:
+    """Ways to the reference: cheap and different ones first."""
+    names, level = bench.names, bench.full
+    other = names[1] if len(names) > 1 else names[0]
+    yield Combination(names[0], "0", "dopri", level)
+    yield Combination(other, "2", "radau", level)
+    yield Combination(names[0], "2", "bdf", level)
+    if other != names[0]:
+        yield Combination(names[0], "2", "radau", level)
+
+
+def _finest(
+    bench: Bench, combination: Combination, budget: float | None, number: int, reasons: list[str]
+) -> _Run | None:
+    """A run at the finest tolerance that ends in time; None where none does."""
+    law, tolerance = LAWS[combination.method], FINEST[combination.method]
+    coarsest = max(law.tolerance(ENOUGH * bench.accuracy), tolerance)
+    wall = SECONDS if budget is None else max(PART * budget, 1e-3)
+    while True:
+        began = time.monotonic()
+        ran, reason = bench.trace(combination, tolerance, Limits(STEPS, wall), name=f"reference{number}")
+        if ran is not None and ran.outcome.final:
+            counts = ran.outcome.statistics
+            steps = counts["steps"], counts["residual_evaluations"]
+            return _Run(f"{combination.name} at {tolerance:.0e}", ran.outcome.traced, steps)
+        if ran is None or tolerance >= coarsest:
+            reasons.append(f"{combination.name}: {reason}")
+            return None
+        late = time.monotonic() - began >= 0.5 * wall
+        tolerance = coarsest if late else min(100.0 * tolerance, coarsest)

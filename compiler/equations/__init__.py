@@ -1,0 +1,1 @@
+"""The equations of a formulation as a book prints them."""

@@ -1,0 +1,177 @@
+"""Like terms joined: an expression as a list of terms, each a coefficient times flows, rates and multipliers.
+
+The expression is a polynomial in what moves (rates, multipliers, flows, momenta, efforts); each coefficient takes the
+shortest of the forms that sympy finds: as it stands, factored, trigonometric sums joined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from sysdyn.compiler.equations.algebra import Algebra
+from sysdyn.dsl.model.expression import Node, const, is_const, mul, product, variables
+
+LARGEST = 120
+"""Operations of a coefficient up to which shorter forms are looked for."""
+TURNING = 40
+"""The same of trigonometric ones."""
+GRANTED = 1500
+"""Operations of all coefficients of one model for which shorter forms are looked for: some seconds."""
+def moving(node: Node) -> bool:
+    """Whether an unknown is one of those in which terms are polynomials."""
+    return node.op == "var" and (node.data[2] > 0 or node.data[1] not in ("q", "s"))
+
+
+def joined(algebra: Algebra, root: Node) -> tuple[Node, ...]:
+    """The terms of an expression, rates first, then multipliers, flows, and what does not move."""
+    if is_const(root, 0.0):
+        return ()
+    whole = algebra.object(root)
+    leaves = sorted((n for n in variables(root) if moving(n)), key=_leading)
+    polynomial = _polynomial(algebra, whole, leaves)
+    if polynomial is None:  # flows inside of functions: what is linear in rates and multipliers is still apart
+        leaves = [n for n in leaves if n.data[2] or n.data[1] in ("kappa", "mu")]
+        polynomial = _polynomial(algebra, whole, leaves)
+    if polynomial is None:
+        return tuple(_split(algebra, whole))
+    found: list[Node] = []
+    for powers, coefficient in polynomial:
+        short = shortest(algebra, coefficient)
+        if short == 0:
+            continue
+        if not any(powers):
+            found += _split(algebra, short)
+            continue
+        pairs = sorted(zip(powers, leaves, strict=True), key=lambda pair: algebra.order.rank(pair[1]))
+        held = product(1.0, ((float(k), leaf) for k, leaf in pairs if k))
+        found.append(mul(ordered(algebra, algebra.node(short)), held))
+    return tuple(found)
+
+
+def shorter(algebra: Algebra, root: Node) -> tuple[Node, ...]:
+    """The terms of an expression, as written or joined, whichever is shorter."""
+    plain = algebra.sympy.Add.make_args(algebra.object(root))
+    written = tuple(ordered(algebra, algebra.node(part)) for part in plain if part != 0)
+    found = joined(algebra, root)
+    return min((found, written), key=lambda terms: length(algebra, terms))
+
+
+def length(algebra: Algebra, terms: Sequence[Node]) -> int:
+    """Operations of a sum of terms."""
+    return len(terms) + sum(int(algebra.object(term).count_ops()) for term in terms)
+
+
+def _leading(leaf: Node) -> tuple[int, int]:
+    """Rates first, then multipliers, then the rest, as they were made."""
+    kind, order = leaf.data[1], leaf.data[2]
+    return (0 if order else 1 if kind in ("kappa", "mu") else 2), leaf.number
+
+
+def _polynomial(algebra: Algebra, whole: Any, leaves: Sequence[Node]) -> list[tuple[tuple[int, ...], Any]] | None:
+    """(powers, coefficient) of a polynomial in the leaves, highest first; None where it is none."""
+    sympy = algebra.sympy
+    symbols = [algebra.symbol(leaf) for leaf in leaves]
+    rest, inside = whole.as_independent(*symbols, as_Add=True)
+    opened = _opened(sympy, inside)
+    found: dict[tuple[int, ...], Any] = {}
+    for term in sympy.Add.make_args(opened):
+        coefficient, moves = term.as_independent(*symbols, as_Add=False)
+        powers = moves.as_powers_dict()
+        if any(base not in symbols or not (e.is_Integer and e > 0) for base, e in powers.items() if base != 1):
+            return None
+        key = tuple(int(powers.get(s, 0)) for s in symbols)
+        found[key] = found.get(key, 0) + coefficient
+    still = (0,) * len(symbols)
+    rest = rest + found.pop(still, 0)
+    return [*sorted(found.items(), reverse=True), *([(still, rest)] if rest != 0 else [])]
+
+
+def _opened(sympy: Any, whole: Any) -> Any:
+    """Products of sums multiplied out, functions left as they are."""
+    return sympy.expand(whole, power_base=False, power_exp=False, log=False, basic=False)
+
+
+def shortest(algebra: Algebra, coefficient: Any) -> Any:
+    """The shortest form of a coefficient."""
+    sympy = algebra.sympy
+    size = coefficient.count_ops()
+    algebra.spent += size
+    if size > LARGEST or algebra.spent > GRANTED:
+        return coefficient
+    forms = [coefficient]
+    waves = coefficient.has(sympy.sin, sympy.cos)
+    ways: list[Callable[[Any], Any]] = [sympy.factor]
+    if waves and size <= TURNING:
+        ways += [lambda c: sympy.fu(sympy.expand(c)), lambda c: sympy.factor(sympy.trigsimp(sympy.expand(c)))]
+        ways += [lambda c: sympy.factor(sympy.fu(sympy.factor(c)))]
+    elif not coefficient.is_Mul:
+        ways.append(sympy.expand)
+    for way in ways:
+        try:
+            forms.append(way(coefficient))
+        except (sympy.PolynomialError, NotImplementedError):
+            continue
+    return min(forms, key=lambda c: (sympy.count_ops(c, visual=False), str(c)))
+
+
+def _split(algebra: Algebra, whole: Any) -> list[Node]:
+    """The terms of what does not move: as written, or with like ones joined where that is shorter."""
+    sympy = algebra.sympy
+    forms = [] if _laden(algebra, whole) else [[shortest(algebra, part) for part in sympy.Add.make_args(whole)]]
+    if whole.is_Add or whole.is_Mul:
+        forms.append(_alike(algebra, whole))
+    best = min(forms, key=lambda parts: len(parts) + sum(int(p.count_ops()) for p in parts))
+    nodes = [ordered(algebra, algebra.node(part)) for part in best]
+    return sorted((n for n in nodes if not is_const(n, 0.0)), key=lambda n: (n.op == "const", _first(n)))
+
+
+def _alike(algebra: Algebra, whole: Any) -> list[Any]:
+    """Terms of the same unknowns and functions of them, their parameters joined."""
+    sympy = algebra.sympy
+    if whole.count_ops() > LARGEST:
+        return list(sympy.Add.make_args(whole))
+    still = {s for s in whole.free_symbols if algebra.node(s).op == "param"}
+    found: dict[Any, Any] = {}
+    for term in sympy.Add.make_args(_opened(sympy, whole)):
+        held, moves = term.as_independent(*(whole.free_symbols - still), as_Add=False)
+        found[moves] = found.get(moves, 0) + held
+    parts = list(sympy.Add.make_args(found.pop(sympy.S.One, sympy.S.Zero)))
+    by_held: dict[Any, Any] = {}
+    for moves, held in found.items():
+        short = shortest(algebra, held)
+        sign = -1 if short.could_extract_minus_sign() else 1
+        if short * sign == 1:
+            parts.append(sign * moves)
+        else:
+            by_held[sign * short] = by_held.get(sign * short, 0) + sign * moves
+    return [*parts, *(held * moves for held, moves in by_held.items())]
+
+
+def _laden(algebra: Algebra, whole: Any) -> bool:
+    """Whether it is a product with a sum in it whose terms have parameters of their own: no single term to a reader."""
+    if not whole.is_Mul:
+        return False
+    sums = [factor for factor in whole.args if factor.is_Add]
+    return any(
+        algebra.node(s).op == "param" and not term.is_Symbol
+        for factor in sums
+        for term in factor.args
+        for s in term.free_symbols
+    ) and any(algebra.node(s).op != "param" for factor in sums for s in factor.free_symbols)
+
+
+def _first(node: Node) -> tuple[int, int]:
+    """Terms with unknowns before those of parameters alone, each as they were made."""
+    found = sorted(n.number for n in variables(node) if n.op == "var")
+    return (0, found[0]) if found else (1, node.number)
+
+
+def ordered(algebra: Algebra, node: Node) -> Node:
+    """A product with its factors in the order of a book."""
+    if node.op == "sum" and node.data[0] == 0.0 and len(node.args) == 1:
+        return mul(ordered(algebra, node.args[0]), const(node.data[1][0]))
+    if node.op != "mul":
+        return node
+    pairs = sorted(zip(node.data, node.args, strict=True), key=lambda pair: algebra.order.rank(pair[1]))
+    return product(1.0, pairs)

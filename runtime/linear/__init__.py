@@ -1,0 +1,1 @@
+"""The linearisation of a model about a state: matrices, modes, zeros, states of rest."""

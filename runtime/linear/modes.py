@@ -1,0 +1,180 @@
+"""Eigenvalues with damping, frequency and participation; poles, zeros and gain of transfer functions.
+
+Participation (Perez-Arriaga, Verghese and Schweppe 1982): of state k in mode i |w_ki v_ik| with left and right
+eigenvectors, normed to a sum of one.
+
+Zeros of c (s - a)^-1 b + d: of d != 0 the eigenvalues of a - b c/d.  Else, with relative degree r (c a^(r-1) b the
+first Markov parameter m that is not zero), the motion that keeps the output at zero stays in the null space of
+[c; c a; ...; c a^(r-1)] and obeys a - b c a^r / m there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.equilibrate import factors
+from sysdyn.runtime.numerics.rank import count, decomposed
+
+Complexes = NDArray[np.complex128]
+VANISHING = 1e-11
+"""A Markov parameter below this part of its factors' size is zero."""
+DEFECTIVE = 1e11
+"""Condition of the eigenvectors from which they count as dependent: participation is then by right vectors alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """An eigenvalue (1/s): frequency |s| (rad/s), damping ratio -Re s/|s| (None at zero), participation [states]."""
+
+    eigenvalue: complex
+    frequency: float
+    damping: float | None
+    participation: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """gain prod(s - zeros)/prod(s - poles); static: its value at s = 0 (None: infinite); improper: direct slopes by the
+    first and second rate of the input.
+    """
+
+    output: int
+    input: int
+    poles: Complexes
+    zeros: Complexes
+    gain: float
+    static: float | None
+    improper: tuple[float, float]
+
+
+def balanced(a: Floats) -> tuple[Floats, Floats]:
+    """D^-1 a D with rows and columns of like size, and the diagonal of D (powers of two)."""
+    from scipy.linalg import matrix_balance
+
+    if not a.size:
+        return a, np.ones(0)
+    found, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    return np.asarray(found), np.asarray(scale)
+
+
+def modes(a: Floats) -> tuple[Mode, ...]:
+    """The modes of x' = a x, by rising real part, then imaginary part."""
+    if not a.size:
+        return ()
+    inner = balanced(a)[0]
+    values, right = np.linalg.eig(inner)
+    values = _resolved(values, inner)
+    share = np.abs(right) ** 2
+    if np.linalg.cond(right) < DEFECTIVE:
+        share = np.abs(right * np.linalg.inv(right).T)
+    share = share / share.sum(axis=0)
+    order = sorted(range(values.size), key=lambda k: (round(float(values[k].real), 12), float(values[k].imag)))
+    return tuple(_mode(complex(values[k]), share[:, k]) for k in order)
+
+
+def _resolved(values: Complexes, a: Floats) -> Complexes:
+    """Eigenvalues of a balanced matrix, zero where they are below what its round-off leaves open."""
+    least = 4.0 * a.shape[0] * np.finfo(float).eps * float(np.abs(a).sum(axis=0).max(initial=0.0))
+    return np.where(np.abs(values) > least, values, 0.0)
+
+
+def _mode(value: complex, share: Floats) -> Mode:
+    size = abs(value)
+    return Mode(value, size, 0.0 - value.real / size if size > 0.0 else None, share)
+
+
+def transfer(
+    a: Floats, b: Floats, c: Floats, d: float, place: tuple[int, int], improper: tuple[float, float]
+) -> Transfer:
+    """One output by one input; b, c [states]; place: output, input; improper: slopes by the input's rates."""
+    inner, scale = balanced(a)
+    inner, b, c = reached(inner, b / scale, c * scale)
+    inner, c, b = reached(inner.T, c, b)
+    inner = inner.T
+    zeros, gain = _zeros(inner, b, c, d)
+    zeros = _at_origin(inner, b, c, d, zeros)
+    poles = _resolved(np.linalg.eigvals(inner).astype(complex), inner) if inner.size else np.zeros(0, complex)
+    poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
+    return Transfer(*place, poles, zeros, gain, _static(poles, zeros, gain), improper)
+
+
+def reached(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats]:
+    """a, b, c on the states that b reaches (Arnoldi's process, orthogonalised twice)."""
+    size = float(np.linalg.norm(a, 2)) if a.size else 0.0
+    basis: list[Floats] = []
+    following, least = b, 0.0
+    while len(basis) < b.size:
+        for _ in range(2):
+            for q in basis:
+                following = following - (q @ following) * q
+        norm = float(np.linalg.norm(following))
+        if norm <= least:
+            break
+        basis.append(following / norm)
+        following, least = a @ basis[-1], VANISHING * size
+    q = np.array(basis).reshape(len(basis), b.size)
+    return q @ a @ q.T, q @ b, q @ c
+
+
+def _zeros(a: Floats, b: Floats, c: Floats, d: float) -> tuple[Complexes, float]:
+    """Zeros and leading coefficient; none and 0 where nothing passes."""
+    n = b.size
+    if not n:
+        return np.zeros(0, complex), d
+    if d != 0.0:
+        return np.linalg.eigvals(a - np.outer(b, c) / d).astype(complex), d
+    kept, size = [c], np.abs(c)
+    for _ in range(n):
+        markov = float(kept[-1] @ b)
+        if abs(markov) > VANISHING * float(size @ np.abs(b)):
+            break
+        kept.append(kept[-1] @ a)
+        size = size @ np.abs(a)
+    else:
+        return np.zeros(0, complex), 0.0
+    return _kept_at_zero(a, b, np.array(kept), markov), markov
+
+
+def _kept_at_zero(a: Floats, b: Floats, kept: Floats, markov: float) -> Complexes:
+    """Eigenvalues of the motion that keeps the output at zero; kept [r, n]: c, c a, ..., c a^(r-1)."""
+    size = np.linalg.norm(kept, axis=1)
+    _, _, vt = np.linalg.svd(kept / size[:, None])
+    basis = vt[len(kept) :].T
+    if not basis.size:
+        return np.zeros(0, complex)
+    inner = a - np.outer(b, kept[-1] @ a) / markov
+    return np.linalg.eigvals(basis.T @ inner @ basis).astype(complex)
+
+
+def _at_origin(a: Floats, b: Floats, c: Floats, d: float, zeros: Complexes) -> Complexes:
+    """The zeros, those at s = 0 exactly: as many as moments d - c a^-1 b, -c a^-2 b, ... vanish."""
+    if not zeros.size or not regular(a):
+        return zeros
+    inverse = np.linalg.inv(a)
+    size, number = np.abs(c), 0
+    row, direct = c @ inverse, d
+    while number < zeros.size:
+        size = size @ np.abs(inverse)
+        moment = direct - float(row @ b)
+        if abs(moment) > VANISHING * (abs(direct) + float(size @ np.abs(b))):
+            break
+        row, direct, number = row @ inverse, 0.0, number + 1
+    found = zeros.copy()
+    found[np.argsort(np.abs(zeros))[:number]] = 0.0
+    return found
+
+
+def regular(a: Floats) -> bool:
+    """Whether a square matrix has an inverse to be trusted."""
+    row, column = factors(a)
+    sigma = decomposed(row[:, None] * a * column)[1]
+    return count(sigma) == sigma.size
+
+
+def _static(poles: Complexes, zeros: Complexes, gain: float) -> float | None:
+    """The value at s = 0."""
+    below = np.prod(-poles)
+    return float((gain * np.prod(-zeros) / below).real) + 0.0 if below != 0.0 else None

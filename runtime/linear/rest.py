@@ -1,0 +1,256 @@
+"""States of rest: every rate is zero but those of displacements that nothing depends on, which may go on steadily.
+
+    0 = U - Phi_q^T kappa - Psi_f^T mu   at f' = 0, p' = 0;   Phi = 0, Psi = 0, Gamma = 0, Lambda = 0, momenta
+
+with f = 0 of every coordinate whose displacement something depends on, time held; where all rows depend on differences
+of displacements alone (shafts that turn together), f may lie along the directions V in which none changes:
+(1 - V V^T) f = 0.  Newton's method (least change, see
+numerics/least_change.py) from the guesses and from seeded random points around them.
+Receives a System and what of it is tangible.  Hands on states of rest, each once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.linear.tangent import quadratures
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import group_maximum
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import factors
+from sysdyn.runtime.numerics.least_change import DENSE, FOLDS, Problem, Work, solve
+from sysdyn.runtime.numerics.rank import null_space
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.start.starter import Starter
+
+Mask = NDArray[np.bool_]
+MET = 1e-9
+"""Largest row, relative to its terms, of a state of rest."""
+SAME = 1e-6
+"""Distance of two states of rest, in magnitudes, below which they are one."""
+NEAR = 1e-9
+"""Part of a magnitude that is tried as zero."""
+SHARE = 0.05
+"""Of the work that a search for a start may take: that of one search for rest."""
+NEAREST, FARTHEST = -1.0, 1.5
+"""Powers of ten between which random points lie around the guess, in magnitudes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """A state of rest; residual: largest row relative to its terms; free: unknowns that it leaves open, by name;
+    together: directions in which displacements may move together without changing anything.
+    """
+
+    state: ConsistentState
+    residual: float
+    free: tuple[str, ...]
+    together: int = 0
+
+
+class Resting:
+    """The equations of rest of one model, time held at t; first: guess [unknowns] of what they leave open."""
+
+    def __init__(self, system: System, tangible: AbstractSet[str], t: float, first: Floats) -> None:
+        self.system, self.tangible, self.t, self.first = system, tangible, t, first
+        self.starter = Starter(system)
+        self.rows = self.starter.settled
+        self.n = system.form.written
+        families = system.description.families
+        owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: self.n]], dtype=bool)
+        self.still = (system.kinds[: self.n] == "f") & owners
+        self.use = self._use()
+        self.turns = np.array([families[int(k)].unit == "rad" for k in system.family_of[: self.n]], dtype=bool)
+        self.turns &= system.kinds[: self.n] == "q"
+        self.along = self._together()
+
+    def _together(self) -> Floats:
+        """Orthonormal flows [flows of tangible coordinates, k] along which no row changes, wherever the model is.
+
+        Displacement constraints that are linear may move: their rates are rows of their own.
+        """
+        flows = np.flatnonzero(self.still)
+        at = dict(zip(self.system.form.k_f.tolist(), self.system.form.k_q.tolist(), strict=True))
+        if not flows.size or self.n > DENSE or any(int(k) not in at for k in flows):
+            return np.zeros((flows.size, 0))
+        places = np.array([at[int(k)] for k in flows])
+        random = np.random.default_rng(11)
+        points = [self.first, *(self.first + self._spread() * random.standard_normal(self.n) for _ in range(2))]
+        with np.errstate(all="ignore"):
+            matrices = [self.rows.dense(self.jacobian(y)) for y in points]
+        if not all(np.isfinite(m).all() for m in matrices):
+            return np.zeros((flows.size, 0))
+        linear = np.all([(m == matrices[0]).all(axis=1) for m in matrices], axis=0) & self.starter.groups("phi")
+        stacked = np.vstack([m[self.use & ~linear][:, places] for m in matrices])
+        row, _ = factors(stacked)
+        return null_space(row[:, None] * stacked) if stacked.size else np.eye(flows.size)
+
+    def _spread(self) -> Floats:
+        """How far points lie from the guess."""
+        x = np.concatenate([self.first, np.zeros(self.starter.first - self.n)])
+        return 0.3 * self.starter.scale(self.t, x)[: self.n]
+
+    def _use(self) -> Mask:
+        """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
+        use = self.starter.groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda")
+        use[self.rows.held[0]] = True
+        grows = quadratures(self.system, self.tangible) & (self.system.kinds[: self.n] == "s")
+        for group, family, first in self.rows.form.groups:
+            if group == "lambda":
+                owner = self.system.description.rows[family].owner
+                use[first : first + self.system.description.rows[family].size] = ~grows[self._places("s", owner)]
+        return use
+
+    def _places(self, kind: str, owner: str) -> slice:
+        families = self.system.description.families
+        k = next(k for k, f in enumerate(families) if f.kind == kind and f.owner == owner)
+        first = int(self.system.form.at[k])
+        return slice(first, first + families[k].size)
+
+    def residual(self, y: Floats) -> Floats:
+        """All rows at rest [rows], then those of the flows that may not go on [flows of tangible coordinates]."""
+        rows = self.rows.residual(self.t, y, self.rates(y))
+        return np.concatenate([rows, self._held @ y[self.still]]) if self.along.size else rows
+
+    @property
+    def _held(self) -> Floats:
+        """1 - V V^T."""
+        return np.eye(self.along.shape[0]) - self.along @ self.along.T
+
+    def rates(self, y: Floats) -> Floats:
+        """Rates at rest: displacements go on with their flows."""
+        yd = np.zeros(self.n)
+        yd[self.system.form.k_q] = y[self.system.form.k_f]
+        return yd
+
+    def jacobian(self, y: Floats) -> Floats:
+        """Values by y on the pattern of the rows alone."""
+        return self.rows.jacobian(self.t, y, self.rates(y))[0]
+
+    def _slopes(self, y: Floats) -> Floats:
+        values = self.jacobian(y)
+        return np.concatenate([values, self._held.ravel()]) if self.along.size else values
+
+    def problem(self, guess: Floats) -> Problem:
+        """Rest nearest to a guess."""
+        x = np.concatenate([guess, np.zeros(self.starter.first - self.n)])
+        scale = self.starter.scale(self.t, x)[: self.n]
+        follows = np.isin(self.system.kinds[: self.n], ("kappa", "mu", "e"))
+        pattern = self.rows.pattern
+        rows, columns = pattern.row.astype(np.int64), pattern.columns_of().astype(np.int64)
+        use, free = self.use, ~self.still
+        if self.along.size:
+            flows = np.flatnonzero(self.still)
+            rows = np.concatenate([rows, self.rows.rows + np.repeat(np.arange(flows.size), flows.size)])
+            columns = np.concatenate([columns, np.tile(flows, flows.size)])
+            use, free = np.append(use, np.ones(flows.size, dtype=bool)), np.ones_like(free)
+        return Problem(
+            residual=self.residual,
+            jacobian=self._slopes,
+            rows=rows,
+            columns=columns,
+            number=use.size,
+            use=use,
+            free=free,
+            guess=guess,
+            scale=scale,
+            weight=np.where(follows, 1e-3, 1.0),
+            work=Work(SHARE),
+        )
+
+    def found(self, guess: Floats) -> Rest | None:
+        """The state of rest that Newton's method comes to from a guess."""
+        guess = guess.copy()
+        guess[self.still] = self.along @ (self.along.T @ guess[self.still])
+        problem = self.problem(guess)
+        for folds in (0, FOLDS):
+            best = solve(problem, guess, folds=folds)
+            if best.residual < MET:
+                break
+        else:
+            return None
+        y = self._turned(self._clean(best.x, problem))
+        again = self.problem(y)  # in magnitudes of its own: what is near zero in the guess's may be large in these
+        own = solve(again, y)
+        if not own.residual < MET:
+            return None
+        y = self._clean(own.x, problem)
+        null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
+        y = self._back(y, again, null)
+        state = ConsistentState(self.t, y, self.rates(y), (), own.residual, 0, ())
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        largest = np.abs(null).max(axis=1, initial=0.0)
+        free = tuple(self.system.name(int(k)) for k in np.flatnonzero(told & (largest > SAME)))
+        return Rest(state, own.residual, free, self.along.shape[1])
+
+    def _met(self, y: Floats) -> bool:
+        return solve(self.problem(y), y, 1).residual < MET
+
+    def _clean(self, y: Floats, problem: Problem) -> Floats:
+        """Without what is near zero in its magnitude, where that is as good."""
+        clean = np.where(np.abs(y) > NEAR * group_maximum(self.system, problem.scale), y, 0.0)
+        return clean if (clean != y).any() and self._met(clean) else y
+
+    def _back(self, y: Floats, problem: Problem, null: Floats) -> Floats:
+        """What the rows leave open as it was first guessed."""
+        if not null.size:
+            return y
+        away = (y - self.first) / problem.scale
+        back = y - problem.scale * (null @ np.linalg.lstsq(null, away, rcond=1e-9)[0])
+        return back if self._met(back) else y
+
+    def _turned(self, y: Floats) -> Floats:
+        """Angles in -pi..pi where the rows cannot tell whole turns."""
+        turned = np.where(self.turns, np.pi - np.mod(np.pi - y, 2.0 * np.pi), y)
+        near = solve(replace(self.problem(turned), guess=turned), turned, 3)
+        return near.x if near.residual < MET else y
+
+    def _null(self, y: Floats, problem: Problem) -> Floats:
+        """Directions along which the rows of rest do not change [unknowns, k]."""
+        full = self.rows.dense(self.jacobian(y))[self.use]
+        if self.along.size:
+            held = np.zeros((self.along.shape[0], self.n))
+            held[:, self.still] = self._held
+            full = np.vstack([full, held])
+        full = full[:, problem.free]
+        row, column = factors(full)
+        null = null_space(row[:, None] * full * column)
+        found = np.zeros((self.n, null.shape[1]))
+        found[problem.free] = column[:, None] * null
+        return found
+
+    def apart(self, one: Rest, other: Rest) -> bool:
+        """Whether two states differ by more than what the first leaves open."""
+        problem = self.problem(one.state.y)
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
+        size = np.maximum(size, group_maximum(self.system, problem.scale))
+        move = ((other.state.y - one.state.y) / size)[told]
+        if one.free:
+            null = (self._null(one.state.y, problem) / size[:, None])[told]
+            move = move - null @ np.linalg.lstsq(null, move, rcond=1e-9)[0]
+        return bool(np.abs(move).max(initial=0.0) > SAME)
+
+
+def rests(resting: Resting, tries: int, most: int | None = None) -> tuple[Rest, ...]:
+    """States of rest from the first guess and from random points, in the order found; most: how many are wanted."""
+    kept: list[Rest] = []
+    guess = resting.first
+    random = np.random.default_rng(7)
+    scale = resting.problem(guess).scale
+    scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
+    mirrored: list[Floats] = []  # springs and pendulums are often symmetrical
+    for k in range(tries + 1):
+        if most is not None and len(kept) >= most:
+            break
+        shaken = 10.0 ** random.uniform(NEAREST, FARTHEST) * scale * random.standard_normal(guess.size)
+        point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
+        found = resting.found(point)
+        if found is not None and all(resting.apart(other, found) for other in kept):
+            kept.append(found)
+            mirrored.append(-found.state.y)
+            scale = np.maximum(scale, np.abs(found.state.y - guess))
+    return tuple(kept)

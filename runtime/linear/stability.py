@@ -1,0 +1,152 @@
+"""Stability of a state of rest: Lyapunov's indirect method, and the energy test of Lagrange and Dirichlet.
+
+Indirect: of the motion beside it, x' = a x without the states that nothing depends on, every eigenvalue in the open
+left half plane: asymptotically stable; one in the open right half plane: unstable; else the linearisation does not
+decide.
+
+Energy: on the virtual displacements, the null space of [Phi_q; Psi_f], the balances have the stiffness
+K = V_qq + (Phi_q^T kappa)_q.  Where K is symmetric there and no effort depends on a flow but those of dissipators, a
+minimum (K > 0) is stable; without dissipators and gyroscopic efforts a direction with K < 0 is unstable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.linear.modes import Mode, balanced, modes
+from sysdyn.runtime.linear.tangent import Reduced
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.rank import null_space
+from sysdyn.runtime.start.start import ConsistentState
+
+STILL = 1e-7
+"""Real part of an eigenvalue, relative to the largest one, that decides nothing: half the digits of a double root."""
+FLAT = 1e-9
+"""Of the largest stiffness: what is below is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """kind: minimum, maximum, saddle or flat; stiffness: eigenvalues of K on unit virtual displacements, rising;
+    conservative: no dissipation and no gyroscopic effort.
+    """
+
+    kind: str
+    stiffness: tuple[float, ...]
+    conservative: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """stability: asymptotically stable, stable, unstable or undecided; by: linearisation or energy."""
+
+    stability: str
+    by: str
+    modes: tuple[Mode, ...]
+    energy: Energy | None
+
+
+def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, together: int = 0) -> Verdict:
+    """What both methods say together; loose [unknowns]: what nothing depends on; together: directions in which
+    displacements move without changing anything: so many eigenvalues at zero say nothing.
+    """
+    felt = np.flatnonzero((small.places >= 0) & ~loose[small.places])
+    values = np.linalg.eigvals(balanced(small.a[np.ix_(felt, felt)])[0]) if felt.size else np.zeros(0)
+    near = STILL * float(np.abs(values).max(initial=0.0))
+    values = values[np.argsort(np.abs(values))]
+    values = values[min(together, int((np.abs(values) <= near).sum())) :]
+    found = modes(small.a)
+    if (values.real > near).any():
+        return Verdict("unstable", "linearisation", found, energy)
+    if (values.real < -near).all():
+        return Verdict("asymptotically stable", "linearisation", found, energy)
+    if energy is not None and energy.kind == "minimum":
+        return Verdict("stable", "energy", found, energy)
+    if energy is not None and energy.kind in ("maximum", "saddle") and energy.conservative:
+        return Verdict("unstable", "energy", found, energy)
+    return Verdict("undecided", "linearisation", found, energy)
+
+
+def energy_at(system: System, state: ConsistentState) -> Energy | None:
+    """The energy test at a state of rest; None where it says nothing: steady motion, efforts that effort constraints or
+    dynamic variables give, or that have no potential.  system: the form as written of a primal formulation.
+    """
+    if np.abs(state.y[system.kinds[: state.y.size] == "f"]).any():
+        return None
+    settled = system.another("settled")
+    jy, _ = settled.jacobian(state.t, state.y, state.yd)
+    full = settled.dense(jy)
+    flows, places, balances = _coordinates(settled)
+    if full[np.ix_(balances, np.flatnonzero(np.isin(settled.kinds, ("e", "s"))))].any():
+        return None
+    stiff = np.where(places >= 0, full[np.ix_(balances, np.maximum(places, 0))], 0.0)
+    loss = full[np.ix_(balances, flows)]
+    bound = _bound(settled, full, flows, places)
+    free = null_space(equilibrated(bound)[0]) if bound.size else np.eye(flows.size)
+    stiff, loss = (free.T @ part @ free for part in (stiff, loss))
+    if not stiff.size:
+        return None
+    size = float(np.abs(stiff).max())
+    turning = float(np.abs(loss - loss.T).max()) > FLAT * max(float(np.abs(loss).max()), 1e-300)
+    worst = float(np.linalg.eigvalsh((loss + loss.T) / 2.0).min())
+    active = worst < -FLAT * float(np.abs(loss).max())
+    if not np.isfinite(stiff).all() or np.abs(stiff - stiff.T).max() > FLAT * size or active:
+        return None
+    values: Floats = np.asarray(np.linalg.eigvalsh((stiff + stiff.T) / 2.0), dtype=np.float64)
+    return Energy(_kind(values), tuple(map(float, values)), not turning and not np.abs(loss).any())
+
+
+def _kind(values: Floats) -> str:
+    near = FLAT * float(np.abs(values).max(initial=0.0))
+    if (values > near).all():
+        return "minimum"
+    if (values < -near).all():
+        return "maximum"
+    return "saddle" if (values < -near).any() else "flat"
+
+
+def _coordinates(settled: System) -> tuple[Floats, Floats, Floats]:
+    """Of each coordinate: place of its flow, of its displacement (-1: it has none), row of its balance."""
+    families, form = settled.description.families, settled.form
+    first = {settled.description.rows[k].owner: row for group, k, row in form.groups if group == "dynamics"}
+    displacement = {f.owner: int(form.at[k]) for k, f in enumerate(families) if f.kind == "q"}
+    nothing = np.zeros(0, dtype=np.int64)
+    flows: list[NDArray[np.integer]] = [nothing]
+    places: list[NDArray[np.integer]] = [nothing]
+    rows: list[NDArray[np.integer]] = [nothing]
+    for k, family in enumerate(families):
+        if family.kind != "f":
+            continue
+        here = np.arange(family.size)
+        flows.append(form.at[k] + here)
+        own = displacement.get(family.owner)
+        places.append(own + here if own is not None else np.full(family.size, -1))
+        rows.append(first[family.owner] + here)
+    return tuple(np.concatenate(part).astype(np.int64) for part in (flows, places, rows))  # type: ignore[return-value]
+
+
+def _bound(settled: System, full: Floats, flows: Floats, places: Floats) -> Floats:
+    """[Phi_q; Psi_f] of the constraints that hold."""
+    idle = set(settled.idle_multipliers().tolist())
+    parts = []
+    for group, k, row in settled.form.groups:
+        size = settled.description.rows[k].size
+        if group not in ("phi", "psi"):
+            continue
+        block = full[row : row + size]
+        part = np.where(places >= 0, block[:, np.maximum(places, 0)], 0.0) if group == "phi" else block[:, flows]
+        parts.append(part[[r for r in range(size) if _multiplier(settled, k, r) not in idle]])
+    return np.vstack([np.zeros((0, flows.size)), *parts])
+
+
+def _multiplier(settled: System, row: int, position: int) -> int:
+    """Place of the multiplier of a constraint's row."""
+    own = settled.description.rows[row]
+    kind = "kappa" if own.block == "phi" else "mu"
+    families = settled.description.families
+    k = next(k for k, f in enumerate(families) if f.kind == kind and f.owner in (own.owner, own.label))
+    return int(settled.form.at[k]) + position

@@ -1,0 +1,325 @@
+"""The linearisation on the constraint manifold, about a state at rest or a moving one.
+
+About a moving state the frozen pencil (dF/dy, dF/dy') of a form of index 2 or 3 has other eigenvalues than the motion
+beside it: the constraints' gradients move.  What varies must vary on all rows that hold and on their derivatives.  With
+z = (y, the rates that the rows of the start read) and G their Jacobian, variations obey G dz + G_u du = 0, where
+dq' = df.  For a set S of differential unknowns that fix all others,
+
+    [G; I_S] dz = [-G_u du; dx]     =>     dx' = A dx + B0 du + B1 du' + B2 du'',  y = C dx + D0 du + D1 du' + D2 du''
+
+(what depends on int du has that for a state of its own), and with dx := dx - B2 du' - (B1 + A B2) du the derivatives of
+inputs leave the state equation:
+B = B0 + A B1 + A^2 B2,  D = D0 + C B1 + C A B2;  D1 + C B2 and D2 remain where the transfer function is improper.
+
+Receives a System, a consistent state, the slopes by inputs and of outputs.  Hands on a `Reduced`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import group_maximum
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import factors
+from sysdyn.runtime.numerics.rank import TOLERANCE, decomposed, least_squares, null_space
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.start.starter import Starter
+
+LARGEST = 1500
+"""Unknowns and rates up to which full matrices are taken."""
+NOISE = 1e-13
+"""Of the largest variation, in equilibrated unknowns: what is smaller is round-off of the solution."""
+PASSES, MOVES = 2, 1e-13
+"""Of the scaling of unknowns; the part of a unit vector that is no round-off."""
+OWN = 10.0
+"""Preference for the flow or momentum of a coordinate whose displacement is a state."""
+ORDERS = 4
+"""Slopes by an input are taken by its integral, itself, its rate and its second rate."""
+
+
+class NoLinearisation(Exception):  # noqa: N818
+    """There is none: too large, or the rows do not determine the rates `names` of the state."""
+
+    def __init__(self, message: str, names: tuple[str, ...] = ()) -> None:
+        self.names = names
+        super().__init__(message)
+
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Slopes of the outputs: by y [outputs, unknowns], by y' [outputs, unknowns], by inputs [outputs, inputs]."""
+
+    by_y: Floats
+    by_rate: Floats
+    by_input: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Reduced:
+    """dx' = a dx + b du, dy = c dx + d du + d1 du' + d2 du''; places [states]: of the states in y, names: theirs.
+
+    A state may be a combination where an input or its rate moves it: see the module.
+    """
+
+    a: Floats
+    b: Floats
+    c: Floats
+    d: Floats
+    d1: Floats
+    d2: Floats
+    places: NDArray[np.int64]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """The rows of the start at a state: jacobian [rows, unknowns and rates], which rows hold, which rates are read."""
+
+    starter: Starter
+    jacobian: Floats
+    holds: Mask
+
+
+def rows_at(system: System, state: ConsistentState) -> Rows:
+    """Every row that holds at consistent states, linearised; system: the form as written."""
+    starter = Starter(system, measuring=True)
+    if max(starter.first, starter.settled.rows) > LARGEST:
+        raise NoLinearisation(
+            f"{starter.first} unknowns and rates are more than {LARGEST}, up to which full matrices are taken"
+        )
+    x = np.concatenate([state.y, state.yd[starter.rates], np.zeros(starter.missed.size)])
+    full = np.zeros((starter.settled.rows, x.size))
+    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
+    if not np.isfinite(full).all():
+        raise NoLinearisation("the slopes of the equations are no numbers there")
+    return Rows(starter, full[:, : starter.first], starter.every & ~starter.groups("initial"))
+
+
+def _tangent(g: Floats, by_column: Floats) -> tuple[Floats, Floats]:
+    """The null space of G, orthonormal in units [unknowns] in which those that move at all move alike; these units.
+
+    Where a farad counts in millionths, charges would pass for at rest beside voltages.
+    """
+    by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
+    tangent = null_space(by_row[:, None] * g * by_column)
+    for _ in range(PASSES):
+        size = np.linalg.norm(tangent, axis=1)
+        by_column = by_column * np.where(size > MOVES, size, 1.0)
+        by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
+        tangent = null_space(by_row[:, None] * g * by_column)
+    return tangent, by_column
+
+
+def candidates_of(system: System, state: ConsistentState, n: int) -> NDArray[np.int64]:
+    """Places of y that may be states: displacements, momenta, dynamic variables, flows with inertia and no momentum."""
+    _, jyd = system.jacobian(state.t, state.y, state.yd)
+    moving = system.differential(jyd)[:n]
+    moving[system.form.k_q] = True
+    kinds = system.kinds[:n]
+    families = system.description.families
+    carried = {f.owner for f in families if f.kind == "p"}
+    bare = np.array([families[int(k)].owner not in carried for k in system.family_of[:n]], dtype=bool)
+    return np.flatnonzero(moving & (np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & bare)))
+
+
+def _pivots(matrix: Floats, number: int) -> NDArray[np.int64]:
+    """The rows of a matrix [m, n] that are farthest from each other's spans, one after the other (ascending)."""
+    from scipy.linalg import qr
+
+    _, _, order = qr(matrix.T, mode="economic", pivoting=True)
+    return np.sort(order[:number].astype(np.int64))
+
+
+def _rank(part: Floats) -> int:
+    """Rank of rows of orthonormal columns."""
+    return int((decomposed(part)[1] > TOLERANCE).sum()) if part.size else 0
+
+
+def chosen_states(
+    system: System, tangent: Floats, units: Floats, candidates: NDArray[np.int64], loose: Mask
+) -> NDArray[np.int64]:
+    """States [k] of orthonormal directions [unknowns, k] in these units: as many displacements as are free, then what
+    moves beside them, of the same coordinates if it can be, what nothing depends on (loose) last; of what is alike
+    that which moves most.
+    """
+    n = system.form.written
+    size = np.linalg.norm(tangent[:n], axis=1) * units[:n]
+    most = group_maximum(system, size)
+    weight = np.where(most > 0.0, size / np.where(most > 0.0, most, 1.0), 0.0)[:, None]
+    shown = system.kinds[candidates] == "q"
+    kept: list[int] = []
+    for group in (shown & ~loose[candidates], ~shown & ~loose[candidates], loose[candidates]):
+        members = candidates[group]
+        left = tangent @ _null(tangent[kept])
+        coordinates = {_coordinate(system, k) for k in kept}
+        near = np.array([OWN if _coordinate(system, int(k)) in coordinates else 1.0 for k in members])
+        part = left[members] * near[:, None] * weight[members]
+        kept += members[_pivots(part, _rank(left[members]))].tolist() if part.size else []
+    return np.array(kept, dtype=np.int64)
+
+
+def _null(rows: Floats) -> Floats:
+    """Directions that some rows of orthonormal columns do not see."""
+    return np.asarray(decomposed(rows)[2][_rank(rows) :].T) if rows.size else np.eye(rows.shape[1])
+
+
+def _coordinate(system: System, place: int) -> tuple[str, int]:
+    """Coordinate of an unknown: its family's owner, its position there."""
+    k = int(system.family_of[place])
+    return system.description.families[k].owner, place - int(system.form.at[k])
+
+
+def reduced(
+    rows: Rows,
+    system: System,
+    state: ConsistentState,
+    by_input: tuple[Floats, ...],
+    out: Outputs,
+    names: tuple[str, ...],
+    loose: Mask,
+) -> Reduced:
+    """The reduction; by_input: slopes of the start's rows by the integrals of inputs, inputs, their rates, second rates
+    [rows, inputs]; names: of the inputs; loose [unknowns]: what nothing depends on.
+
+    Raises NoLinearisation.
+    """
+    starter, n = rows.starter, rows.starter.n
+    g = rows.jacobian[rows.holds]
+    by_row, by_column = factors(g)
+    scaled = by_row[:, None] * g * by_column
+    tangent, moves = _tangent(g, by_column)
+    candidates = candidates_of(system, state, n)
+    part = tangent[candidates]
+    rank = _rank(part)
+    chosen = chosen_states(system, tangent, moves, candidates, loose)
+    rates = _rates(starter, system, chosen)
+    _refuse_undetermined(system, tangent, part, chosen, rates, by_column, rank)
+    inputs = len(names)
+    pick = np.zeros((chosen.size, starter.first))
+    pick[np.arange(chosen.size), chosen] = 1.0
+    pick = pick * by_column
+    own = np.abs(pick).max(axis=1, initial=0.0)[:, None]
+    right = np.zeros((g.shape[0] + chosen.size, chosen.size + ORDERS * inputs))
+    right[g.shape[0] :, : chosen.size] = np.eye(chosen.size) / own
+    right[: g.shape[0], chosen.size :] = -by_row[:, None] * starter.with_sums(np.hstack(by_input))[rows.holds]
+    moved = (by_column / moves)[:, None] * _refined(np.vstack([scaled, pick / own]), right)
+    moved = moves[:, None] * np.where(np.abs(moved) > NOISE * np.abs(moved).max(axis=0, initial=0.0), moved, 0.0)
+    return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose)
+
+
+def _refined(matrix: Floats, right: Floats) -> Floats:
+    """The solution of consistent equations, its residual small beside the terms of each row (Skeel 1980)."""
+    found = least_squares(matrix, right, 1e-14)
+    for _ in range(2):
+        found = found + least_squares(matrix, right - matrix @ found, 1e-14)
+    return found
+
+
+def _rates(starter: Starter, system: System, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Place in z of the rate of each state: the flow of a displacement, else the rate itself."""
+    at = np.full(starter.n, -1, dtype=np.int64)
+    at[starter.rates] = starter.n + np.arange(starter.rates.size)
+    at[system.form.k_q] = system.form.k_f
+    return at[chosen]
+
+
+def _refuse_undetermined(
+    system: System,
+    tangent: Floats,
+    part: Floats,
+    chosen: NDArray[np.int64],
+    rates: NDArray[np.int64],
+    by_column: Floats,
+    rank: int,
+) -> None:
+    """NoLinearisation where rates of states move though no state does: constraints are hidden deeper than the rows."""
+    _, _, vt = decomposed(part) if part.size else (None, None, np.eye(tangent.shape[1]))
+    still = tangent @ vt[rank:].T
+    if not still.size or not rates.size:
+        return
+    loose = np.abs(still[rates]).max(axis=1) > np.sqrt(TOLERANCE)
+    if loose.any():
+        names = tuple(system.name(int(k)) for k in chosen[loose])
+        raise NoLinearisation(f"the equations do not determine the rate of {', '.join(names[:3])}", names)
+
+
+def _without_rates_of_inputs(
+    moved: Floats,
+    rates: NDArray[np.int64],
+    starter: Starter,
+    system: System,
+    chosen: NDArray[np.int64],
+    inputs: tuple[str, ...],
+    out: Outputs,
+    loose: Mask,
+) -> Reduced:
+    """The matrices of variations `moved` [z, states and inputs and their rates]."""
+    states, n = chosen.size, starter.n
+    yd = np.zeros((n, moved.shape[1]))
+    yd[starter.rates] = moved[n:]
+    yd[system.form.k_q] = moved[system.form.k_f]
+    seen = out.by_y @ moved[:n] + out.by_rate @ yd
+    size = np.abs(out.by_y) @ np.abs(moved[:n]) + np.abs(out.by_rate) @ np.abs(yd)
+    seen = np.where(np.abs(seen) > NOISE * size, seen, 0.0)
+    slopes = moved[rates]
+    slopes[:, :states][:, loose[chosen]] = 0.0
+    cut = [0, states, *(states + k * len(inputs) for k in range(1, ORDERS + 1))]
+    a, b_, b0, b1, b2 = (slopes[:, i:j] for i, j in pairwise(cut))
+    c, d_, d0, d1, d2 = (seen[:, i:j] for i, j in pairwise(cut))
+    names = tuple(system.name(int(k)) for k in chosen)
+    summed = np.flatnonzero(np.abs(np.vstack([b_, d_])).max(axis=0, initial=0.0) > 0.0)
+    if summed.size:  # their integrals are states
+        own = np.eye(len(inputs))[summed]
+        a = np.block([[a, b_[:, summed]], [np.zeros((summed.size, states + summed.size))]])
+        b0, b1, b2 = (np.vstack([part, add]) for part, add in ((b0, own), (b1, 0.0 * own), (b2, 0.0 * own)))
+        c = np.hstack([c, d_[:, summed]])
+        chosen = np.concatenate([chosen, np.full(summed.size, -1)])
+        names = (*names, *(integral(inputs[k]) for k in summed))
+    b = b0 + a @ (b1 + a @ b2)
+    d = d0 + out.by_input + c @ (b1 + a @ b2)
+    return Reduced(a, b, c, d, d1 + c @ b2, d2, chosen, names)
+
+
+def integral(name: str) -> str:
+    """The name of the state that is the integral of an input."""
+    return f"integral of {name}"
+
+
+def quadratures(system: System, tangible: AbstractSet[str]) -> Mask:
+    """Unknowns that nothing depends on [unknowns as written]: displacements of coordinates that are not tangible,
+    dynamic variables that stand in no row but their own.
+    """
+    settled = system.another("settled")
+    n = system.form.written
+    columns = settled.pattern.columns_of()[settled.structural()[0]]
+    read = np.zeros(settled.unknowns, dtype=bool)
+    read[columns] = True
+    families, kinds = system.description.families, system.kinds[:n]
+    owners = np.array([families[int(k)].owner in tangible for k in system.family_of[:n]], dtype=bool)
+    found: Mask = ((kinds == "q") & ~owners) | ((kinds == "s") & ~read[:n])
+    return found
+
+
+def moving(system: System, state: ConsistentState) -> bool:
+    """Whether any differential unknown moves."""
+    yd = state.yd.copy()
+    yd[system.form.k_q] = state.y[system.form.k_f]
+    places = candidates_of(system, state, system.form.written)
+    return bool(np.abs(yd[places]).max(initial=0.0) > 0.0)
+
+
+def constant(system: System, state: ConsistentState) -> bool:
+    """Whether the pencil is the same beside the state: linear equations, whose frozen pencil is right in motion too."""
+    random = np.random.default_rng(5)
+    here = system.jacobian(state.t, state.y, state.yd)
+    y, yd = (v + np.maximum(np.abs(v), 1.0) * random.uniform(0.1, 0.3, v.size) for v in (state.y, state.yd))
+    there = system.jacobian(state.t + 0.37, y, yd)
+    return all(np.allclose(one, two, rtol=1e-12, atol=0.0) for one, two in zip(here, there, strict=True))

@@ -1,0 +1,366 @@
+"""`sysdyn equations`: golden texts read against the book, and every simplification against numbers."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+from sysdyn.cli.analysis.asked import compiled
+from sysdyn.cli.main import run
+from sysdyn.cli.run.running import Request
+from sysdyn.compiler.equations.algebra import Algebra
+from sysdyn.compiler.equations.book import BLOCKS, equations
+from sysdyn.compiler.equations.matrices import canonical, rows_of, underlying, unknowns
+from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.pieces import pieces
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+from texts import ROOT, run_json, write
+
+SEED = ROOT / "models" / "seed"
+MODELS = sorted(p.stem for p in SEED.glob("*.sd"))
+
+
+def printed(capsys, name, *options):
+    assert run(["equations", str(SEED / f"{name}.sd"), *options, "--quiet"]) == 0
+    return capsys.readouterr().out
+
+
+GOLDEN = {
+    ("pendulum", "lagrangian"): """\
+T* = 1/2 m (f1^2 + f2^2)
+δW = -m g δq2
+
+            q1' = f1
+            q2' = f2
+m f1' + 2 q1 κ1 = 0
+m f2' + 2 q2 κ1 = -m g
+              0 = q1^2 + q2^2 - l^2
+
+κ1 of rod, line 11
+""",
+    ("pendulum", "hamiltonian"): """\
+T* = 1/2 m (f1^2 + f2^2)
+δW = -m g δq2
+
+q1' = f1
+q2' = f2
+p1' = -2 q1 κ1
+p2' = -m g - 2 q2 κ1
+ p1 = m f1
+ p2 = m f2
+  0 = q1^2 + q2^2 - l^2
+
+κ1 of rod, line 11
+""",
+    ("em_suspension", "lagrangian"): """\
+T* = 1/2 M f_x^2 + b0 f2^2/(2 (b1 + x))
+ D = 1/2 R f3^2
+δW = (F0 + F1 sin(w t)) δx + E δq3
+
+                  x' = f_x
+              M f_x' = -b0 f2^2/(2 (b1 + x)^2) + F0 + F1 sin(w t)
+b0 f2'/(b1 + x) + μ1 = b0 f2 f_x/(b1 + x)^2
+                  μ1 = R f3 - E
+                   0 = f2 - f3
+
+μ1 of series, line 22
+""",
+    ("pendulum_spring", "lagrangian"): """\
+T* = 1/2 m (f1^2 + f2^2)
+ V = 1/2 k w^2
+ D = 1/2 b f_w^2
+δW = -m g δq2
+
+                  q1' = f1
+                  q2' = f2
+                   w' = f_w
+      m f1' + 2 q1 κ1 = 0
+m f2' + 2 (q2 - w) κ1 = -m g
+        2 (q2 - w) κ1 = b f_w + k w
+                    0 = (q2 - w)^2 + q1^2 - l^2
+
+κ1 of rod, line 19
+""",
+    ("knife_edge", "lagrangian"): """\
+T* = 1/2 M (f_x^2 + f_y^2) + 1/2 J f_th^2
+δW = sin(al) M g δx
+
+                 x' = f_x
+                 y' = f_y
+                th' = f_th
+M f_x' + sin(th) μ1 = sin(al) M g
+M f_y' - cos(th) μ1 = 0
+            J f_th' = 0
+                  0 = sin(th) f_x - cos(th) f_y
+
+μ1 of edge, line 18
+""",
+    ("lead_filter", "lagrangian"): """\
+ V = q_c^2/(2 C)
+ D = 1/2 R1 f_r1^2 + 1/2 R2 f_supply^2
+δW = -E sin(w t) δq_supply
+
+q_supply' = f_supply
+    q_r1' = f_r1
+     q_c' = f_c
+       κ1 = -R2 f_supply - E sin(w t)
+       κ1 = -R1 f_r1
+       κ1 = -q_c/C
+        0 = q_c + q_r1 + q_supply - c_out_
+
+κ1 of out_, line 12
+""",
+    ("co_circuit", "co_lagrangian"): """\
+V* = 1/2 C1 e_a^2 + 1/2 C3 e_c^2
+ T = (p_a - p_b)^2/(2 L1) + (p_b - p_c)^2/(2 L2)
+ G = e_c^2/(2 R3) + e_b^2/(2 R2)
+δW = A1 sin(w t) δp_a + A2 δp_c
+
+   p_a' = e_a
+   p_b' = e_b
+   p_c' = e_c
+C1 e_a' = -(p_a - p_b)/L1 + A1 sin(w t)
+      0 = -e_b/R2 + (p_a - p_b)/L1 - (p_b - p_c)/L2
+C3 e_c' = -e_c/R3 - (p_c - p_b)/L2 + A2
+""",
+    ("integral_controller", "lagrangian"): """\
+T* = 1/2 M f_x^2
+ V = 1/2 k x^2
+ D = 1/2 b f_x^2
+δW = -e δx
+
+    x' = f_x
+M f_x' = -e - b f_x - k x
+     0 = e - Ki s
+    s' = x - qr
+""",
+}
+
+
+@pytest.mark.parametrize(("name", "formulation"), GOLDEN)
+def test_equations_are_those_of_the_book(name, formulation, capsys):
+    """Examples 6.1, 3.4, 6.6, 2.4.2, 6.4, 5.1 and 2.30, read by eye: rows, signs and classes of efforts."""
+    found = printed(capsys, name, "--formulation", formulation)
+    assert _same_terms(found, GOLDEN[name, formulation])
+
+
+def _same_terms(found, expected):
+    """Line by line, up to the order of the energy functions' terms."""
+    one, other = found.splitlines(), expected.splitlines()
+    assert len(one) == len(other), found
+    for a, b in zip(one, other, strict=True):
+        left, right = (re.split(r" (?=[+-] )", line.partition("= ")[2]) for line in (a, b))
+        assert a.partition("= ")[0] == b.partition("= ")[0], (a, b)
+        assert sorted(t.removeprefix("+ ") for t in left) == sorted(t.removeprefix("+ ") for t in right), (a, b)
+    return True
+
+
+def test_the_arm_has_the_terms_of_the_book(capsys):
+    """Example 3.1: squares of sines and cosines joined, differences of angles, like terms: four terms a row."""
+    found = printed(capsys, "two_link_arm", "--formulation", "lagrangian")
+    rows = [line.strip() for line in found.splitlines() if "f_th1'" in line and line.strip() != "th1' = f_th1"]
+    first, second = rows
+    assert first == (
+        "(m1 + m2) l1^2 f_th1' + m2 l1 l2 cos(th1 - th2) f_th2'"
+        " = -m2 l1 l2 sin(th1 - th2) f_th2^2 - (m1 + m2) l1 g cos(th1) - l1 F3 sin(th1) sin(w t)"
+    )
+    assert second == (
+        "m2 l1 l2 cos(th1 - th2) f_th1' + m2 l2^2 f_th2'"
+        " = m2 l1 l2 sin(th1 - th2) f_th1^2 - m2 l2 g cos(th2) - l2 F3 sin(th2) sin(w t)"
+    )
+
+
+def test_the_canonical_suspension_has_the_row_of_the_book(capsys):
+    """(4.22): the pull of the magnet is p2^2/(2 b0), whatever the gap."""
+    found = printed(capsys, "em_suspension", "--form", "canonical", "--formulation", "hamiltonian")
+    assert "p_x' = F0 + F1 sin(w t) - p2^2/(2 b0)" in found
+    assert "H = (b1 + x) p2^2/(2 b0) + p_x^2/(2 M)" in found
+
+
+def test_matrices_by_name(capsys):
+    assert printed(capsys, "pendulum", "--form", "matrices") == """\
+  M = [ m   0 ]
+      [ 0   m ]
+Φ_q = [ 2 q1   2 q2 ]
+  Y = [ 0    ]
+      [ -m g ]
+ Z1 = [ 2 f1^2 + 2 f2^2 ]
+
+f = (f1, f2)
+"""
+
+
+def test_latex(capsys):
+    found = printed(capsys, "pendulum", "--latex", "--formulation", "hamiltonian")
+    assert r"\dot p_{2} &= -m \, g - 2 \, q_{2} \, \kappa_{1}" in found
+    assert found.count(r"\begin{align*}") == found.count(r"\end{align*}") == 2
+
+
+def test_a_page(capsys):
+    found = printed(capsys, "pendulum", "--html")
+    assert found.startswith("<!doctype html>")
+    assert found.count("<math>") == found.count("</math>") == 5  # two functions, three rows
+
+
+# -- numbers -----------------------------------------------------------------------------------------------------------
+
+
+def model(name, formulation):
+    report = Report()
+    made = compiled(Request(str(SEED / f"{name}.sd"), formulation=formulation, backend="numpy"), report)
+    return None if made is None else made[1].compiled
+
+
+class Values:
+    """A random number for each parameter and unknown."""
+
+    def __init__(self, seed):
+        self.random = np.random.default_rng(seed)
+        self.known = {}
+
+    def __call__(self, node):
+        if node not in self.known:
+            self.known[node] = float(self.random.uniform(0.4, 1.6))
+        return self.known[node]
+
+    def of(self, node):
+        return ex.evaluate([ex.without_signals(node)], self)[0]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_what_is_printed_is_what_is_compiled(name):
+    """left - right of every equation against the sum of its row, at random values, up to one sign."""
+    for formulation in ("lagrangian", "hamiltonian", "co_lagrangian"):
+        with ex.fresh():
+            made = model(name, formulation)
+            if made is None:
+                continue
+            order = Order([p.name for p in made.network.parameters])
+            found = [e for e in equations(Algebra(order), made.energies, made.form, 1000) if e.kind != "kinematic"]
+            rows = [k for k, row in enumerate(made.form.rows) if row.block in BLOCKS]
+            by_row = [list(group) for _, group in itertools.groupby(found, key=lambda e: (e.kind, e.owner))]
+            assert len(by_row) == len(rows)
+            for number, group in zip(rows, by_row, strict=True):
+                values = Values(number)
+                terms = [(t, 1.0) for e in group for t in e.left] + [(t, -1.0) for e in group for t in e.right]
+                if any(t.over for t, _ in terms) or any(e.where for e in group):
+                    continue
+                ours = sum(sign * values.of(t.expression) for t, sign in terms)
+                theirs = sum(values.of(p.expression) for p in pieces(made.form, number))
+                size = sum(abs(values.of(t.expression)) for t, _ in terms) + 1e-300
+                assert min(abs(ours - theirs), abs(ours + theirs)) <= 1e-12 * size, (formulation, group[0].owner)
+
+
+@pytest.mark.parametrize("name", ["pendulum", "two_link_arm", "slider_crank", "knife_edge", "bead_rod", "mass_spring"])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_the_underlying_equations_solve_the_rows(name, formulation):
+    """Rates and multipliers printed against a numerical solution of the rows that they come from."""
+    with ex.fresh():
+        form = model(name, formulation).form
+        found = underlying(Algebra(Order()), form)
+        rows = rows_of(form, "dynamics", "momentum_rate", "phi_acceleration", "psi_rate")
+        kinds = (("f", 1), ("p", 1), ("kappa", 0), ("mu", 0))
+        wanted = [n for kind, order in kinds for n in unknowns(form, kind, order)]
+        values = Values(3)
+        matrix = np.array([[values.of(ex.derivative(row.expression, n)) for n in wanted] for row in rows])
+        still = dict.fromkeys(wanted, ex.const(0.0))
+        right = np.array([-values.of(ex.substitute(row.expression, still)) for row in rows])
+        solution = dict(zip(wanted, np.linalg.solve(matrix, right), strict=True))
+        compared = 0
+        for e in found:
+            (left,) = e.left
+            if left.expression in solution:
+                value = sum(values.of(t.expression) for t in e.right)
+                assert value == pytest.approx(solution[left.expression], rel=1e-9, abs=1e-12), e.owner
+                compared += 1
+        assert compared >= 1
+
+
+@pytest.mark.parametrize("name", ["pendulum", "two_link_arm", "slider_crank", "em_suspension", "mass_spring"])
+def test_the_canonical_equations_are_derivatives_of_h(name):
+    """q' = dH/dp, and p' + dH/dq holds what is no conservative effort: the same at any momenta."""
+    with ex.fresh():
+        made = model(name, "hamiltonian")
+        function, found = canonical(Algebra(Order()), made.energies, made.form)
+        h = ex.add(*(t.expression for t in function.terms))
+        carriers = [f.owner for f in made.form.families if f.kind == "p"]
+        values = Values(4)
+        rates = {e.owner: ex.add(*(t.expression for t in e.right)) for e in found if e.kind == "kinematic"}
+        for owner in carriers:
+            if owner in rates:
+                slope = ex.derivative(h, ex.var(owner, "p"))
+                assert values.of(rates[owner]) == pytest.approx(values.of(slope), rel=1e-9), owner
+            (row,) = (e for e in found if e.kind == "dynamics" and e.owner == owner)
+            conservative = ex.derivative(h, ex.var(owner, "q"))
+            rest = ex.add(*(t.expression for t in row.right), conservative)
+            dependent = [n for n in ex.variables(rest) if n.op == "var" and n.data[1] == "p"]
+            slopes = [values.of(ex.derivative(rest, n)) for n in dependent]
+            dissipated = any(t.expression is not None for t in made.energies.function("D"))
+            assert dissipated or slopes == pytest.approx([0.0] * len(slopes), abs=1e-9), owner
+
+
+def test_the_linear_form_is_that_of_linearize(capsys):
+    found = printed(capsys, "dc_motor", "--form", "linear")
+    assert "f_supply' = 12.5 f_shaft - 40 f_supply" in found
+    assert "f_shaft' = -1/2 f_shaft - 25 f_supply" in found
+
+
+# -- the command -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_is_printed(name, capsys):
+    code, found = run_json(capsys, "equations", str(SEED / f"{name}.sd"))
+    assert code == 0
+    assert found["result"]["equations"]
+    for line in (*found["result"]["functions"], *found["result"]["equations"]):
+        assert "…" not in line["text"]
+        text = line["latex"]
+        assert text.count("{") == text.count("}")
+        assert text.count(r"\left") == text.count(r"\right")
+
+
+FAMILY = """
+model chain {
+  param n = 5
+  param m = 1 kg
+  param k = 2 N/m
+  coord x[1..n]: translation
+  energy T* = sum(i in 1..n: 1/2*m*x[i]'^2)
+  energy V = sum(i in 2..n: 1/2*k*(x[i] - x[i-1])^2)
+}
+"""
+
+
+def test_families_stay_families(tmp_path, capsys):
+    assert run(["equations", str(write(tmp_path, FAMILY)), "--quiet"]) == 0
+    out = capsys.readouterr().out
+    assert "T* = sum(i = 1..n) 1/2 m f_x[i]^2" in out
+    assert "x[i]' = f_x[i]    i = 1..n" in out
+    lines = [line.strip() for line in out.splitlines()]
+    assert "0 = m f_x[i]'    i = 1..n" in lines
+    assert "+ k (x[i] - x[i - 1])    i = 2..n" in lines
+    pulled = re.compile(r"[+-] k \(x\[i( \+ 1)?\] - x\[i( \+ 1)?\]\)    i = 1\.\.n - 1")
+    assert any(pulled.fullmatch(line) for line in lines), lines
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--form", "matrices"), "families over ranges"),
+        (("--form", "canonical", "--formulation", "lagrangian"), "--formulation hamiltonian"),
+    ],
+)
+def test_forms_that_do_not_exist(options, why, tmp_path, capsys):
+    code, found = run_json(capsys, "equations", str(write(tmp_path, FAMILY)), *options)
+    assert code == 1
+    (error,) = found["diagnostics"]
+    assert error["code"] == "E607"
+    assert why in error["message"]
+
+
+def test_a_circuit_has_no_underlying_equation(capsys):
+    code, found = run_json(capsys, "equations", str(SEED / "lead_filter.sd"), "--form", "underlying")
+    assert code == 1
+    assert found["diagnostics"][0]["code"] == "E607"

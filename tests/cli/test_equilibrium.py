@@ -1,0 +1,213 @@
+"""`sysdyn equilibrium`: states of rest against closed forms and scipy's roots, their stability."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from sysdyn.cli.main import run
+from texts import ROOT, run_json, write
+
+SEED = ROOT / "models" / "seed"
+PRIMAL = ("lagrangian", "hamiltonian")
+
+
+def rests(capsys, path, *options, code=0):
+    exit_code, found = run_json(capsys, "equilibrium", str(path), "--backend", "numpy", *options)
+    assert exit_code == code, found["diagnostics"]
+    return found["result"]["equilibria"]
+
+
+def by(found, name):
+    return sorted(found, key=lambda e: e["values"][name])
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_a_pendulum_hangs_or_stands(formulation, capsys):
+    found = by(rests(capsys, SEED / "pendulum.sd", "--formulation", formulation), "q2")
+    assert [e["values"]["q2"] for e in found] == pytest.approx([-2.34, 2.34], rel=1e-12)
+    assert [e["values"]["q1"] for e in found] == pytest.approx([0.0, 0.0], abs=1e-12)
+    # reaction: q2 row, m g + 2 kappa q2 = 0
+    assert [e["values"]["rod.multiplier"] for e in found] == pytest.approx(1.13 * 9.81 / 2 / np.array([2.34, -2.34]))
+    assert [e["stability"] for e in found] == ["stable", "unstable"]
+    assert [e["energy"] for e in found] == ["minimum", "maximum"]
+    assert found[0]["by"] == "energy"
+    # on unit displacements along the circle: 2 kappa
+    assert found[0]["stiffness"] == pytest.approx([1.13 * 9.81 / 2.34], rel=1e-10)
+    assert found[0]["conservative"] is True
+
+
+DUFFING = """
+model duffing {
+  param m = 2 kg
+  param c = 0.3 N.s/m
+  param k = -8 N/m
+  param k3 = 2 N/m^3
+  coord x: translation = 0.1 m
+  energy T* = 1/2*m*x'^2
+  energy V = 1/2*k*x^2 + 1/4*k3*x^4
+  content D = 1/2*c*x'^2
+}
+"""
+
+
+@pytest.mark.parametrize(("c", "wells"), [("0.3", "asymptotically stable"), ("0", "stable"), ("-0.1", "unstable")])
+def test_a_double_well(c, wells, tmp_path, capsys):
+    found = by(rests(capsys, write(tmp_path, DUFFING), "--set", f"c={c}"), "x")
+    assert [e["values"]["x"] for e in found] == pytest.approx([-2.0, 0.0, 2.0], abs=1e-12)
+    assert [e["stability"] for e in found] == [wells, "unstable", wells]
+    middle, well = (np.roots([2.0, float(c), k]) for k in (-8.0, -8.0 + 3 * 2.0 * 4.0))
+    for e, expected in ((found[1], middle), (found[0], well)):
+        theirs = sorted(expected, key=lambda v: (v.real, v.imag))
+        ours = sorted((complex(*v) for v in e["eigenvalues"]), key=lambda v: (v.real, v.imag))
+        assert ours == pytest.approx(theirs, rel=1e-10, abs=1e-10)
+
+
+DIODE = """
+model diode {
+  param E = 5 V
+  param R = 220 ohm
+  param Is = 1e-12 A
+  param vT = 25.85 mV
+  param C = 1 uF
+  node s, a: electrical
+  supply: effort(e = E) s -> ground
+  r: dissipator(e = R*f) s -> a
+  d: dissipator(f = Is*(exp(e/vT) - 1)) a -> ground
+  c: potential(q = C*e) a -> ground
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
+def test_the_operating_point_of_a_diode(formulation, tmp_path, capsys):
+    (found,) = rests(capsys, write(tmp_path, DIODE), "--formulation", formulation)
+    current = lambda v: 1e-12 * (np.exp(v / 0.02585) - 1.0)  # noqa: E731
+    v = brentq(lambda v: (5.0 - v) / 220.0 - current(v), 0.0, 1.0, xtol=1e-15)
+    slope = 1 / 220 + (current(v) + 1e-12) / 0.02585
+    eigenvalues = [complex(*e) for e in found["eigenvalues"] if abs(complex(*e)) > 1.0]
+    assert eigenvalues == pytest.approx([-slope / 1e-6], rel=1e-9)
+    assert found["stability"] == "asymptotically stable"
+
+
+def test_a_diode_at_its_voltage(tmp_path, capsys):
+    """The operating point itself, by what the linearisation says of it."""
+    options = ("--equilibrium", "--inputs", "E", "--outputs", "d.e,d.f", "--backend", "numpy")
+    code, found = run_json(capsys, "linearize", str(write(tmp_path, DIODE)), *options)
+    assert code == 0
+    v = brentq(lambda v: (5.0 - v) / 220.0 - 1e-12 * (np.exp(v / 0.02585) - 1.0), 0.0, 1.0, xtol=1e-15)
+    resistance = 0.02585 / (1e-12 * np.exp(v / 0.02585))
+    by_voltage, by_current = found["result"]["transfer"]
+    assert by_voltage["static"] == pytest.approx(resistance / (resistance + 220.0), rel=1e-9)
+    assert by_current["static"] == pytest.approx(1.0 / (resistance + 220.0), rel=1e-9)
+
+
+def test_levitation_rests_where_the_magnet_bears_the_load(capsys):
+    found = by(rests(capsys, SEED / "em_suspension.sd"), "x")
+    gap = 4.42 / 5.0 * np.sqrt(0.004 / (2 * 19.62))
+    assert [e["values"]["x"] + 0.01 for e in found] == pytest.approx([-gap, gap], rel=1e-9)
+    assert {e["stability"] for e in found} == {"unstable"}
+    assert found[1]["values"]["q2'"] == pytest.approx(4.42 / 5.0, rel=1e-12)
+    assert found[1]["energy"] is None  # a current flows
+
+
+def test_a_motor_turns_steadily(capsys):
+    (found,) = rests(capsys, SEED / "dc_motor.sd")
+    speed = 0.25 * 12.0 / (0.8 * 0.005 + 0.25**2)
+    assert found["values"]["shaft'"] == pytest.approx(speed, rel=1e-12)
+    assert found["stability"] == "asymptotically stable"
+
+
+def test_four_rests_of_a_double_pendulum(capsys):
+    found = rests(capsys, SEED / "two_link_arm.sd")
+    angles = {tuple(np.round(np.sin([e["values"]["th1"], e["values"]["th2"]])).astype(int)): e for e in found}
+    assert len(found) == len(angles) == 4
+    assert angles[-1, -1]["stability"] == "stable"
+    assert {angles[k]["stability"] for k in ((1, 1), (1, -1), (-1, 1))} == {"unstable"}
+    # [V_11, V_22] = -(m1 + m2) g l1 sin th1, -m2 g l2 sin th2
+    assert sorted(angles[1, -1]["stiffness"]) == pytest.approx([-2.0 * 9.81, 0.8 * 9.81 * 0.7], rel=1e-10)
+
+
+def test_redundant_constraints_do_not_disturb(capsys):
+    found = by(rests(capsys, SEED / "redundant_pendulum.sd"), "q2")
+    assert [e["stability"] for e in found] == ["stable", "unstable"]
+    assert found[0]["free"] == ["th"]
+
+
+def test_dynamic_variables_alone(tmp_path, capsys):
+    """Van der Pol: 0 is unstable, its eigenvalues are those of s^2 - mu s + 1."""
+    text = """
+    model vdp {
+      param mu = 0.5
+      param tau = 1 s
+      state x: 1 = 0.1
+      state y: 1 = 0
+      dynamic x' = y/tau
+      dynamic y' = (mu*(1 - x^2)*y - x)/tau
+    }
+    """
+    (found,) = rests(capsys, write(tmp_path, text))
+    assert found["stability"] == "unstable"
+    ours = sorted((complex(*v) for v in found["eigenvalues"]), key=lambda v: v.imag)
+    assert ours == pytest.approx(sorted(np.roots([1, -0.5, 1]), key=lambda v: v.imag), rel=1e-10)
+
+
+SHAFT = """
+model drive {
+  param J1 = 0.2 kg.m^2
+  param J2 = 0.5 kg.m^2
+  param k = 30 N.m/rad
+  param b = 0.4 N.m.s/rad
+  param M = 6 N.m
+  coord a, c: rotation
+  energy T* = 1/2*J1*a'^2 + 1/2*J2*c'^2
+  energy V = 1/2*k*(a - c)^2
+  content D = 1/2*b*c'^2
+  work M on a
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_two_wheels_turn_together(formulation, tmp_path, capsys):
+    """A driven shaft: speed M/b, twist M/k; one eigenvalue at zero is its angle's, the others decide."""
+    (found,) = rests(capsys, write(tmp_path, SHAFT), "--formulation", formulation)
+    assert [found["values"][n] for n in ("a'", "c'")] == pytest.approx([15.0, 15.0], rel=1e-10)
+    assert found["values"]["a"] - found["values"]["c"] == pytest.approx(0.2, rel=1e-10)
+    assert found["stability"] == "asymptotically stable"
+    assert found["free"] == ["a", "c"]
+    # J1 s^2 a = -k (a - c),  J2 s^2 c = k (a - c) - b s c
+    expected = np.roots([0.2 * 0.5, 0.2 * 0.4, 30 * 0.7, 30 * 0.4])
+    ours = [complex(*v) for v in found["eigenvalues"] if abs(complex(*v)) > 1e-9]
+    assert len(ours) == 3
+    for value in expected:
+        assert min(abs(v - value) for v in ours) < 1e-9
+
+
+FREE = """
+model free_mass {
+  param m = 1 kg
+  input F: N = 1 N
+  coord x: translation = 0 m
+  energy T* = 1/2*m*x'^2
+  work F on x
+}
+"""
+
+
+def test_what_has_no_rest_says_so(tmp_path, capsys):
+    assert rests(capsys, write(tmp_path, FREE), code=3) == []
+    assert run(["equilibrium", str(write(tmp_path, FREE)), "--backend", "numpy", "--quiet"]) == 3
+    assert "no state of rest was found" in capsys.readouterr().err
+
+
+def test_a_free_mass_goes_on_and_is_not_called_stable(tmp_path, capsys):
+    (found,) = rests(capsys, write(tmp_path, FREE), "--set", "F=0")
+    assert found["stability"] == "undecided"
+    assert found["free"] == ["x'"]
+
+
+def test_the_table(tmp_path, capsys):
+    assert run(["equilibrium", str(write(tmp_path, DUFFING)), "--backend", "numpy"]) == 0
+    out, err = capsys.readouterr()
+    assert "3 found" in err
+    assert out.count("asymptotically stable by the eigenvalues (Lyapunov's indirect method)") == 2
+    assert "x = -2" in out

@@ -1,0 +1,201 @@
+"""`sysdyn import`: netlists against closed forms and, where it is installed, ngspice; hostile texts."""
+
+import json
+import math
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sysdyn.api import simulate
+from sysdyn.cli.main import run
+from sysdyn.cli.spice.netlist import Unreadable, number, value
+from sysdyn.cli.spice.writing import quantity
+
+NETLISTS = Path(__file__).with_name("netlists")
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [("4.7k", 4.7e3), ("10meg", 1e7), ("0.1n", 1e-10), ("100nF", 1e-7), ("1e-3", 1e-3), ("2.5MEGohm", 2.5e6),
+     ("1m", 1e-3), ("-3.3", -3.3), ("1.5e3k", 1.5e6), ("1mil", 25.4e-6), (".5u", 5e-7), ("2f", 2e-15), ("x", None),
+     ("1..2", None)],
+)  # fmt: skip
+def test_numbers(text, wanted):
+    assert number(text) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [("{2*r + 1k}", 1200.0), ("'sqrt(r)^2'", 100.0), ("{1/(2*pi*r)}", 0.5e-2 / math.pi), ("{-r}", -100.0)],
+)
+def test_expressions(text, wanted):
+    assert value(text, {"r": 100.0}) == pytest.approx(wanted, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{__import__('os').system('x')}", "{r.__class__}", "{(lambda: 1)()}", "{[1][0]}", "{'a'}", "{zz}", "{1/0}",
+     "{9^9^9^9}", "{" + "(" * 300, "{r if r else 1}", "{f(1)}", "{1;2}", "{" + "1+" * 400 + "1}"],
+)  # fmt: skip
+def test_hostile_expressions_are_refused(text):
+    with pytest.raises(Unreadable):
+        value(text, {"r": 1.0})
+
+
+def test_quantities_read_as_a_person_writes_them():
+    assert [quantity(x, "ohm") for x in (4700.0, 1e-3, 0.0, 1e6, 123456.789)] == [
+        "4.7 kohm", "1 mohm", "0 ohm", "1 Mohm", "123456.789 ohm",
+    ]  # fmt: skip
+
+
+def imported(netlist, folder, capsys):
+    out = folder / "model.sd"
+    code = run(["import", str(netlist), "-o", str(out), "--json"])
+    return code, json.loads(capsys.readouterr().out), out
+
+
+def traces(name, folder, capsys, accuracy=1e-7):
+    code, found, out = imported(NETLISTS / f"{name}.cir", folder, capsys)
+    assert code == 0, found["diagnostics"]
+    assert run(["check", str(out), "--strict"]) == 0, capsys.readouterr()
+    assert run(["fmt", "--check", str(out)]) == 0
+    return simulate(out, scene="tran", accuracy=accuracy, output=folder / "t.h5")
+
+
+def test_a_pulse_through_a_resistor_and_a_capacitor(tmp_path, capsys):
+    """Linear rise in 1 us, 5 V for 3 ms: the closed form at the end of each edge and long after."""
+    trace = traces("rc", tmp_path, capsys)
+    v, tau = np.asarray(trace["v_out"]), 1e-3
+
+    def ramp(t):  # answer to 5 V/us from 1 ms on
+        s = np.maximum(t - 1e-3, 0.0)
+        return 5e6 * (s - tau * -np.expm1(-s / tau))
+
+    t = trace.time
+    wanted = ramp(t) - ramp(t - 1e-6) - ramp(t - 1e-6 - 3e-3) + ramp(t - 2e-6 - 3e-3)
+    first = t < 10.9e-3
+    assert np.abs(v - wanted)[first].max() < 5e-6
+
+
+def test_initial_conditions_and_parameters(tmp_path, capsys):
+    """A damped series circuit at its resonance from 2 V and 0.1 A: SciPy's solution of its two equations."""
+    from scipy.integrate import solve_ivp
+
+    trace = traces("rlc", tmp_path, capsys)
+    rate = 1.0 / (2 * 3.14159265 * math.sqrt(1e-3 * 1e-6))
+    found = solve_ivp(
+        lambda t, y: [(math.sin(2 * math.pi * rate * t) - 10.0 * y[0] - y[1]) / 1e-3, y[0] / 1e-6],
+        (0.0, trace.time[-1]), [0.1, 2.0], "DOP853", trace.time, rtol=1e-11, atol=1e-12,
+    )  # fmt: skip
+    assert np.abs(np.asarray(trace["i_l1"]) - found.y[0]).max() < 1e-6 * 0.1
+    assert np.abs(np.asarray(trace["v_3"]) - found.y[1]).max() < 1e-6 * 3.6
+
+
+def test_controlled_sources(tmp_path, capsys):
+    """v(a) = 1 k i; v(b) = 2 v(a); i(V2) = v(b)/1 k; v(h) = 500 i; v(d) = 300 i; 2 mS v(d) go into 1 k and 10 n."""
+    trace = traces("ctrl", tmp_path, capsys)
+    t = trace.time
+    i = np.interp(t, [0.0, 1e-3, 2e-3], [0.0, 1e-3, 0.5e-3])
+    assert np.abs(np.asarray(trace["v_h"]) - 500.0 * 2.0 * i).max() < 1e-9
+    target = 1e3 * 2e-3 * 300.0 * 2.0 * i  # behind it by 10 us
+    assert np.abs(np.asarray(trace["v_g"]) - target).max() < 2e-2 * 1.2
+    assert abs(np.asarray(trace["v_g"])[-1] - target[-1]) < 1e-6
+
+
+def test_subcircuits_become_components(tmp_path, capsys):
+    code, found, _ = imported(NETLISTS / "inv.cir", tmp_path, capsys)
+    text = found["result"]["text"]
+    assert code == 0
+    assert "component inv {" in text
+    assert "param cl = 50 fF" in text
+    assert re.search(r"x2: inv\(cl = 100 fF\) in_ = b, out = c, vdd = vdd", text)
+    assert "beta = 0.00022 A/V^2" in text
+
+
+@pytest.mark.skipif(shutil.which("ngspice") is None, reason="ngspice is not installed")
+@pytest.mark.parametrize("name", sorted(p.stem for p in NETLISTS.glob("*.cir")))
+def test_ngspice_agrees(name, tmp_path, capsys):
+    """Every trace within 3e-4 of its largest value (between the rows both are interpolated by lines)."""
+    trace = traces(name, tmp_path, capsys, 1e-6)
+    text = (NETLISTS / f"{name}.cir").read_text()
+    shown = re.search(r"(?im)^\.print tran (.*)$", text)[1].split()
+    body = re.sub(r"(?im)^\.(print.*|end)$", "", text).rstrip()
+    (tmp_path / "n.cir").write_text(
+        f"{body}\n.options reltol=1e-7 abstol=1e-15 vntol=1e-9 chgtol=1e-18 trtol=1 method=gear maxord=4\n.control\n"
+        "set wr_singlescale\nset wr_vecnames\nset numdgt=12\nrun\nlinearize\n"
+        f"wrdata n.txt {' '.join(shown)}\nquit\n.endc\n.end\n"
+    )
+    subprocess.run(["ngspice", "-b", "n.cir"], cwd=tmp_path, capture_output=True, timeout=120, check=False)
+    table = np.loadtxt(tmp_path / "n.txt", skiprows=1)
+    for k, asked in enumerate(shown):
+        kind, what = re.fullmatch(r"(?i)([vi])\((\w+)\)", asked).groups()
+        values = np.interp(table[:, 0], trace.time, np.asarray(trace[f"{kind}_{what}".lower()]))
+        assert np.abs(values - table[:, k + 1]).max() < 3e-4 * np.abs(table[:, k + 1]).max(), asked
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("R1 a 0", "ends too early"),
+        ("R1 a 0 zz", "zz"),
+        ("D1 a 0 none", "no .model none"),
+        ("X1 a none", "no subcircuit 'none'"),
+        ("O1 a 0 b 0 m", "letter O"),
+        ("B1 a 0 V=1", "letter B"),
+        ("V1 a 0 SFFM(0 1 1 1 1)", "are known"),
+        ("V1 a 0 PWL(0 0 0 1)", "ascending"),
+        ("K1 L1 L2 0.5", "two coils"),
+        ("F1 a 0 V9 2", "V9".lower()),
+        ("E1 a 0 value={1}", "expressions"),
+        (".include ../secret.cir", "netlist's folder"),
+        (".include /etc/passwd", "netlist's folder"),
+        (".nonsense", "not known"),
+        (".ends", "without .subckt"),
+        (".subckt x a b", "no .ends"),
+        (".param a", "NAME=VALUE"),
+    ],
+)
+def test_what_cannot_be_said_is_named_with_its_line(line, said, tmp_path, capsys):
+    path = tmp_path / "n.cir"
+    path.write_text(f"title\nR9 a 0 1k\n{line}\n.end\n")
+    code, found, out = imported(path, tmp_path, capsys)
+    assert code == 1
+    assert not out.exists()
+    (error,) = [d for d in found["diagnostics"] if d["severity"] == "error"]
+    assert error["code"] == "E941"
+    assert said in error["message"]
+    assert error["line"] == (1 if said == "no .ends" else 3)
+
+
+def test_what_is_left_out_is_said(tmp_path, capsys):
+    path = tmp_path / "n.cir"
+    text = "t\n.model d d(is=1e-14 cjo=4p)\nV1 a 0 1\nR1 a b 1k\nD1 b 0 d\n.ac dec 10 1 1k\n.tran 1u 1m\n.end\n"
+    path.write_text(text)
+    code, found, _ = imported(path, tmp_path, capsys)
+    assert code == 0
+    assert {(d["code"], d["line"]) for d in found["diagnostics"]} == {("W941", 5), ("N941", 6)}
+
+
+def test_names_and_titles_of_others_are_data(tmp_path, capsys):
+    """Whatever they are, the text is one that `check` takes."""
+    path = tmp_path / "n.cir"
+    path.write_text(
+        "title } model evil { \x1b[31m\nRif if then 1k\nR-2 then 0 2k\nRa.b if 0 1k\nVmodel if 0 1\nR1 1 0 1\n"
+        "Rx 1 if 1\n.tran 1m 1\n"
+    )
+    code, _, out = imported(path, tmp_path, capsys)
+    assert code == 0
+    assert run(["check", str(out)]) == 0
+    assert "\x1b" not in out.read_text()
+
+
+def test_usage(tmp_path, capsys):
+    assert run(["import", str(tmp_path / "none.cir")]) == 5
+    (tmp_path / "n.cir").write_text("t\nR1 a 0 1\n")
+    assert run(["import", str(tmp_path / "n.cir"), "-o", "x.txt"]) == 2
+    capsys.readouterr()
+    assert run(["import", str(tmp_path / "n.cir")]) == 0
+    assert "resistor(R = 1 ohm) a -> ground" in capsys.readouterr().out

@@ -1,0 +1,209 @@
+"""`sysdyn reduce`: activities in closed form, and a reduced model whose error is measured by a run of its own."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from schema import NUMBER, conforms, envelope
+from sysdyn import api
+from sysdyn.cli.main import run
+from sysdyn.cli.reduce.activity import variation
+from sysdyn.runtime.comparison.arrays import arrays_of
+from sysdyn.runtime.comparison.compare import compare
+from sysdyn.runtime.comparison.verdict import Tolerance
+from sysdyn.runtime.trace.trace import Quantity
+from texts import ROOT, TWO_SCENES, run_json, write
+
+REDUCE = {"activity": list, "total": NUMBER, "accuracy": NUMBER, "trials": list, "error": NUMBER, "ended": bool}
+ACTIVITY = {"element": str, "role": str, "activity": NUMBER, "share": NUMBER, "file": str, "line": int}
+TRIAL = {"element": str, "change": str, "error": (*NUMBER, type(None)), "kept": bool, "reason": (str, type(None))}
+
+OSCILLATOR = """\
+model oscillator {
+  param m = 2 kg
+  param k = 8 N/m
+  node x: translation = 0.3 m
+  body: kinetic(p = m*f) x
+  spring: potential(e = k*q) x -> ground
+  init body.f = 0 m/s
+}
+scene run of oscillator {
+  time 0 s to 7 s
+  trace x.q as q
+  accuracy 1e-6
+}
+"""
+
+CHARGING = """\
+model charging {
+  param R = 3 ohm
+  param C = 0.5 F
+  node a, b: electrical
+  V: effort(e = 4 V) a -> ground
+  r: dissipator(e = R*f) a -> b
+  c: potential(q = C*e) b -> ground
+  init c.e = 0 V
+}
+scene run of charging {
+  time 0 s to 2 s
+  trace c.e as v
+  accuracy 1e-6
+}
+"""
+
+DRIVE = """\
+## A motor with a wire, two discs and a seal.
+from std.electrical import voltage, resistor, capacitor, inductor
+
+model drive {
+  param J1 = 0.2 kg.m^2
+  param J2 = 1e-6 kg.m^2    # of the ring
+  param Lw = 1 uH
+  node s, a, c: electrical
+  node shaft: rotation
+  V: voltage(v = 12 V) s -> ground
+  R: resistor(R = 1 ohm) s -> a
+  wire: inductor(L = Lw) a -> c
+  stray: capacitor(C = 1 pF) c -> ground
+  emf: gyrator(e1 = 0.5 V.s/rad*f2) c -> ground, shaft -> ground
+  rotor: kinetic(p = J1*f) shaft
+  ring: kinetic(p = J2*f) shaft
+  bearing: dissipator(e = 0.02 N.m.s/rad*f) shaft -> ground
+  seal: dissipator(e = 1e-8 N.m.s/rad*f) shaft -> ground
+  init wire.f = 0 A
+  init stray.e ~ 0 V
+  init shaft.f = 0 rad/s
+}
+
+scene go of drive {
+  time 0 s to 3 s
+  trace shaft.f as om
+  accuracy 1e-3
+}
+"""
+
+
+def activities(capsys, folder, text):
+    code, found = run_json(capsys, "reduce", write(folder, text), "--activity")
+    assert code == 0
+    envelope(found, "reduce", REDUCE)
+    for item in found["result"]["activity"]:
+        conforms(item, ACTIVITY)
+    return {a["element"]: a for a in found["result"]["activity"]}
+
+
+def test_a_spring_and_a_mass_turn_their_energy_over_four_times_a_period(tmp_path, capsys):
+    found = activities(capsys, tmp_path, OSCILLATOR)
+    # the energy of the spring falls from 1/2 k a^2 to 0 and back twice a period, w = 2 rad/s
+    whole, part = divmod(2.0 * 7.0, np.pi / 2)
+    last = np.cos(2.0 * 7.0) ** 2
+    half = 1.0 - last if whole % 2 == 0 else last
+    wanted = 0.5 * 8.0 * 0.3**2 * (whole + half)
+    assert part > 0.0
+    for name in ("spring", "body"):
+        assert found[name]["activity"] == pytest.approx(wanted, rel=1e-5)
+        assert found[name]["share"] == pytest.approx(0.5, rel=1e-5)
+        assert found[name]["role"] == "stored"
+
+
+def test_a_capacitor_is_charged(tmp_path, capsys):
+    found = activities(capsys, tmp_path, CHARGING)
+    v = 4.0 * (1.0 - np.exp(-2.0 / 1.5))
+    assert found["V"]["activity"] == pytest.approx(0.5 * 4.0 * v, rel=1e-5)
+    assert found["c"]["activity"] == pytest.approx(0.25 * v**2, rel=1e-5)
+    assert found["r"]["activity"] == pytest.approx(0.25 * 16.0 * (1.0 - np.exp(-4.0 / 1.5)), rel=1e-5)
+
+
+def test_the_largest_come_first_and_shares_add_up(tmp_path, capsys):
+    code, found = run_json(capsys, "reduce", str(ROOT / "models/seed/dc_motor.sd"), "--activity")
+    assert code == 0
+    items = found["result"]["activity"]
+    assert [a["activity"] for a in items] == sorted((a["activity"] for a in items), reverse=True)
+    assert sum(a["share"] for a in items if a["role"] != "passed on") == pytest.approx(1.0)
+    sides = [a["activity"] for a in items if a["element"].startswith("emf")]
+    assert sides[0] == pytest.approx(sides[1], rel=1e-4)
+
+
+def test_the_variation_of_a_cubic_is_that_of_its_extremes():
+    # y = s (s - 1/4) (s - 1) on [0, 1] and its mirror image: two cells, extremes inside both
+    def y(s):
+        return s * (s - 0.25) * (s - 1.0)
+
+    def rate(s):
+        return 3 * s * s - 2.5 * s + 0.25
+
+    time = np.array([0.0, 1.0, 2.0])
+    values = np.array([y(0.0), y(1.0), y(0.0)])
+    found = variation(time, Quantity("y", values, "1", None, np.array([rate(0.0), rate(1.0), -rate(0.0)])))
+    s = np.linspace(0.0, 1.0, 200_001)
+    one = np.abs(np.diff(y(s))).sum()
+    h = np.linspace(0.0, 1.0, 200_001)
+    # from (0, y'(1)) back to (0, -y'(0)): the cubic of the second cell
+    other = np.abs(np.diff(rate(1.0) * (h - 2 * h**2 + h**3) - rate(0.0) * (h**3 - h**2))).sum()
+    assert found == pytest.approx(one + other, rel=1e-9)
+
+
+def test_what_a_scene_does_not_need_is_left_out_of_the_text(tmp_path, capsys):
+    file = write(tmp_path, DRIVE)
+    code, found = run_json(capsys, "reduce", file)
+    assert code == 0
+    result = found["result"]
+    for trial in result["trials"]:
+        conforms(trial, TRIAL)
+    kept = {t["element"] for t in result["trials"] if t["kept"]}
+    assert kept == {"stray", "seal", "wire", "ring"}
+    assert result["reduced"]["unknowns"] < result["full"]["unknowns"]
+    text = Path(result["file"]).read_text(encoding="utf-8")
+    for gone in ("stray:", "seal:", "  ring:", "J2", "Lw", "1 pF", "init wire.f", "init stray"):
+        assert gone not in text
+    for needed in ("## A motor", "rotor: kinetic(p = J1*f) shaft", "bearing:", "init shaft.f"):
+        assert needed in text
+    assert run(["fmt", "--check", result["file"]]) == 0
+    # an error that is measured once more, by runs of its own, at their steps
+    full = api.simulate(file, accuracy=1e-5, output="full.h5")
+    reduced = api.simulate(result["file"], accuracy=1e-5, output="reduced.h5")
+    verdict = compare(arrays_of(full), arrays_of(reduced), Tolerance(rtol=1e-3, tau=3e-9))
+    assert verdict.equal, verdict.worst
+    assert result["error"] <= 1e-3
+    capsys.readouterr()
+
+
+def test_a_finer_accuracy_keeps_more(tmp_path, capsys):
+    file = write(tmp_path, DRIVE)
+    kept = []
+    for accuracy in ("1e-2", "1e-6"):
+        result = run_json(capsys, "reduce", file, "--accuracy", accuracy)[1]["result"]
+        assert result["error"] <= float(accuracy)
+        kept.append({t["element"] for t in result["trials"] if t["kept"]})
+    assert kept[1] < kept[0]
+
+
+def test_a_model_that_needs_everything_is_left_as_it_is(tmp_path, capsys):
+    assert run(["reduce", write(tmp_path, OSCILLATOR)]) == 0
+    out = capsys.readouterr().out
+    assert "every element that was tried is needed" in out
+    assert not Path(tmp_path / "model-reduced.sd").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--rtol", "1e-4"], "--accuracy says what is wanted"),
+        (["-o", "model.sd"], "is the model itself"),
+        (["--max-wall", "soon"], "a number of seconds"),
+    ],
+)
+def test_wrong_usage(tmp_path, capsys, arguments, said):
+    assert run(["reduce", write(tmp_path, OSCILLATOR), *arguments]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_several_scenes_and_none_named(tmp_path, capsys):
+    assert run(["reduce", write(tmp_path, TWO_SCENES)]) == 2
+    assert "--scene swing | again" in capsys.readouterr().err
+
+
+def test_a_model_without_powers_is_told_so(tmp_path, capsys):
+    text = "model m {\n  state y: 1 = 1\n  dynamic y' = -1 Hz*y\n}\nscene s of m { time 0 s to 1 s; trace y }\n"
+    assert run(["reduce", write(tmp_path, text)]) == 1
+    assert "powers of the elements" in capsys.readouterr().err
