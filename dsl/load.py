@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sysdyn.dsl.elaborate import events
+from sysdyn.dsl.elaborate.authors import told
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.listing import Instance, Readable, instances, readable
@@ -125,9 +126,25 @@ def _network(
     outputs: Sequence[str] | None,
 ) -> Network | None:
     elaborator, reader = _elaborated(document, model, scene, report, settings, levels)
+    try:
+        return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
+    finally:
+        report.retold(lambda found: told(elaborator, found))
+
+
+def _judged(
+    elaborator: Elaborator,
+    reader: SceneReader,
+    scene: syntax.Scene | None,
+    report: Report,
+    *,
+    required: bool,
+    outputs: Sequence[str] | None,
+) -> Network | None:
+    """The network of an elaborated model, after every check."""
     read_scene: Scene | None = None
     if scene is not None:
-        read_scene = reader.read(scene, Place(document.file.source, scene.name.span))
+        read_scene = reader.read(scene, Place(elaborator.source, scene.name.span))
     if outputs is not None:
         for source, trace in reader.only(outputs, lambda text: _trace(text, report)):
             reader.command(source, trace, SceneReader.trace)

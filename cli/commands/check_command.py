@@ -110,10 +110,14 @@ def _form(console: Console, chosen: str | None, files: tuple[str, ...]) -> None:
 
 def _file(console: Console, path: str, refused: bool) -> dict[str, object]:
     document = targets.read(path, console.report)
+    wrong = [d.place.span for d in console.report if d.severity == "error" and d.place and d.place.file == path]
     found = []
     for target in targets.all_targets(document, console.report):
         with ex.fresh():
             summary = checked(target, console.report, refused)
+        items = [item.span for item in (target.model, target.scene) if item is not None]
+        if any(i.start <= span.start < i.end for span in wrong for i in items):
+            summary["ok"] = False  # a slip that was read as it was meant is still to be mended
         found.append(summary)
         if summary["ok"]:
             console.say(f"{path}: {target.name}: {_line(summary)}")

@@ -212,7 +212,7 @@ class Instances(Elements):
                 raise self.resolver.fail(
                     "E405", f"'{component.name}' has no parameter '{arg.name}'", arg.span, help=listed
                 )
-            found[arg.name] = (arg.value, self.resolver.resolve(arg.value))
+            found[arg.name] = (arg.value, self.resolver.resolve(arg.value), self.resolver.bare(arg.value))
         return found
 
     def _required(self, s: syntax.Instance, component: ComponentSymbol, head: Head, given: dict[str, Argument]) -> None:

@@ -17,7 +17,8 @@ from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.tree import syntax
 
-Argument = tuple[syntax.Expr, Typed | Vector]  # as written, and its value where the instance stands
+Argument = tuple[syntax.Expr, Typed | Vector, str | None]
+"""As written, its value where the instance stands, and the name of the bare number that it is."""
 
 
 class Parameters(Frame):
@@ -88,7 +89,7 @@ class Parameters(Frame):
         elif given is not None:
             if unit is None and statement.value is not None:  # the default fixes the dimension
                 unit = self._values(statement, statement.value, self.resolver.resolve(statement.value), None, shape)[1]
-            values, unit, truth = self._values(statement, given[0], given[1], unit, shape)
+            values, unit, truth = self._values(statement, given[0], given[1], unit, shape, given[2])
         if unit is None:
             raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span)
         around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
@@ -103,8 +104,12 @@ class Parameters(Frame):
         value: Typed | Vector,
         unit: Unit | None,
         shape: Shape,
+        bare: str | None = None,
     ) -> tuple[tuple[Node, ...], Unit, bool]:
-        """Nodes of a default or an argument, and the unit that it fixes where none is declared."""
+        """Nodes of a default or an argument, and the unit that it fixes where none is declared.
+
+        bare: the parameter of the user that the argument is, where that is a number without unit.
+        """
         items = value.items if isinstance(value, Vector) else (value,)
         for item in items:
             self._is_run_constant(item.node, statement)
@@ -126,7 +131,10 @@ class Parameters(Frame):
                 code = "E207" if what == "default" else "E214"
                 if code == "E214":
                     name = self.current.path or self.current.component
+                    want = unit.text if unit is not None else want
                     message = f"argument {statement.decl.name} of '{name}' is {is_}, wants {want}"
+                    if bare is not None and help_ is None and have == "dimensionless":
+                        help_ = f"'{bare}' is a number without unit; in {want} it fits"
                 raise self.resolver.fail(code, message, self._where(statement), help=help_)
         truth = isinstance(value, Typed) and value.truth
         nodes = tuple(i.node for i in items)

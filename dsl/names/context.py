@@ -352,6 +352,11 @@ class Context:
     def _written(self, e: syntax.Expr) -> str:
         return " ".join(self.source.text[e.span.start : e.span.end].split())
 
+    def bare(self, expression: syntax.Expr) -> str | None:
+        """The name of the one parameter among the factors of an expression that is a bare number."""
+        found = self._bare(expression)
+        return None if found is None else found[0]
+
     def _bare(self, expression: syntax.Expr) -> tuple[str, str | None] | None:
         """The one parameter among the factors of an expression that is a bare number: its name and that number."""
         inner: object = expression

@@ -6,7 +6,7 @@ where there is one, the text to write instead (`help`). Rules never raise: they 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,6 +102,10 @@ class Report:
         """Add several diagnostics."""
         for diagnostic in diagnostics:
             self.add(diagnostic)
+
+    def retold(self, tell: Callable[[Iterable[Diagnostic]], Iterable[Diagnostic]]) -> None:
+        """Tell what was found in another way, in the same order."""
+        self._found = dict.fromkeys(tell(self._found))
 
     def error(
         self,

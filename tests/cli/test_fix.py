@@ -118,3 +118,14 @@ def test_sarif_carries_the_changes(tmp_path, capsys):
     assert replacement["insertedContent"]["text"] == "N.m"
     region = replacement["deletedRegion"]
     assert (region["startLine"], region["startColumn"], region["endColumn"]) == (2, 15, 17)
+
+
+@pytest.mark.parametrize("line", ["param R = 10k", "phi stop: x == 1 m", "let y := x"])
+def test_a_model_with_a_slip_is_not_called_ok(tmp_path, capsys, line):
+    text = f"model m {{\n  coord x: translation = 1 m\n  energy T* = 1/2*(1 kg)*x'^2\n  {line}\n}}\n"
+    (tmp_path / "m.sd").write_text(text)
+    assert run(["check", "m.sd"]) == 1
+    assert ": ok" not in capsys.readouterr().err
+    assert run(["check", "m.sd", "--json"]) == 1
+    (file,) = json.loads(capsys.readouterr().out)["result"]["files"]
+    assert [t["ok"] for t in file["targets"]] == [False]

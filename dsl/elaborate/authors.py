@@ -1,0 +1,67 @@
+"""Findings placed in a library, shown where the author uses it: the element's line first, the library as a note.
+
+A component's text stands for every instance of it.  What is found there is told at the statement in the author's own
+file that made the instance, on the way from the model inwards the last one that the author wrote.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.names.symbols import Space
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related
+from sysdyn.dsl.tree import syntax
+
+_ARGUMENT = re.compile(r"argument (\w+) of")
+
+
+def told(elaborator: Elaborator, found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    """The findings, those of a library at the author's place."""
+    for d in found:
+        yield _told(elaborator, d) if d.place is not None and d.place.source is not elaborator.source else d
+
+
+def _told(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
+    assert d.place is not None
+    spaces = [s for s, _ in elaborator.bodies if s.path and _within(elaborator, s, d.place)]
+    named = [s for s in spaces if re.search(rf"(?<![\w.]){re.escape(s.path)}(?![\w])", d.message)]
+    for space in (*sorted(named, key=lambda s: -len(s.path)), *spaces):
+        place = _author(elaborator, space, d)
+        if place is not None:
+            said = f"in component '{space.component}'"
+            return replace(d, place=place, related=(Related(said, d.place), *d.related))
+    return d
+
+
+def _within(elaborator: Elaborator, space: Space, place: Place) -> bool:
+    """Whether a place lies in the text of a space's component."""
+    if space.source is not place.source:
+        return False
+    body = next(body for s, body in elaborator.bodies if s is space)
+    spans = [statement.span for statement, _ in body]
+    return any(span.start <= place.span.start and place.span.end <= span.end for span in spans)
+
+
+def _author(elaborator: Elaborator, space: Space, d: Diagnostic) -> Place | None:
+    """The statement in the author's file that a space comes from, or its argument that the finding is about."""
+    labels = [label.partition("[")[0] for label in space.path.split(".")]
+    inner: tuple[Space, syntax.Instance] | None = None
+    for depth, label in enumerate(labels):
+        around = ".".join(labels[:depth])
+        for outer, body in elaborator.bodies:
+            if outer.source is elaborator.source and _plain(outer.path) == around:
+                made = [s for s, _ in body if isinstance(s, syntax.Instance) and s.decl.name == label]
+                inner = (outer, made[0]) if made else inner
+    if inner is None:
+        return None
+    statement = inner[1]
+    argument = _ARGUMENT.search(d.message)
+    span = next((a.span for a in statement.args or () if argument and a.name == argument.group(1)), statement.span)
+    return Place(elaborator.source, span)
+
+
+def _plain(path: str) -> str:
+    return re.sub(r"\[[^\]]*\]", "", path)

@@ -1,0 +1,77 @@
+"""A finding in a library is told at the author's line; the library is a note."""
+
+import pytest
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+
+HEAD = """from std.electrical import resistor, capacitor, voltage
+
+component stage {
+  param R = 1 ohm
+  port a, b: electrical
+  inner: resistor(R = R) a -> b
+  store: capacitor(C = 1 uF) b -> ground
+}
+
+model m {
+  param k = 4
+  node a, b, c: electrical
+  V: voltage(v = 5 V) a -> ground
+"""
+LINES = [
+    ("X: resistor(R = k) a -> b", "E214", "R = k"),
+    ("X: capacitor(C = 3 H) a -> b", "E214", "C = 3 H"),
+    ("X: resistor(R = -3 ohm) a -> b", "E322", "X: resistor(R = -3 ohm) a -> b"),
+    ("X: stage(R = -3 ohm) a = a, b = b", "E322", "inner: resistor(R = R) a -> b"),
+    ("for i in 1..2 { X[i]: resistor(R = -3 ohm) a -> b }", "E322", "X[i]: resistor(R = -3 ohm) a -> b"),
+]
+
+
+@pytest.mark.parametrize(("line", "code", "marked"), LINES, ids=[x[0] for x in LINES])
+def test_a_finding_of_the_library_stands_at_the_authors_line(tmp_path, line, code, marked):
+    path = tmp_path / "m.sd"
+    rest = "  Y: resistor(R = 2 ohm) b -> c\n  Z: resistor(R = 3 ohm) c -> ground\n"
+    path.write_text(f"{HEAD}  {line}\n{rest}}}\n")
+    found = findings(path)
+    (error,) = [d for d in found if d.code == code]
+    assert error.place.file == str(path)
+    assert text_of(error.place) == marked
+    assert error.related[0].place.file == "std/electrical.sd"
+    assert error.related[0].message.startswith("in component '")
+    assert {d.code for d in found if d.severity == "error"} == {code}
+
+
+def test_the_element_that_is_named_is_the_one_that_is_shown(tmp_path):
+    path = tmp_path / "m.sd"
+    wrong = "".join(f"  R{k}: resistor(R = {r} ohm) a -> b\n" for k, r in enumerate((1, -2, 3, -4)))
+    path.write_text(
+        f"{HEAD}{wrong}  Z: resistor(R = 3 ohm) b -> ground\n  Q: capacitor(C = 1 F) c -> ground\n"
+        "  S: resistor(R = 1 ohm) c -> a\n}\n"
+    )
+    errors = [d for d in findings(path) if d.code == "E322"]
+    assert [text_of(d.place) for d in errors] == ["R1: resistor(R = -2 ohm) a -> b", "R3: resistor(R = -4 ohm) a -> b"]
+
+
+def test_a_library_of_ones_own_is_a_library(tmp_path):
+    (tmp_path / "parts.sd").write_text(
+        "component heavy {\n  param m: kg\n  branch: translation\n  law p = m*f\n  require m > 0 kg\n}\n"
+    )
+    path = tmp_path / "m.sd"
+    path.write_text("from parts import heavy\n\nmodel m {\n  node x: translation = 1 m\n  M: heavy(m = -1 kg) x\n}\n")
+    (error,) = [d for d in findings(path) if d.code == "E322"]
+    assert error.place.file == str(path)
+    assert error.place.start[0] == 5
+    assert error.related[0].place.file.endswith("parts.sd")
+
+
+def text_of(place):
+    return place.source.text[place.span.start : place.span.end]
+
+
+def findings(path):
+    report = Report()
+    document = load.read(path, report)
+    with ex.fresh():
+        load.network(document, document.models["m"], None, report, required=False)
+    return list(report)
