@@ -15,7 +15,6 @@ from pathlib import Path
 
 from sysdyn.cli.run.running import Request, run
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.trace.trace import Trace
 
 SPAN = 10.0
 ACCURACY = 1e-3
@@ -91,7 +90,7 @@ def missed(shot: Shot, folder: Path) -> tuple[bool, float]:
     assert ran is not None, [d.message for d in report.diagnostics]
     if ran.outcome.failure is not None:
         return False, float("nan")
-    speed = float(Trace.open(ran.outcome.trace)["v"][-1])
+    speed = float(ran.outcome.traced["v"][-1])
     error = abs(speed / (shot.impulse / 2.0) - 1.0)
     return ran.outcome.met and error > 3.0 * ACCURACY, error
 

@@ -107,7 +107,7 @@ def true_error(file, m, entry, folder):
     c = m.combination
     how = {"formulation": c.formulation, "index": c.index, "method": c.method, "rtol": m.tolerance}
     ran = simulate(Request(str(file), scene="reference", output=str(folder / "run.h5"), **how), Report())
-    trace, t = Trace.open(ran.outcome.trace), np.array(entry["t"])
+    trace, t = ran.outcome.traced, np.array(entry["t"])
     rows = np.searchsorted(trace.time, t + 1e-9 * t[-1], side="right") - 1
     wanted = entry["values"]
     return max(

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.run.running import Request, run
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.trace.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -40,4 +39,4 @@ def ran(folder, text, **options):
     if outcome.failure is not None:
         return Ran(str(outcome.failure), False, outcome)
     notes = frozenset(d.code for d in report.diagnostics)
-    return Ran("", outcome.met, outcome, Trace.open(outcome.trace), notes)
+    return Ran("", outcome.met, outcome, outcome.traced, notes)

@@ -123,7 +123,7 @@ class Bench:
         ran = integrate(target, prepared, self.options, report)
         if ran is None or ran.exit == 3:
             raise ModelError(report.diagnostics)
-        self.right = Trace.open(ran.outcome.trace)
+        self.right = ran.outcome.traced
 
     def tried(self, fault: Fault, text: str) -> Found:
         """A run with a changed text."""
@@ -139,7 +139,7 @@ class Bench:
             return Found(fault, np.inf, "no start")
         if ran.outcome.failure is not None:
             return Found(fault, np.inf, "the solver stops")
-        moved = self.moved(Trace.open(ran.outcome.trace))
+        moved = self.moved(ran.outcome.traced)
         return Found(fault, moved, "" if ran.outcome.met else ran.outcome.judgement.not_met[0].what)
 
     def _moved_unseen(self, changed: Prepared) -> float:
@@ -154,7 +154,7 @@ class Bench:
             running.check_module = kept
         if ran is None or ran.outcome.failure is not None:
             return np.inf
-        return self.moved(Trace.open(ran.outcome.trace))
+        return self.moved(ran.outcome.traced)
 
     def moved(self, trace: Trace) -> float:
         """Largest difference to the faultless run over the accuracy, of all traced quantities."""
