@@ -10,10 +10,13 @@ from __future__ import annotations
 import contextlib
 import json
 import secrets
+import signal
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -31,6 +34,22 @@ FLUSH_SECONDS = 0.8
 """Flushed at least every second of wall time: rows arrive about every 50 ms."""
 MANY = 1 << 20
 """Numbers that may wait in memory."""
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ctrl-C inside the block counts at its end; in other threads than the main one there is none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[tuple[int, FrameType | None]] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: held.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before if before is not None else signal.default_int_handler)
+        if held and callable(before):
+            before(*held[0])
 
 
 class Met:
@@ -120,7 +139,14 @@ class TraceWriter:
             self._turn(None)
 
     def _turn(self, last: Mapping[str, Mapping[str, Any]] | None, events: Sequence[Happened] = ()) -> None:
-        """The hidden store takes all rows (and last attributes, after which it is closed) and becomes visible."""
+        """The hidden store takes all rows (and last attributes, after which it is closed) and becomes visible.
+
+        An interruption waits until that is done: half of it would be written twice.
+        """
+        with uninterrupted():
+            self._turned(last, events)
+
+    def _turned(self, last: Mapping[str, Mapping[str, Any]] | None, events: Sequence[Happened]) -> None:
         new, self._waiting, self._numbers = self._waiting, [], 0
         try:
             with input_output(self.path):
