@@ -19,7 +19,7 @@ from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, op
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.dsl.text.diagnostics import ModelError, Report
 
 KEPT = 64
 """Texts that are kept compiled."""
@@ -115,11 +115,3 @@ class Loaded:
             ran = integrate(self.target, prepared, options, report, checked=bool(compiled.checked))
             compiled.checked.extend([True] if ran is not None else [])
             return ran
-
-    def findings(self, settings: Settings) -> tuple[Diagnostic, ...]:
-        """What is wrong with these settings; () where they can be run."""
-        try:
-            self.bound(settings)
-        except ModelError as error:
-            return tuple(error.diagnostics)
-        return ()

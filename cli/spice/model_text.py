@@ -126,14 +126,14 @@ class Writer:
         if len(at) != len(inner.ports):
             raise Unreadable(f"'{name}' has {len(inner.ports)} nodes, {len(at)} are given")
         units = _units(inner)
+        written, nodes, _ = self._names(inner)
         given = []
         for key, text in pairs(plain_words[first:]):
             if key not in inner.parameters:
                 raise Unreadable(f"'{name}' has no parameter '{key}'")
             if not units.get(key):
                 raise Unreadable(f"'{key}' of '{name}' is no value of an element by itself: give it a .param instead")
-            given.append(f"{self._names(inner)[0][key]} = {quantity(value(text, scope.known), units[key])}")
-        nodes = self._names(inner)[1]
+            given.append(f"{written[key]} = {quantity(value(text, scope.known), units[key])}")
         joined = ", ".join(f"{nodes[p]} = {scope.node(n)}" for p, n in zip(inner.ports, at, strict=True))
         return Element((f"{scope.name[card.head]}: {self.components[name]}({', '.join(given)}) {joined}",))
 

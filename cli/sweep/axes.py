@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.run.running import separate
 
 Numbers = NDArray[np.float64]
 Evaluate = Callable[[str, str], float | None]
@@ -56,16 +57,9 @@ class Axis:
         return DISTRIBUTIONS[self.quantile](u, self.first, self.second)
 
 
-def separate(text: str) -> list[str]:
-    """The parts between commas outside brackets."""
-    parts, depth = [""], 0
-    for character in text:
-        depth += (character in "([") - (character in ")]")
-        if character == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += character
-    return [part.strip() for part in parts]
+def _parts(text: str) -> list[str]:
+    """The parts between commas outside brackets, without the blanks around them."""
+    return [part.strip() for part in separate(text)]
 
 
 def axis(text: str, evaluate: Evaluate) -> Axis:
@@ -80,7 +74,7 @@ def axis(text: str, evaluate: Evaluate) -> Axis:
         return _distribution(name, said, evaluate)
     if ".." in said and not name.startswith("level "):
         return _grid(name, said, evaluate)
-    return listed(name, separate(said), evaluate)
+    return listed(name, _parts(said), evaluate)
 
 
 def listed(name: str, texts: Sequence[str], evaluate: Evaluate) -> Axis:
@@ -119,7 +113,7 @@ def _distribution(name: str, said: str, evaluate: Evaluate) -> Axis:
     found = _DRAWN.fullmatch(said)
     if found is None or found[1] not in DISTRIBUTIONS:
         raise UsageError(f"--over {name}~{said}: one of {', '.join(f'{d}(a, b)' for d in DISTRIBUTIONS)}")
-    texts = separate(found[2])
+    texts = _parts(found[2])
     if len(texts) != 2:
         raise UsageError(f"--over {name}: {found[1]} takes two values, not {len(texts)}")
     first = _number(name, texts[0], evaluate)
