@@ -39,7 +39,6 @@ class Swept:
     """What came of a sweep.  cases and kept [runs]; resumed: runs that stood in the journal."""
 
     output: Path
-    study: Study
     cases: tuple[Case, ...]
     kept: tuple[Kept, ...]
     units: dict[str, str]
@@ -115,7 +114,7 @@ def sweep(request: Request, study: Study, output: Path, jobs: int, progress: Pro
             results.write(output, cases, journal.done, units, attributes, timings=timings)
         kept_ = tuple(journal.done[k] for k in range(len(cases)))
         journal.remove()
-    return Swept(output, study, cases, kept_, units, resumed)
+    return Swept(output, cases, kept_, units, resumed)
 
 
 def _units(runner: Runner) -> dict[str, str]:
