@@ -18,7 +18,7 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
         return NULL;
     size_t n = (size_t)(extended > stepper->n ? extended : stepper->n) + 8, m = (size_t)observed + 8;
     size_t a = (size_t)audited + 8;
-    run->memory = calloc(4 * n + 2 * m + 5 * a, sizeof(double));
+    run->memory = calloc(4 * n + 3 * m + 5 * a, sizeof(double));
     if (!run->memory) {
         free(run);
         return NULL;
@@ -33,8 +33,9 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
     run->aux_d = run->aux + n;
     run->values = run->aux_d + n;
     run->largest = run->values + m;
+    run->slope = run->largest + m;
     run->audited = audited;
-    run->power = run->largest + m;
+    run->power = run->slope + m;
     run->after = run->power + a;
     run->sample = run->after + a;
     run->integral = run->sample + a;
@@ -137,7 +138,23 @@ static void note_beyond(sd_run *run)
             run->beyond = fabs(run->point[j]) / run->magnitude[j];
 }
 
-/* one output row at an instant of the last step, written as of `label` */
+/* The row just written once more for the comparison alone, with the slopes of the dense output.  The rates of a settled
+ * point are those of the equations: a motion that relaxes at once makes of any error a rate without bound. */
+static void emit_compared(sd_run *run, double *row)
+{
+    size_t width = (size_t)(SD_ROW_HEAD + 2 * run->observed);
+    int32_t others = (int32_t)row[1] & ~SD_COMPARED;
+    if (others) {
+        memcpy(row + width, row, width * sizeof *row);
+        row[1] = (double)others;
+        row += width;
+        row[1] = SD_COMPARED;
+        run->rows++;
+    }
+    memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
+}
+
+/* one output row at an instant of the last step, written as of `label`; two where it is compared too */
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
     double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
@@ -152,6 +169,11 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
             supplied = run->integral[3];
         }
         run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    }
+    int compared = !at_step && (int32_t)kind & SD_COMPARED && run->observe_rate;
+    if (compared) {
+        memset(run->slope, 0, (size_t)run->observed * sizeof(double));
+        run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d, run->slope);
     }
     if (run->settle)
         sd_settle_point(run->settle, t, run->point, run->point_d);
@@ -190,6 +212,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     }
     run->rows++;
     run->rows_written++;
+    if (compared)
+        emit_compared(run, row);
 }
 
 /* kind of the row at the end of a step, or at the start */
@@ -208,7 +232,7 @@ int sd_run_drain(sd_run *run)
         run->instant[run->next] < t)
         run->stepper->refine(run->stepper->self, run->settle);
     while (run->pending) {
-        if (run->rows >= run->room)
+        if (run->rows + 1 >= run->room)
             return 1;
         int asked = run->next < run->instants && run->instant[run->next] <= t;
         if (asked && run->instant[run->next] < t) {

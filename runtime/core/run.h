@@ -18,6 +18,7 @@
 #include "stepper.h"
 
 #define SD_ROW_HEAD 8
+#define SD_COMPARED 4 /* kind of a row that runs are compared by (integrate/request.py) */
 
 enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };
 
@@ -51,7 +52,8 @@ typedef struct sd_run {
     double t_from;
     double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
                                                         * sample; integrals over the step; of a row */
-    double *point, *point_d, *aux, *aux_d, *values, *largest, *memory;   /* largest [observed]: of observe_scale */
+    double *point, *point_d, *aux, *aux_d, *values, *largest, *slope, *memory; /* largest [observed]: of observe_scale;
+                                       * slope [observed]: rates of the dense output as it is */
     int64_t rows_written;
     double first_energy;
     /* events */

@@ -76,8 +76,8 @@ class Sampled:
     """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
     is zero to round-off; between [instants]: between an event of this run and the same one of the run before it; late
-    [instants, quantities]: what each value moves by within the time tolerance (TIMING): on a steep front no more is
-    asked; there: values and late at instants of its own, for the run behind it (None: those are the same).
+    [instants, quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep
+    front no more is asked; there: values at instants of its own, for the run behind it (None: those are the same).
     """
 
     tolerance: float
@@ -87,12 +87,12 @@ class Sampled:
     noise: Floats | float = 0.0
     between: NDArray[np.bool_] | None = None
     late: Floats | float = 0.0
-    there: tuple[Floats, Floats | float] | None = None
+    there: Floats | None = None
 
     @property
-    def own(self) -> tuple[Floats, Floats | float]:
-        """Values and late at its own instants."""
-        return (self.values, self.late) if self.there is None else self.there
+    def own(self) -> Floats:
+        """Values at its own instants [instants, quantities]."""
+        return self.values if self.there is None else self.there
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +114,8 @@ Run = Callable[[float, float], Sampled]
 
 def apart(coarse: Sampled, fine: Sampled) -> Floats:
     """How far two runs' values are from each other [instants, quantities], within the time tolerance."""
-    values, late = coarse.own
-    late = np.maximum(np.nan_to_num(late), np.nan_to_num(fine.late))
-    return np.asarray(np.fmax(np.abs(fine.values - values) - late, 0.0 * fine.values * values))
+    values = coarse.own
+    return np.asarray(np.fmax(np.abs(fine.values - values) - np.nan_to_num(fine.late), 0.0 * fine.values * values))
 
 
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
@@ -125,7 +124,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
     if not use.any() or not fine.values.size:
         return 0.0, 0.0
-    before = coarse.own[0]
+    before = coarse.own
     if before.shape != fine.values.shape:
         return np.inf, np.inf
     # zero by symmetry, in both runs: what is left of it is nobody's error

@@ -19,6 +19,7 @@ from sysdyn.runtime.integrate.ledgers import Ledgers
 from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.metric import kinematic_scale, light
 from sysdyn.runtime.integrate.pieces import Pieces
+from sysdyn.runtime.integrate.relaxation import displacement, order
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
@@ -28,7 +29,6 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, unresolved
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.runtime.start.settled import Settler
 from sysdyn.runtime.start.start import ConsistentState
@@ -66,7 +66,7 @@ class Integration:
         state = np.isin(system.kinds, ("q", "f"))
         # a tolerance below what round-off leaves open is one that no step meets
         self._least = np.where(state, UNRESOLVED * unresolved(system, self.y, jy), 0.0) / max(request.rtol, 1e-15)
-        self.magnitude = self._magnitudes()
+        self.magnitude = self._magnitudes(jy, jyd)
         if system.form.name == "2":
             jy, jyd = self._weighted(jy, jyd)
         self._light = light(system, jy, jyd)
@@ -85,11 +85,13 @@ class Integration:
         if (scale == self.system.kinematic_scale).all():
             return jy, jyd
         self.system.kinematic_scale[:] = scale
-        self.magnitude = self._magnitudes()
-        return self.system.jacobian(self.start.t, self.y, self.yd)
+        jy, jyd = self.system.jacobian(self.start.t, self.y, self.yd)
+        self.magnitude = self._magnitudes(jy, jyd)
+        return jy, jyd
 
-    def _magnitudes(self) -> Floats:
-        found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd)
+    def _magnitudes(self, jy: Floats, jyd: Floats) -> Floats:
+        far = displacement(self.system, jy, jyd, self.yd)
+        found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd, far)
         return np.maximum(found, self._least)
 
     def _linear(self, jy: Floats, jyd: Floats) -> None:
@@ -100,7 +102,7 @@ class Integration:
             return
         pattern = self.system.pattern
         span = max(self.request.t_end - self.start.t, 1e-300)
-        self._order = column_order(pattern, jy + 1e3 / span * jyd)
+        self._order = order(self.system, jy + 1e3 / span * jyd)
         self.linear = lib.core.sd_linear_new(
             pattern.unknowns, *(lib.pointer(item) for item in (pattern.column, pattern.row, self._order))
         )

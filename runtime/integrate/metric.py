@@ -10,29 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.inertia import own_inertia
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
-
-
-def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
-    """Diagonal of M = d2T*/df2 at the places of the flows [unknowns]; 0 where there is none.
-
-    jy, jyd [entries]: dF/dy, dF/dyd.  M stands in the rows of dynamics (Lagrange), minus M in those of momentum.
-    """
-    found = np.zeros(system.unknowns)
-    families = system.description.families
-    flows = {family.owner: k for k, family in enumerate(families) if family.kind == "f"}
-    columns = system.pattern.columns_of()
-    for values, name in ((jyd, "dynamics"), (jy, "momentum")):
-        place = np.full(system.rows, -1, dtype=np.int64)
-        for group, family, first in system.form.groups:
-            row = system.description.rows[family]
-            flow = flows.get(row.owner)
-            if group == name and flow is not None and families[flow].size == row.size:
-                place[first : first + row.size] = system.form.at[flow] + np.arange(row.size)
-        mine = place[system.pattern.row] == columns
-        np.maximum.at(found, columns[mine], np.abs(values[mine]))
-    return found
 
 
 def light(system: System, jy: Floats, jyd: Floats) -> NDArray[np.bool_]:

@@ -301,7 +301,7 @@ class Runs:
             self.common = common(self.thinned.time, self.options)
             there = self._sampled(self.thinned.rows(self.common), finished)
         self.compared_at = instants if instants is not None else self.common
-        values, late = there if there is not None and instants is None else self._sampled(rows, finished)
+        values = there if there is not None and instants is None else self._sampled(rows, finished)
         sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
         noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(self.meters)))
@@ -311,16 +311,17 @@ class Runs:
         assert self.compared_at is not None
         between = beside(self.compared_at, jumps if last is None else last, jumps, span)
         steps = finished.statistics.steps
+        late = self._late(rows) if instants is not None else 0.0
         found = Sampled(tolerance, values, np.array(sizes), steps, noise, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
 
-    def _sampled(self, rows: Floats, finished: Finished) -> tuple[Floats, Floats]:
-        """The compared quantities [k, quantities] at rows, and what they move by within the time tolerance."""
+    def _sampled(self, rows: Floats, finished: Finished) -> Floats:
+        """The compared quantities [k, quantities] at rows."""
         if finished.beyond > BEYOND:
             rows = np.full_like(rows, np.nan)
         places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
-        return rows[:, places], self._late(rows)
+        return rows[:, places]
 
     def _late(self, rows: Floats) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]."""
@@ -357,7 +358,7 @@ class Runs:
         """
         asked = {name: float(wanted) for name, wanted in zip(self.compared, target, strict=True)}
         name = min(asked, key=lambda n: asked[n], default="")
-        if len(self.samplings) < 2 or self.samplings[0].own[0].shape != self.samplings[1].values.shape:
+        if len(self.samplings) < 2 or self.samplings[0].own.shape != self.samplings[1].values.shape:
             return name, asked.get(name, 0.0), None
         one, two = self.samplings
         assert self.compared_at is not None
@@ -365,7 +366,7 @@ class Runs:
         with np.errstate(all="ignore"):
             ratio = accuracy.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
-        ratio = np.where(one.own[0] == two.values, 0.0, ratio)
+        ratio = np.where(one.own == two.values, 0.0, ratio)
         ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)

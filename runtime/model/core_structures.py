@@ -366,7 +366,7 @@ class Run(c.Structure):
         *[(name, _D) for name in ["stored", "dissipated", "supplied", "step_dissipated", "step_supplied"]],
         ("t_from", _D),
         *[(name, _P) for name in ["power", "after", "sample", "integral", "end"]],
-        *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "memory"]],
+        *[(name, _P) for name in ["point", "point_d", "aux", "aux_d", "values", "largest", "slope", "memory"]],
         ("rows_written", _L),
         ("first_energy", _D),
         ("watch", _P),

@@ -133,8 +133,8 @@ class Initial:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts: of the index forms made
-    so far (model/system.py), which need be found once.
+    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts, orders: of the index
+    forms made so far (model/system.py, integrate/relaxation.py), which need be found once.
     """
 
     families: tuple[Family, ...]
@@ -145,6 +145,7 @@ class Description:
     initial: tuple[Initial, ...]
     switches: Switches
     layouts: dict[Any, Any] = field(default_factory=dict, compare=False, init=False)
+    orders: dict[Any, Ints] = field(default_factory=dict, compare=False, init=False)
 
     def families_of(self, kind: str) -> tuple[int, ...]:
         """Numbers of the families of one kind."""

@@ -10,9 +10,12 @@ During a run magnitudes grow with max |y|; a second run starts with the maxima o
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.inertia import compliance
 from sysdyn.runtime.model.system import System
 
 ROUND_OFF = 1e-12
@@ -33,12 +36,12 @@ _SAMPLES = 16
 _SWEEPS = 8
 
 
-def _grouped(system: System, y: Floats, moves: Floats) -> Floats:
+def _grouped(system: System, y: Floats, moves: Floats, compliance: Floats) -> Floats:
     """What is not zero at the start counts as it is, be it ever so small: it may grow.  Zeros count as what they move
     in the time scale of the start, and as GROUP of their like at least.
     """
     known = np.maximum(np.abs(y), moves)
-    largest = group_maximum(system, known)
+    largest = compliance * group_maximum(system, known / compliance)
     return np.where(np.abs(y) > NOTHING * largest, known, np.maximum(known, GROUP * largest))
 
 
@@ -200,8 +203,13 @@ def _with_momentum(system: System) -> NDArray[np.bool_]:
     return np.asarray(member[system.family_of])
 
 
-def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
-    """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s]."""
+def magnitudes(
+    system: System, t0: float, t_end: float, y: Floats, yd: Floats, far: Callable[[float], Floats] | None = None
+) -> tuple[Floats, float]:
+    """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s].
+
+    far: how far each unknown gets within a time; None: as its rate says.
+    """
     span = max(t_end - t0, 0.0) or 1.0
     y, yd = (np.where(np.isfinite(item), item, 0.0) for item in (y, yd))
     state = np.isin(system.kinds, ("q", "f", "p", "s"))
@@ -210,12 +218,12 @@ def magnitudes(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
     jy, jyd = system.jacobian(t0, y, yd)
     # flows without inertia follow from the rest
     carries = state & ((system.kinds != "f") | system.differential(jyd) | _with_momentum(system))
-    moves = np.where(carries, tau * np.abs(yd), 0.0)
+    moves = np.where(carries, tau * np.abs(yd) if far is None else far(tau), 0.0)
     known = np.maximum(np.abs(y), moves)
     form = system.form
     flows = np.maximum(known, GROUP * group_maximum(system, known))[form.k_f]
     moves[form.k_q[np.abs(y[form.k_f]) < QUIET * flows]] = 0.0  # rates that are round-off
-    known = _grouped(system, y, moves)
+    known = _grouped(system, y, moves, compliance(system, jy, jyd))
     found = np.where(system.nominal > 0.0, system.nominal, known)
     found = _flows(system, found, span)
     size = np.abs(jy) + np.abs(jyd) / tau

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.metric import own_inertia
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.inertia import own_inertia
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
 
