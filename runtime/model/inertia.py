@@ -1,0 +1,61 @@
+"""Inertia and stiffness of each coordinate by itself: the diagonals of M = d2T*/df2 and K = d2V/dq2."""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+
+
+def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
+    """|entry| of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
+    found = np.zeros(system.unknowns)
+    families = system.description.families
+    own = {family.owner: k for k, family in enumerate(families) if family.kind == kind}
+    place = np.full(system.rows, -1, dtype=np.int64)
+    for name, family, first in system.form.groups:
+        row = system.description.rows[family]
+        unknown = own.get(row.owner)
+        if name == group and unknown is not None and families[unknown].size == row.size:
+            place[first : first + row.size] = system.form.at[unknown] + np.arange(row.size)
+    columns = system.pattern.columns_of()
+    mine = place[system.pattern.row] == columns
+    np.maximum.at(found, columns[mine], np.abs(values[mine]))
+    return found
+
+
+def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
+    """Diagonal of M at the places of the flows [unknowns]; 0 where there is none.
+
+    jy, jyd [entries]: dF/dy, dF/dyd.  M stands in the rows of dynamics (Lagrange), minus M in those of momentum.
+    """
+    return np.maximum(_own(system, jyd, "dynamics", "f"), _own(system, jy, "momentum", "f"))
+
+
+def compliance(system: System, jy: Floats, jyd: Floats) -> Floats:
+    """What each unknown is divided by to compare it with its like [unknowns].
+
+    Momenta of unlike inertias are as unlike as their flows are alike, displacements of unlike stiffnesses as their
+    efforts are: of momenta the inertia, of displacements one over the stiffness.  1 for all of a kind and unit of which
+    one has none, and for what else there is.
+    """
+    inertia, stiffness = own_inertia(system, jy, jyd), _own(system, jy, "dynamics", "q")
+    found, families = np.ones(system.unknowns), system.description.families
+    at = [slice(first, first + family.size) for family, first in zip(families, system.form.at, strict=False)]
+    flow = {family.owner: k for k, family in enumerate(families) if family.kind == "f"}
+    plain: set[tuple[str, str]] = set()
+    for k, family in enumerate(families[: len(at)]):
+        if family.kind == "q":
+            with np.errstate(divide="ignore"):
+                size = 1.0 / stiffness[at[k]]
+        elif family.kind == "p" and family.owner in flow:
+            size = inertia[at[flow[family.owner]]]
+        else:
+            continue
+        found[at[k]] = size
+        if not ((size > 0.0) & np.isfinite(size)).all():
+            plain.add((family.kind, family.unit))
+    for k, family in enumerate(families[: len(at)]):
+        if (family.kind, family.unit) in plain:
+            found[at[k]] = 1.0
+    return found
