@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.running import Request, options_of, ready
-from sysdyn.cli.run.running import _stops as stops_of
+from sysdyn.cli.run.running import Request, options_of, ready, stops
 from sysdyn.cli.run.sizes import sizes
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl.model import expression as ex
@@ -25,6 +24,8 @@ from sysdyn.runtime.trace.trace import Trace
 MODELS = Path(__file__).resolve().parents[2] / "models"
 LONGEST_RUN = 20.0
 """Seconds after which a run is given up."""
+TIMING = 1e-9
+"""Of the span: the time tolerance of comparisons (integrate/accuracy.py)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ class Bench:
             assert options is not None
             started = start(prepared, options.t_start, report, options.redundancy)
             assert started is not None, [d.message for d in report.diagnostics]
-            options = replace(options, stops=stops_of(prepared, options, report), watch=None, sampled_at=())
+            options = replace(options, stops=stops(prepared, options, report), watch=None, sampled_at=())
         self.prepared, self.started = prepared, started
         self.options = replace(options, sample_steps=False, max_wall=LONGEST_RUN, accuracy_on=())
 
@@ -100,21 +101,29 @@ class Bench:
 
 
 class Reference:
-    """A run at `rtol` with rows at all instants of the runs it is to judge."""
+    """A run at `rtol` with rows at all instants of the runs it is to judge, and the time tolerance beside them."""
 
     def __init__(self, bench: Bench, runs: list[Measured], rtol: float = 1e-15) -> None:
-        at = np.unique(np.concatenate([run.time for run in runs]))
+        self.late = TIMING * (bench.options.t_end - bench.options.t_start)
+        times = np.unique(np.concatenate([run.time for run in runs]))
+        at = np.unique(np.clip([times - self.late, times, times + self.late], times[0], times[-1]))
         found = bench.run(accuracy=None, rtol=rtol, method="radau", index="auto", at=tuple(at), max_wall=120.0)
         if found is None:
             raise NoSuchForm("no reference within its time")
         self.found = found
 
     def error(self, run: Measured) -> float:
-        """Largest relative error of any traced quantity at any row."""
-        place = np.searchsorted(self.found.time, run.time)
+        """Largest relative error of any traced quantity at any row: how far it is from all that the reference holds
+        within the time tolerance.
+        """
+        time = self.found.time
+        low = np.searchsorted(time, run.time - self.late)
+        high = np.minimum(np.searchsorted(time, run.time + self.late), time.size - 1)
         worst = 0.0
         for name, values in run.values.items():
             size = self.found.nominal[name]
             if size > 0.0:
-                worst = max(worst, float(np.abs(values - self.found.values[name][place]).max()) / size)
+                near = [self.found.values[name][np.minimum(low + k, high)] for k in range(1 + int((high - low).max()))]
+                beyond = np.maximum(values - np.max(near, axis=0), np.min(near, axis=0) - values)
+                worst = max(worst, float(beyond.max()) / size)
         return worst

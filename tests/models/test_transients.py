@@ -1,0 +1,43 @@
+"""A transient that is over before a picture shows it: seen by the error test in every formulation, at every accuracy."""
+
+import numpy as np
+import pytest
+from sysdyn.api import load
+
+FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian")
+COILS = """from std.electrical import voltage, resistor, inductor
+model coils {
+  param quick = 1 uH
+  node s, a, c: electrical
+  V: voltage(v = 1 V) s -> ground
+  r1: resistor(R = 1 ohm) s -> a
+  l1: inductor(L = 1 H) a -> ground
+  r2: resistor(R = 1 ohm) a -> c
+  l2: inductor(L = quick) c -> ground
+  init l1.f = 0 A
+  init l2.f = 0 A
+}
+scene run of coils { time 0 s to 5 s; trace l2.f as j }
+"""
+
+
+def current(t, quick):
+    """Of the quick coil (A): L1 i' = 1 V - R (i + j), L2 j' = L1 i' - R j."""
+    matrix = np.array([[-1.0, -1.0], [-1.0 / quick, -2.0 / quick]])
+    rest = np.linalg.solve(matrix, [-1.0, -1.0 / quick])
+    rates, modes = np.linalg.eig(matrix)
+    parts = np.linalg.solve(modes, -rest)
+    return np.real(rest + (np.exp(np.outer(t, rates)) * parts) @ modes.T)[:, 1]
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.parametrize("quick", [1e-4, 1e-6, 1e-9])
+def test_a_transient_is_as_exact_as_was_asked(tmp_path, formulation, method, quick):
+    path = tmp_path / "coils.sd"
+    path.write_text(COILS)
+    model = load(path, formulation=formulation, method=method)
+    for accuracy in (1e-2, 1e-3, 1e-5):
+        trace = model.run(accuracy=accuracy, set={"quick": f"{quick} H"})
+        exact = current(np.array(trace.time), quick)
+        assert np.abs(trace["j"] - exact).max() <= 1.5 * accuracy * np.abs(exact).max()
