@@ -23,12 +23,6 @@ FALSELY = {
     "pendulum, unit of mass",
 }
 
-
-KNOWN = {
-    # the first step of radau is 500 time constants of the branch long, its end 0.6 % off; at no instant are two runs
-    # compared there: reported
-    ("two coils, ratio of inductances", "L2 1e-6 lagrangian"),
-}
 SLOW = {"oscillator, 1e4 periods": 2}
 
 
@@ -40,8 +34,8 @@ def sliced(family):
 
 
 def judged(folder, family, cases):
-    """Verdicts on cases, without what is known."""
-    return [judge(folder, family, case) for case in cases if (family.name, case.name) not in KNOWN]
+    """Verdicts on cases."""
+    return [judge(folder, family, case) for case in cases]
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)

@@ -1,4 +1,4 @@
-"""A transient that is over before a picture shows it: seen by the error test in every formulation, at every accuracy."""
+"""A transient that is over before a picture shows it: the error test sees it, in every formulation and accuracy."""
 
 import numpy as np
 import pytest
