@@ -40,6 +40,7 @@ STRETCH = 1.5
 differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
 TIMING, SHARE = 1e-9, 1e-3
 """Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
+PARTED, MUCH = 10.0, 0.3
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 
@@ -136,6 +137,22 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
         relative = apart(coarse, fine)[there][:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative), relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
+
+
+def parted(coarse: Sampled, fine: Sampled) -> bool:
+    """Whether two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it
+    is: then they ran away, and that both end alike, beside what has become of them, says little.
+    """
+    before, values = coarse.own, fine.values
+    if before.shape != values.shape or len(values) < 2:
+        return False
+    with np.errstate(all="ignore"):
+        most = np.maximum.accumulate(np.abs(values), axis=0)[:-1]
+        now = np.maximum(np.abs(values), np.abs(before))[1:]
+        away = apart(coarse, fine)[1:] > np.maximum(PARTED * most, MUCH * now)
+    if fine.between is not None:
+        away[fine.between[1:]] = False
+    return bool((away & (np.abs(values[0]) > fine.noise)).any())
 
 
 def _shrink(power: float, step: float) -> float:
@@ -241,7 +258,7 @@ def control(
         apart = estimate.compare(last, now)
         if now.steps == last.steps and apart < ROUND_OFF:
             return _shifted(run, now, target, number)
-        if estimate.over <= 1.0 and not (doubted and number == 2):
+        if estimate.over <= 1.0 and not (doubted and number == 2) and not parted(last, now):
             return _achieved(estimate.apart, True, number, now.tolerance)
         last, longest = now, longest / STRETCH
         if now.tolerance <= 1.01 * law.finest:
