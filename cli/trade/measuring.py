@@ -71,7 +71,7 @@ class Bench:
     """The settings of one scene.  Traces go to `folder`.
 
     carried: by formulation and level; names: formulations that can express the scene; full: the level with the most
-    unknowns, which the reference has.
+    detail, which the reference has.
     """
 
     def __init__(self, request: Request, target: Target, report: Report, folder: Path, began: float) -> None:
@@ -94,7 +94,7 @@ class Bench:
         first = self._carry(own, self.report)
         if first is None:
             return False
-        unknowns = self._unknowns(first)
+        unknowns, detail = self._unknowns(first), self._detail(first)
         self.names, self.full = [first[0]], first[1]
         self.levels = _levels(self.carried[first].prepared.network, self.request.levels, first[1])
         for name in FORMULATIONS if asked in (None, "auto") else []:
@@ -107,9 +107,14 @@ class Bench:
                 self.names.append(name)
         for text, levels in self.levels.items():
             key = self._carry(Carrying(first[0], text, levels), Report()) if text != first[1] else None
-            if key is not None and self._unknowns(key) > unknowns:
-                self.full, unknowns = text, self._unknowns(key)
+            if key is not None and self._detail(key) > detail:
+                self.full, detail = text, self._detail(key)
         return True
+
+    def _detail(self, key: tuple[str, str]) -> tuple[int, int]:
+        """Elements and states of a level, then its unknowns."""
+        network = self.carried[key].prepared.network
+        return len(network.branches) + len(network.couplings) + len(network.states), self._unknowns(key)
 
     def _unknowns(self, key: tuple[str, str]) -> int:
         return self.carried[key].started.system.unknowns
