@@ -105,7 +105,8 @@ class StudyFile:
     options: dict[str, Any]
 
 
-_KEYS = {"file": str, "scene": str, "model": str, "sample": str, "runs": int, "seed": int, "output": str, "jobs": int}
+_TEXTS, _NUMBERS = ("file", "scene", "model", "sample", "output", "keep"), ("runs", "seed", "jobs")
+_KEYS: dict[str, type] = {**dict.fromkeys(_TEXTS, str), **dict.fromkeys(_NUMBERS, int)}
 
 
 def read(path: str) -> StudyFile:
