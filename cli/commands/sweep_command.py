@@ -34,6 +34,7 @@ KINDS = (".png", ".svg")
 @click.option("--sample", type=click.Choice(SAMPLES), help="How they are drawn. Default: random.")
 @click.option("--seed", type=int, default=None, help="Of what is drawn. Default: 0.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes side by side. Default: one a core.")
+@click.option("--dask", metavar="ADDRESS", help="On the workers of this Dask scheduler (tcp://host:8786).")
 @click.option("--keep", type=click.Choice(tuple(KEEPS)), help="Of each run. Default: traces (thinned), with extrema.")
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("-o", "output", metavar="RUNS.h5", help="Default: <stem>-<scene>-sweep.h5 here.")
@@ -48,6 +49,7 @@ def command(
     sample: str | None,
     seed: int | None,
     jobs: int | None,
+    dask: str | None,
     keep: str | None,
     output: str | None,
     plot: str | None,
@@ -72,7 +74,10 @@ def command(
         options["scene"] = options["scene"] or said.pop("scene", None)
         options["model"] = options["model"] or said.pop("model", None)
     request = Request(file, **options)
-    runner = Runner(request)
+    kept = keep or said.get("keep") or "traces"
+    if kept not in KEEPS:
+        raise UsageError(f"keep = '{kept}': one of {', '.join(KEEPS)}")
+    runner = Runner(request, kept)
     asked = study(
         axes_of(runner, over),
         sample or said.get("sample"),
@@ -85,8 +90,9 @@ def command(
     line = ProgressLine("never" if console.quiet else progress)
     number = jobs or said.get("jobs") or os.cpu_count() or 1
     try:
-        kept = keep or said.get("keep") or "traces"
-        swept = sweep(request, asked, target, number, line, timings=not no_timings, keep=kept)
+        swept = sweep(
+            request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner
+        )
     finally:
         line.clear()
     return _shown(console, swept, plot)

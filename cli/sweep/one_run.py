@@ -26,12 +26,14 @@ Task = tuple[int, Case]
 class Runner:
     """Runs cases of one request; what compiles differently is loaded once each.
 
-    keep: end, extrema or traces of each run; core: many at once where that can be.
+    keep: end, extrema or traces of each run; core: many at once where that can be; loaded: what is loaded already.
     """
 
-    def __init__(self, request: Request, keep: str = "traces", *, core: bool = True) -> None:
+    def __init__(
+        self, request: Request, keep: str = "traces", *, core: bool = True, loaded: Loaded | None = None
+    ) -> None:
         self.request, self.keep, self.core = request, keep, core
-        self._loaded: dict[tuple[tuple[str, str], ...], Loaded] = {}
+        self._loaded: dict[tuple[tuple[str, str], ...], Loaded] = {} if loaded is None else {(): loaded}
         self._in_core: dict[Any, InCore | str] = {}
 
     def loaded(self, choices: tuple[tuple[str, str], ...] = ()) -> Loaded:

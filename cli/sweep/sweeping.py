@@ -6,7 +6,7 @@ The file is written anew every REFRESH seconds and at the end, also of a run tha
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,8 @@ from sysdyn.cli.run.running import Request, model_digest, version
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import Journal
-from sysdyn.cli.sweep.kept import Done, Kept
-from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.kept import Done, Item, Kept
+from sysdyn.cli.sweep.one_run import Runner, Task
 from sysdyn.cli.sweep.study import Case, Study
 from sysdyn.cli.sweep.workers import results as worked
 from sysdyn.dsl import load
@@ -30,7 +30,7 @@ REFRESH = 10.0
 """Seconds between two versions of the file, at least ten times what writing one takes."""
 
 FORETOLD = 16
-"""Runs after which the time left is said: workers begin slowly."""
+"""Runs after the first result after which the time left is said."""
 
 Progress = Callable[[float, float | None], None]
 
@@ -100,12 +100,17 @@ def sweep(
     *,
     timings: bool,
     keep: str = "traces",
+    dask: str | None = None,
+    runner: Runner | None = None,
 ) -> Swept:
-    """Runs what the journal does not hold yet.  keep: end, extrema or traces of each run."""
-    runner = Runner(request, keep)
+    """Runs what the journal does not hold yet.
+
+    keep: end, extrema or traces of each run; dask: address of a scheduler whose workers run them; runner: of the
+    request where it is loaded already.
+    """
+    runner = runner or Runner(request, keep)
     cases = tuple(study.cases())
-    first = cases[0]
-    runner.loaded().bound({n: v for n, v in first.items() if n not in CHOICES and not n.startswith("level ")})
+    runner.loaded().bound({n: v for n, v in cases[0].items() if n not in CHOICES and not n.startswith("level ")})
     target = runner.loaded().target
     sha = model_digest(target)
     texts = lock.hashes(target.document.file.source, target.document.file.items)
@@ -125,14 +130,17 @@ def sweep(
         resumed = len(journal.done)
         tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
         left = len(cases) - resumed
-        began = written = time.monotonic()
+        written = time.monotonic()
+        first: tuple[float, int] | None = None
         cost = 0.0
         try:
-            for item in worked(request, tasks, left, min(jobs, max(left, 1)), keep):
+            for item in _items(request, tasks, left, min(jobs, max(left, 1)), keep, dask, runner):
                 journal.take(item)
                 now = time.monotonic()
                 number = len(journal.done) - resumed
-                ahead = (now - began) / number * (left - number) if number > FORETOLD else None
+                first = first or (now, number)  # workers begin slowly: what comes behind the first result tells
+                more = number - first[1]
+                ahead = (now - first[0]) / more * (left - number) if more > FORETOLD else None
                 progress(len(journal.done) / len(cases), ahead)
                 if now - written > max(REFRESH, 10.0 * cost):
                     results.write(output, cases, journal.done, units, attributes, timings=timings)
@@ -141,8 +149,19 @@ def sweep(
         finally:
             results.write(output, cases, journal.done, units, attributes, timings=timings)
         journal.remove()
-    alone = runner.said(first) if journal.done.singles else ""
+    alone = runner.said(cases[0]) if journal.done.singles else ""
     return Swept(output, cases, journal.done, units, resumed, alone)
+
+
+def _items(
+    request: Request, tasks: Iterator[Task], left: int, jobs: int, keep: str, dask: str | None, runner: Runner
+) -> Iterator[Item]:
+    """What is kept of the tasks, by whoever runs them."""
+    if dask is None:
+        return worked(request, tasks, left, jobs, keep, runner=runner)
+    from sysdyn.cli.sweep.on_dask import results as spread
+
+    return spread(request, tasks, left, dask, keep)
 
 
 def _units(runner: Runner) -> dict[str, str]:

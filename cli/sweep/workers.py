@@ -69,6 +69,7 @@ class Queue:
     jobs: int
     again: deque[Task] = field(default_factory=deque)
     size: int = FIRST
+    more: bool = True
 
     def next(self) -> Chunk | None:
         """A chunk; None where there is none."""
@@ -76,6 +77,7 @@ class Queue:
             return Chunk((self.again.popleft(),), alone=True)
         tasks = tuple(islice(self.tasks, max(1, min(self.size, self.left // (2 * self.jobs)))))
         self.left -= len(tasks)
+        self.more = bool(tasks)
         return Chunk(tasks) if tasks else None
 
     def took(self, chunk: Chunk, found: Answer, seconds: float) -> None:
@@ -95,12 +97,21 @@ class _Worker:
 
 
 def results(
-    request: Request, tasks: Iterable[Task], number: int, jobs: int, keep: str = "traces", serve: Serve = serve
+    request: Request,
+    tasks: Iterable[Task],
+    number: int,
+    jobs: int,
+    keep: str = "traces",
+    serve: Serve = serve,
+    runner: Runner | None = None,
 ) -> Iterator[Item]:
-    """What is kept of `number` tasks, as it is ready; jobs 1: in this process.  serve: what a worker does."""
+    """What is kept of `number` tasks, as it is ready; jobs 1: in this process (by `runner`, where it is given).
+
+    serve: what a worker does.
+    """
     queue = Queue(iter(tasks), number, jobs)
     if jobs == 1:
-        runner = Runner(request, keep)
+        runner = runner or Runner(request, keep)
         while (chunk := queue.next()) is not None:
             began = time.monotonic()
             found = answer(runner, chunk)

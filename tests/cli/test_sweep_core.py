@@ -1,4 +1,6 @@
-"""Runs in the core: equal to single runs within the accuracy, bit for bit the same in any order, honest where they miss."""
+"""Runs in the core: equal to single runs within the accuracy, bit for bit the same in any order, honest where they
+miss something.
+"""
 
 import json
 import time
