@@ -189,9 +189,15 @@ def _bipolar(card: Card, scope: Scope) -> Element:
         f"aR = {plain(behind)}, vT = {quantity(THERMAL * v.get('nf', 1.0), 'V')}"
     )
     c, b, e = (scope.node(w) for w in words[1:4])
-    line = f"{scope.name[card.head]}: {model.kind}({given}) c = {c}, b = {b}, e = {e}"
+    name = scope.name[card.head]
+    line = f"{name}: {model.kind}({given}) c = {c}, b = {b}, e = {e}"
     same = ("nr",) if v.get("nr") == v.get("nf", 1.0) else ()
     left = _beyond(model, ("is", "bf", "br", "nf"), ("level", "eg", "xti", "xtb", "tnom", *same))
+    if b in (c, e) and c != e:  # one junction is short: the other is a diode
+        current, other = (saturation / ahead, e) if b == c else (saturation / behind, c)
+        ends = f"{b} -> {other}" if model.kind == "npn" else f"{other} -> {b}"
+        law = f"Is = {quantity(current, 'A')}, vT = {quantity(THERMAL * v.get('nf', 1.0), 'V')}"
+        return Element((f"{name}: diode({law}) {ends}",), ("diode",), (), (), left)
     uses, local = (("npn",), ()) if model.kind == "npn" else ((), ("pnp",))
     return Element((line,), uses, local, (), left)
 

@@ -193,7 +193,8 @@ def test_dask_costs_less_than_5_ms_a_run(fall, cluster):
     number, crew, spent = 400, len(cluster.workers), []
     for _ in range(3):
         began = time.monotonic()
-        found = list(results(fall, [(k, {}) for k in range(number)], number, cluster.scheduler_address, "end", sleeping))
+        cases = [(k, {}) for k in range(number)]
+        found = list(results(fall, cases, number, cluster.scheduler_address, "end", sleeping))
         spent.append((time.monotonic() - began) * crew / number)
         assert sorted(item.run for item in found) == list(range(number))
     assert min(spent) - 0.01 < 5e-3
