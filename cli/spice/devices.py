@@ -271,7 +271,7 @@ def coupled(card: Card, scope: Scope, coils: Mapping[str, Card]) -> Element:
     words = _wanted(card, 4)
     if len(words) > 4 or any(w not in coils for w in words[1:3]):
         raise Unreadable(f"'{card.text[:60]}': two coils of this circuit and a factor are wanted")
-    one, two = coils[words[1]].words, coils[words[2]].words
+    one, two = (_wanted(coils[w], 4) for w in words[1:3])
     name = scope.name[card.head]
     first, second = (_number(scope, coil[3], "H") for coil in (one, two))
     given = f"L1 = {first}, L2 = {second}, k = {plain(value(words[3], scope.known))}"
