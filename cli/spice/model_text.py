@@ -190,7 +190,8 @@ class Writer:
         yield f"scene tran of {model} {{"
         yield f"  time 0 s to {quantity(end, 's')}"
         every = quantity(step if end / step <= MOST else end / STEPS, "s")
-        yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
+        if traced:
+            yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
         yield "}"
 
 
