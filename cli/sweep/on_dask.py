@@ -18,10 +18,11 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.run.crew import DEATHS
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.one_run import Runner, Task
-from sysdyn.cli.sweep.workers import DEATHS, Answer, Chunk, Queue, answer
+from sysdyn.cli.sweep.workers import Answer, Chunk, Queue, answer
 
 DEPTH = 2
 """Chunks that a worker has at a time: one at work, one that waits."""
@@ -145,8 +146,7 @@ class _Crew:
             return
         if item.future.status == "finished":
             found, seconds = item.future.result()
-            self.queue.took(item.chunk, found, seconds)
-            yield from found[0]
+            yield from self.queue.took(item.chunk, found, seconds)
         elif item.future.status == "cancelled":
             yield from self._died(item.chunk)
         else:

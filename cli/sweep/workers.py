@@ -8,29 +8,23 @@ was alone in DEATHS of these is named.
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from multiprocessing.connection import Connection
 
+from sysdyn.cli.run.crew import DEATHS, Crew, Serve
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.one_run import Runner, Task
 
-DEATHS = 3
-"""Workers that a run may kill."""
 FIRST, LARGEST = 8, 1024
 """Cases of a first chunk, and at most."""
 LASTS = 0.25
 """s: what a chunk should take."""
-_CONTEXT = multiprocessing.get_context("spawn")
-
-Serve = Callable[[Connection, Request, str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +62,7 @@ class Queue:
     left: int
     jobs: int
     again: deque[Task] = field(default_factory=deque)
+    deaths: dict[int, int] = field(default_factory=dict)
     size: int = FIRST
     more: bool = True
 
@@ -80,20 +75,25 @@ class Queue:
         self.more = bool(tasks)
         return Chunk(tasks) if tasks else None
 
-    def took(self, chunk: Chunk, found: Answer, seconds: float) -> None:
+    def took(self, job: Chunk, answer: Answer, seconds: float) -> Iterator[Item]:
         """How long a chunk took tells how large the next ones are."""
-        self.again.extend(found[1])
-        if found[0] and not chunk.alone:
-            wanted = int(len(chunk.tasks) * LASTS / max(seconds, 1e-6))
+        self.again.extend(answer[1])
+        if answer[0] and not job.alone:
+            wanted = int(len(job.tasks) * LASTS / max(seconds, 1e-6))
             self.size = max(1, min(wanted, 4 * self.size, LARGEST))
+        yield from answer[0]
 
-
-@dataclass(slots=True)
-class _Worker:
-    process: BaseProcess
-    pipe: Connection
-    chunk: Chunk
-    began: float = 0.0
+    def died(self, job: Chunk, how: str) -> Iterator[Kept]:
+        """The runs that a worker died of go to others one by one, or one is named."""
+        if not job.alone:
+            self.again.extend(job.tasks)
+            return
+        task = job.tasks[0]
+        self.deaths[task[0]] = self.deaths.get(task[0], 0) + 1
+        if self.deaths[task[0]] < DEATHS:
+            self.again.append(task)
+        else:
+            yield Kept(task[0], 4, False, f"its worker died {DEATHS} times ({how})")
 
 
 def results(
@@ -110,86 +110,11 @@ def results(
     serve: what a worker does.
     """
     queue = Queue(iter(tasks), number, jobs)
-    if jobs == 1:
-        runner = runner or Runner(request, keep)
-        while (chunk := queue.next()) is not None:
-            began = time.monotonic()
-            found = answer(runner, chunk)
-            queue.took(chunk, found, time.monotonic() - began)
-            yield from found[0]
+    if jobs > 1:
+        yield from Crew(queue, jobs, serve, (request, keep)).results()
         return
-    crew = _Crew(request, queue, keep, serve)
-    try:
-        yield from crew.results()
-    finally:
-        crew.end()
-
-
-class _Crew:
-    def __init__(self, request: Request, queue: Queue, keep: str, serve: Serve) -> None:
-        self.request, self.queue, self.keep, self.serve = request, queue, keep, serve
-        self.deaths: dict[int, int] = {}
-        self.workers: list[_Worker] = []
-        self._fill()
-
-    def _fill(self) -> None:
-        """As many workers as there are chunks for, at most `jobs`."""
-        while len(self.workers) < self.queue.jobs and (chunk := self.queue.next()) is not None:
-            mine, other = _CONTEXT.Pipe()
-            process = _CONTEXT.Process(target=self.serve, args=(other, self.request, self.keep), daemon=True)
-            process.start()
-            other.close()
-            worker = _Worker(process, mine, chunk)
-            self.workers.append(worker)
-            self._give(worker, chunk)
-
-    @staticmethod
-    def _give(worker: _Worker, chunk: Chunk) -> None:
-        worker.chunk, worker.began = chunk, time.monotonic()
-        with contextlib.suppress(BrokenPipeError):  # it died meanwhile: seen when it is waited for
-            worker.pipe.send(chunk)
-
-    def results(self) -> Iterator[Item]:
-        """Until every task is done."""
-        while self.workers:
-            ready = wait([w.pipe for w in self.workers])
-            for worker in [w for w in self.workers if w.pipe in ready]:
-                try:
-                    found: Answer = worker.pipe.recv()
-                except (EOFError, OSError):
-                    yield from self._died(worker)
-                    continue
-                self.queue.took(worker.chunk, found, time.monotonic() - worker.began)
-                chunk = self.queue.next()
-                if chunk is None:
-                    worker.pipe.close()
-                    self.workers.remove(worker)
-                else:
-                    self._give(worker, chunk)
-                yield from found[0]
-            self._fill()
-
-    def _died(self, worker: _Worker) -> Iterator[Kept]:
-        """The runs that a worker died of go to others one by one, or one is named."""
-        worker.process.join()
-        worker.pipe.close()
-        self.workers.remove(worker)
-        chunk, code = worker.chunk, worker.process.exitcode
-        if not chunk.alone:
-            self.queue.again.extend(chunk.tasks)
-            return
-        task = chunk.tasks[0]
-        self.deaths[task[0]] = self.deaths.get(task[0], 0) + 1
-        if self.deaths[task[0]] < DEATHS:
-            self.queue.again.append(task)
-        else:
-            how = f"signal {-code}" if code is not None and code < 0 else f"exit {code}"
-            yield Kept(task[0], 4, False, f"its worker died {DEATHS} times ({how})")
-
-    def end(self) -> None:
-        """No worker outlives the one who steers."""
-        for worker in self.workers:
-            worker.pipe.close()
-            worker.process.terminate()
-        for worker in self.workers:
-            worker.process.join(5.0)
+    runner = runner or Runner(request, keep)
+    while (chunk := queue.next()) is not None:
+        began = time.monotonic()
+        found = answer(runner, chunk)
+        yield from queue.took(chunk, found, time.monotonic() - began)

@@ -17,8 +17,9 @@ TEXTS = {path.stem: path.read_text() for path in sorted(NETLISTS.glob("*.cir"))}
 CASES = 20_000 if os.environ.get("SYSDYN_LONG") else 400
 JUNK = [
     "\0", "\x1b[2J", "{", "}", "'", '"', "(", ")", "=", ",", "+", "*", ";", "$ ", "//", "日", "\t", "\r", "\n", "\n+",
-    ".", "..", "1e999", "-1", "0", "nan", "inf", "1e-320", "9" * 400, "{1/0}", "{" + "(" * 200, "PULSE(", "SIN(", "PWL(0",
-    "EXP()", ".include /etc/passwd", "\n.include ../../secret.cir\n", "\n.lib '/etc/shadow' x\n", "\n.include .\n",
+    ".", "..", "1e999", "-1", "0", "nan", "inf", "1e-320", "9" * 400, "{1/0}", "{" + "(" * 200, "PULSE(", "SIN(",
+    "PWL(0", "EXP()", ".include /etc/passwd", "\n.include ../../secret.cir\n", "\n.lib '/etc/shadow' x\n",
+    "\n.include .\n",
     "\n.subckt s a\n", "\n.ends\n", "\n.model m d(is=\n", "\n.param a={a}\n", "\nX1 a b inv\n", "\nK1 L1 L1 1\n",
     "\nE1 a 0 a 0 1\n", "\nV1 0 0 1\n", "\n.tran 0 0\n", "\n.tran 1 -1\n", "\n.ic v(=1\n",
     "\n.subckt r a b\nX1 a b r\n.ends\nX9 1 2 r\n",
