@@ -151,7 +151,10 @@ def _call(pipe: Connection, function: Callable[[Any], Any]) -> None:
                 answer: Any = function(item)
             except Exception as error:
                 answer = error
-            pipe.send(answer)
+            try:
+                pipe.send(answer)
+            except (TypeError, AttributeError, ValueError) as error:  # it cannot be handed over
+                pipe.send(RuntimeError(f"{answer!r:.500}: {error}"))
 
 
 def each(function: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> Iterator[tuple[int, Any]]:

@@ -35,10 +35,11 @@ def trade(
     full: bool = False,
     budget: float | None = None,
     progress: Callable[[float, float | None], None] | None = None,
+    jobs: int = 1,
 ) -> Traded | None:
     """Measure; None where the report says why the scene cannot run.  Raises NoReference.
 
-    full: every combination at every tolerance; budget [s] of wall time for all.
+    full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes side by side.
     """
     check_tolerances(request)
     if request.rtol is not None or request.atol is not None:
