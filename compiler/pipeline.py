@@ -6,16 +6,18 @@ primal -> energies -> integration -> lagrangian | hamiltonian -> program -> C or
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from sysdyn.compiler.binding import binding as binding_
+from sysdyn.compiler.binding import columns as columns_
 from sysdyn.compiler.binding import manifest
 from sysdyn.compiler.binding.binding import Binding, Overrides
 from sysdyn.compiler.binding.checks import check_energies
+from sysdyn.compiler.binding.columns import Columns, Floats
 from sysdyn.compiler.binding.counts import check_counts
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.conjugates import with_book_signs
@@ -91,6 +93,10 @@ class CompiledModel:
         if found:
             raise ModelError(found)
         return binding
+
+    def columns(self, binding: Binding, varied: Mapping[str, Floats]) -> Columns | None:
+        """Bindings of many runs at once; None where each needs its own."""
+        return columns_.columns(self.network, self.energies, self.form, self.program, binding, varied)
 
     def manifest(self, binding: Binding, index: int | None = None) -> dict[str, Any]:
         """The object of manifest.json."""

@@ -6,6 +6,7 @@ They call what the commands call.  Findings of a model that cannot be used are r
 
 from __future__ import annotations
 
+import tempfile
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -25,6 +26,8 @@ from sysdyn.cli.run.loaded import Loaded
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.running import Ran, Request, run
 from sysdyn.cli.run.starting import start
+from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.opened import Sweep
 from sysdyn.dsl import load as load_
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
@@ -43,6 +46,7 @@ __all__ = [
     "Module",
     "NotMet",
     "SolverFailure",
+    "Sweep",
     "Trace",
     "UsageError",
     "check",
@@ -280,6 +284,43 @@ class Model:
         report = Report()
         ran = self._loaded.run(set or {}, report, **_changes(given))
         return _handed(ran, report, unmet)
+
+
+    def sweep(
+        self,
+        over: Mapping[str, Any],
+        *,
+        runs: int | None = None,
+        sample: str | None = None,
+        seed: int = 0,
+        until: float | str | None = None,
+        keep: str = "traces",
+        jobs: int = 1,
+        dask: str | None = None,
+        output: str | Path | None = None,
+    ) -> Sweep:
+        """Many runs: the study of `sysdyn sweep`.
+
+        over: names to lists of numbers (SI) or texts, or to what `--over` takes behind the name: "1 N/m..2 N/m:5",
+        "~normal(4 N/m, 0.1 N/m)"; runs, sample, seed: of what is drawn.  keep: end, extrema or traces of each run.
+        jobs: processes side by side (a script that asks for several has its calls under `if __name__ == "__main__"`);
+        dask: address of a scheduler.  output: the file, which the same call goes on with after a kill; None: memory.
+        A run that fails does not raise: `failed` of what is returned names it.
+        """
+        from sysdyn.cli.sweep.study import line, study
+        from sysdyn.cli.sweep.sweeping import axes_of, sweep
+
+        request = replace(self._loaded.request, output=None, **_changes({} if until is None else {"until": until}))
+        runner = Runner(request, keep, loaded=self._loaded if until is None else None)
+        asked = study(axes_of(runner, tuple(line(name, value) for name, value in over.items())), sample, runs, seed)
+        with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+            file = Path(output) if output is not None else Path(folder) / "sweep.h5"
+            sweep(request, asked, file, jobs, _silent, timings=True, keep=keep, dask=dask, runner=runner)
+            return Sweep.open(file)
+
+
+def _silent(fraction: float, ahead: float | None) -> None:
+    """Progress of a sweep that nobody watches."""
 
 
 _RUN = frozenset(("accuracy", "accuracy_check", "rtol", "atol", "method", "index", "max_steps", "max_wall", "output"))

@@ -143,11 +143,10 @@ def check(
         return _mutants(console, goldens)
     backends = backends or ("c",)
     if jobs > 1 and len(goldens) > 1:
-        from sysdyn.cli.golden.jobs import in_processes
+        from sysdyn.cli.golden.jobs import Asked, in_processes
 
-        pairs = (("--formulation", formulations), ("--method", methods), ("--backend", backends))
-        options = [text for option, values in pairs for value in values for text in (option, value)]
-        stream = in_processes(goldens, Path(folder), options, jobs)
+        asked = [Asked(g, formulations, methods, backends, bool(html_file) or pages) for g in goldens]
+        stream = in_processes(asked, jobs)
     else:
         from sysdyn.cli.golden.checking import check as checked
 

@@ -13,7 +13,9 @@ from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run.running import Request
-from sysdyn.cli.sweep.one_run import Kept, Runner
+from sysdyn.cli.sweep.in_core import KEEPS
+from sysdyn.cli.sweep.kept import Kept
+from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.study import SAMPLES, read, study
 from sysdyn.cli.sweep.sweeping import Swept, axes_of, summary, sweep, to_json
 
@@ -32,6 +34,8 @@ KINDS = (".png", ".svg")
 @click.option("--sample", type=click.Choice(SAMPLES), help="How they are drawn. Default: random.")
 @click.option("--seed", type=int, default=None, help="Of what is drawn. Default: 0.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes side by side. Default: one a core.")
+@click.option("--dask", metavar="ADDRESS", help="On the workers of this Dask scheduler (tcp://host:8786).")
+@click.option("--keep", type=click.Choice(tuple(KEEPS)), help="Of each run. Default: traces (thinned), with extrema.")
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("-o", "output", metavar="RUNS.h5", help="Default: <stem>-<scene>-sweep.h5 here.")
 @click.option("--plot", metavar="FILE.png|.svg", help="Bands over time, end values over what varied.")
@@ -45,6 +49,8 @@ def command(
     sample: str | None,
     seed: int | None,
     jobs: int | None,
+    dask: str | None,
+    keep: str | None,
     output: str | None,
     plot: str | None,
     no_timings: bool,
@@ -68,7 +74,10 @@ def command(
         options["scene"] = options["scene"] or said.pop("scene", None)
         options["model"] = options["model"] or said.pop("model", None)
     request = Request(file, **options)
-    runner = Runner(request)
+    kept = keep or said.get("keep") or "traces"
+    if kept not in KEEPS:
+        raise UsageError(f"keep = '{kept}': one of {', '.join(KEEPS)}")
+    runner = Runner(request, kept)
     asked = study(
         axes_of(runner, over),
         sample or said.get("sample"),
@@ -81,7 +90,9 @@ def command(
     line = ProgressLine("never" if console.quiet else progress)
     number = jobs or said.get("jobs") or os.cpu_count() or 1
     try:
-        swept = sweep(request, asked, target, number, line, timings=not no_timings)
+        swept = sweep(
+            request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner
+        )
     finally:
         line.clear()
     return _shown(console, swept, plot)
@@ -101,6 +112,8 @@ def _shown(console: Console, found: Swept, plot: str | None) -> int:
         Path(plot).write_bytes(picture(found, Path(plot).suffix[1:]))
     resumed = f", {found.resumed} of them from before" if found.resumed else ""
     console.say(f"{found.output}: {len(found.cases)} runs{resumed}")
+    if found.alone and len(found.cases) > SHOWN:
+        console.say(f"one by one: {found.alone}")
     for kept in found.failed[:SHOWN]:
         console.complain(f"run {kept.run} ({_said(found, kept.run)}): {kept.reason}", kept.exit)
     if len(found.failed) > SHOWN:
@@ -110,10 +123,9 @@ def _shown(console: Console, found: Swept, plot: str | None) -> int:
 
 def _exit(found: Swept) -> int:
     """The worst of the runs' exits: a fault, a run that failed or is not met, an expectation."""
-    exits = {kept.exit for kept in found.kept}
-    if FAULT in exits:
+    if FAULT in found.exits:
         return FAULT
-    return SOLVER if exits - {0, 1} or not all(kept.met for kept in found.kept) else max(exits)
+    return SOLVER if found.exits - {0, 1} or not found.met else max(found.exits)
 
 
 def _said(found: Swept, run: int) -> str:

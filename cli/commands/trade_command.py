@@ -32,6 +32,7 @@ KINDS = (".html", ".png", ".svg")
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("-o", "output", metavar="FILE.html|.png|.svg", help="The work-precision plot; a page that zooms.")
 @click.option("--full", is_flag=True, help="Every combination at every tolerance from 1e-1 to 1e-12.")
+@click.option("--jobs", "-j", type=click.IntRange(min=1), default=1, show_default=True, metavar="N")
 @click.option("--lock", "locks", is_flag=True, help="Write the choice into FILE.lock, which simulate honours.")
 @click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
 def command(
@@ -39,6 +40,7 @@ def command(
     progress: str,
     no_timings: bool,
     full: bool,
+    jobs: int,
     locks: bool,
     output: str | None,
     max_wall: str | None,
@@ -48,7 +50,8 @@ def command(
 
     Errors are those of the traced quantities against a reference that trade makes itself: the finest run, and one by
     another method, in another formulation where there is one. Cost is CPU time and counted work, which is what the
-    choice goes by. --formulation, --index, --method fix a choice; --max-wall limits the whole search.
+    choice goes by. --formulation, --index, --method fix a choice; --max-wall limits the whole search; --jobs makes
+    runs ahead side by side, with equal results but for CPU times.
     """
     target = _target(output)
     if locks and options["file"] == "-":
@@ -58,7 +61,7 @@ def command(
     try:
         with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
             budget = budget_of(max_wall)
-            found = trade(request, console.report, Path(folder), full=full, budget=budget, progress=line)
+            found = trade(request, console.report, Path(folder), full=full, budget=budget, progress=line, jobs=jobs)
     except NoReference as error:
         console.complain(f"there is no reference: {error}", SOLVER)
         return console.finish(SOLVER)

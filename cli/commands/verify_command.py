@@ -27,15 +27,19 @@ if TYPE_CHECKING:
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("--at", metavar="T1,T2,...", help="Instants that are compared too.")
 @click.option("-o", "output", metavar="DIR", help="Keep the traces there, as FORMULATION-METHOD.h5.")
+@click.option("--jobs", "-j", type=click.IntRange(min=1), default=1, show_default=True, metavar="N")
 @click.option("--full", is_flag=True, help="Do not take reduced sizes from the ci.toml above FILE's folder.")
 @click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
-def command(console: Console, progress: str, no_timings: bool, full: bool, output: str | None, **options: Any) -> int:
+def command(
+    console: Console, progress: str, no_timings: bool, full: bool, jobs: int, output: str | None, **options: Any
+) -> int:
     """Run a scene of FILE in every formulation that can express it, by bdf and by radau, and compare the traces.
 
     Two runs agree where every traced quantity differs by less than 10 x accuracy x its nominal magnitude, up to the
     horizon: the instant at which the reference differs by that much from its own run at a tenth of the accuracy.
     --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree, 3 where a
-    ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.
+    ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.  --jobs runs
+    formulations side by side, with equal results.
     """
     from sysdyn.cli.run.running import Request
     from sysdyn.cli.run.sizes import sizes
@@ -56,7 +60,7 @@ def command(console: Console, progress: str, no_timings: bool, full: bool, outpu
             folder = Path(output)
             folder.mkdir(parents=True, exist_ok=True)
         stack.callback(line.clear)
-        found = verify(request, console.report, folder, line)
+        found = verify(request, console.report, folder, line, jobs)
     if found is None:
         return console.finish(1)
     console.result = _result(found, keep=output is not None, timings=not no_timings)

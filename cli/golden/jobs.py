@@ -1,58 +1,45 @@
-"""Checks in processes of their own: one that is killed costs its own result and no other."""
+"""Checks side by side: one that kills its process costs its own result and no other."""
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 from sysdyn.cli.golden.book import Golden
-from sysdyn.cli.golden.checking import INPUT_OUTPUT, Case
+from sysdyn.cli.golden.checking import INPUT_OUTPUT, Case, check
+from sysdyn.cli.run.crew import Lost, each
 
 
-def in_processes(goldens: Sequence[Golden], root: Path, options: Sequence[str], jobs: int) -> Iterator[list[Case]]:
-    """The cases of each golden as they come in; options: of `golden check` for all of them."""
-    with ThreadPoolExecutor(jobs) as pool:
-        waiting = [pool.submit(_one, golden, root, options) for golden in goldens]
-        try:
-            for done in as_completed(waiting):
-                yield done.result()
-        except BaseException:
-            for future in waiting:
-                future.cancel()
-            raise
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A golden, and how it is checked."""
+
+    golden: Golden
+    formulations: tuple[str, ...]
+    methods: tuple[str, ...]
+    backends: tuple[str, ...]
+    with_page: bool
 
 
-def _one(golden: Golden, root: Path, options: Sequence[str]) -> list[Case]:
+def checked(asked: Asked) -> list[Case]:
+    """The cases of a golden."""
+    return list(check(asked.golden, asked.formulations, asked.methods, asked.backends, asked.with_page))
+
+
+def in_processes(
+    asked: Sequence[Asked], jobs: int, checked: Callable[[Asked], list[Case]] = checked
+) -> Iterator[list[Case]]:
+    """The cases of each golden as they come in; checked: what makes them, in another process."""
     began = time.monotonic()
-    with tempfile.TemporaryFile("w+b") as output:
-        command = [sys.executable, "-m", "sysdyn.cli", "golden", "check", golden.label, "--folder", str(root)]
-        ran = subprocess.run(
-            [*command, "--json", "--pages", *options], stdout=output, stderr=subprocess.PIPE, check=False
-        )
-        output.seek(0)
-        try:
-            cases = json.loads(output.read())["result"]["checks"]
-            return [_case(item) for item in cases]
-        except (ValueError, KeyError, TypeError):
-            pass
-    last = (ran.stderr.decode("utf-8", "replace").strip().splitlines() or ["it said nothing"])[-1]
-    how = f"was killed by signal {-ran.returncode}" if ran.returncode < 0 else f"ended with exit {ran.returncode}"
-    message = f"the check {how}: {last}"
-    seconds = time.monotonic() - began
-    wrong = (("run", message),)
-    code = ran.returncode if ran.returncode > 1 else INPUT_OUTPUT
-    return [Case(golden.label, "", "", "", code, message, float("inf"), None, None, seconds, wrong)]
-
-
-def _case(item: dict[str, Any]) -> Case:
-    known = {name: item[name] for name in Case.__slots__ if name in item}
-    known["cases"] = tuple((name, text) for name, text in known["cases"])
-    known["ratio"] = float("inf") if known["ratio"] is None else known["ratio"]
-    return Case(**known)
+    for k, found in each(checked, asked, jobs):
+        if not isinstance(found, Lost):
+            yield found
+            continue
+        kind, _, number = found.how.partition(" ")
+        how = f"was killed by signal {number}" if kind == "signal" else f"ended with exit {number}"
+        message, seconds = f"the check {how}", time.monotonic() - began
+        code = int(number) if kind == "exit" and int(number) > 1 else INPUT_OUTPUT
+        wrong = (("run", message),)
+        label = asked[k].golden.label
+        yield [Case(label, "", "", "", code, message, float("inf"), None, None, seconds, wrong)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -70,6 +71,8 @@ class Reader:
         head, words, netlist = card.head, card.words, self.netlist
         known = self._open[-1].parameters
         if not head.startswith("."):
+            if any(other.head == head for other in self._open[-1].elements):
+                raise Unreadable(f"'{head}' stands here twice")
             self._open[-1].elements.append(card)
         elif head in (".param", ".params"):
             for name, text in pairs(words[1:]):
@@ -88,6 +91,8 @@ class Reader:
             times = [value(w, self._known()) for w in words[1:] if w != "uic"]
             if len(times) < 2:
                 raise Unreadable(".tran STEP STOP [START] [UIC]")
+            if not (0.0 < times[0] < math.inf and 0.0 < times[1] < math.inf):
+                raise Unreadable(f".tran {times[0]:g} {times[1]:g}: a step and an end after 0 s are wanted")
             netlist.tran, netlist.uic = (times[0], times[1], times[2] if len(times) > 2 else 0.0), "uic" in words
         elif head in (".print", ".plot", ".save", ".probe"):
             netlist.shown += _shown(words[1:])

@@ -189,9 +189,15 @@ def _bipolar(card: Card, scope: Scope) -> Element:
         f"aR = {plain(behind)}, vT = {quantity(THERMAL * v.get('nf', 1.0), 'V')}"
     )
     c, b, e = (scope.node(w) for w in words[1:4])
-    line = f"{scope.name[card.head]}: {model.kind}({given}) c = {c}, b = {b}, e = {e}"
+    name = scope.name[card.head]
+    line = f"{name}: {model.kind}({given}) c = {c}, b = {b}, e = {e}"
     same = ("nr",) if v.get("nr") == v.get("nf", 1.0) else ()
     left = _beyond(model, ("is", "bf", "br", "nf"), ("level", "eg", "xti", "xtb", "tnom", *same))
+    if b in (c, e) and c != e:  # one junction is short: the other is a diode
+        current, other = (saturation / ahead, e) if b == c else (saturation / behind, c)
+        ends = f"{b} -> {other}" if model.kind == "npn" else f"{other} -> {b}"
+        law = f"Is = {quantity(current, 'A')}, vT = {quantity(THERMAL * v.get('nf', 1.0), 'V')}"
+        return Element((f"{name}: diode({law}) {ends}",), ("diode",), (), (), left)
     uses, local = (("npn",), ()) if model.kind == "npn" else ((), ("pnp",))
     return Element((line,), uses, local, (), left)
 
@@ -265,7 +271,7 @@ def coupled(card: Card, scope: Scope, coils: Mapping[str, Card]) -> Element:
     words = _wanted(card, 4)
     if len(words) > 4 or any(w not in coils for w in words[1:3]):
         raise Unreadable(f"'{card.text[:60]}': two coils of this circuit and a factor are wanted")
-    one, two = coils[words[1]].words, coils[words[2]].words
+    one, two = (_wanted(coils[w], 4) for w in words[1:3])
     name = scope.name[card.head]
     first, second = (_number(scope, coil[3], "H") for coil in (one, two))
     given = f"L1 = {first}, L2 = {second}, k = {plain(value(words[3], scope.known))}"

@@ -71,7 +71,7 @@ class Writer:
         labels |= {f"param {name}": text for name, text in written.items()}
         known = {**(self.netlist.top.parameters if circuit is not self.netlist.top else {}), **circuit.parameters}
         scope = Scope(
-            lambda n: "ground" if n in GROUND else nodes[n], labels, known, self.netlist.models, self.asked,
+            lambda n: _node(n, nodes), labels, known, self.netlist.models, self.asked,
             self.netlist.uic, {n: units[n] for n in circuit.parameters if units.get(n)},
         )  # fmt: skip
         said = {n: v for n, v in circuit.parameters.items() if units.get(n)}
@@ -190,8 +190,18 @@ class Writer:
         yield f"scene tran of {model} {{"
         yield f"  time 0 s to {quantity(end, 's')}"
         every = quantity(step if end / step <= MOST else end / STEPS, "s")
-        yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
+        if traced:
+            yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
         yield "}"
+
+
+def _node(name: str, nodes: dict[str, str]) -> str:
+    """A node of a netlist in the language's name."""
+    if name in GROUND:
+        return "ground"
+    if name not in nodes:
+        raise Unreadable(f"'{name}' stands where a node is wanted")
+    return nodes[name]
 
 
 def _read(text: str, nodes: dict[str, str], labels: dict[str, str]) -> str | None:

@@ -6,6 +6,7 @@ import ast
 import math
 import operator
 import re
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -91,6 +92,13 @@ def value(text: str, known: Mapping[str, float]) -> float:
 
     The expression is parsed and walked: numbers, names of parameters, + - * / ** ^ and a few functions, nothing else.
     """
+    found = _value(text, known)
+    if not math.isfinite(found):
+        raise Unreadable(f"'{text[:60]}' has no value")
+    return found
+
+
+def _value(text: str, known: Mapping[str, float]) -> float:
     plain = text.strip("{}'").strip()
     found = number(plain)
     if found is not None:
@@ -104,7 +112,9 @@ def value(text: str, known: Mapping[str, float]) -> float:
         return repr(scaled(match[1], match[2] or ""))
 
     try:
-        tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of literals that are none: they are findings here
+            tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
         return _walk(tree.body, {**CONSTANTS, **known})
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise Unreadable(f"'{text}' is no number and no expression of parameters") from None

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection
 
+from sysdyn.cli.spice.netlist import Unreadable
 from sysdyn.dsl.parser.lexing import RESERVED
 
 SHORT = 9
@@ -21,6 +23,8 @@ WORDS = RESERVED | frozenset(_WORDS.split())
 
 def quantity(number: float, unit: str) -> str:
     """`4.7 kohm`, to fifteen digits; a plain number where there is no unit."""
+    if not math.isfinite(number):
+        raise Unreadable(f"{number:g} {unit} is no value")
     if not unit:
         return plain(number)
     for power, prefix in PREFIXES.items():

@@ -1,4 +1,4 @@
-"""The journal of a sweep: one line of JSON a run, beside the result, written at once.
+"""The journal of a sweep: one line of JSON a run, or a block of them, beside the result, written at once.
 
 A kill loses the runs under way and no more: the same command reads the journal and goes on.
 """
@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.sweep.one_run import Kept
+from sysdyn.cli.sweep.kept import Block, Done, Item, Kept
 
 
 class Journal:
@@ -19,7 +19,7 @@ class Journal:
 
     def __init__(self, output: Path, digest: str) -> None:
         self.path = output.with_name(f".{output.name}.runs")
-        self.done: dict[int, Kept] = {}
+        self.done = Done()
         self._read(digest)
         self._file = self.path.open("a", encoding="utf-8")
         if not self.path.stat().st_size:
@@ -38,16 +38,17 @@ class Journal:
             )
         if whole != text:
             self.path.write_text(whole, encoding="utf-8")
-        self.done = {line["run"]: Kept(**line) for line in lines[1:]}
+        for line in lines[1:]:
+            self.done.take(Block.from_json(line["block"]) if "block" in line else Kept(**line))
 
     def _line(self, item: dict[str, object]) -> None:
         self._file.write(json.dumps(item) + "\n")
         self._file.flush()
 
-    def take(self, kept: Kept) -> None:
+    def take(self, item: Item) -> None:
         """Keeps a result."""
-        self.done[kept.run] = kept
-        self._line(kept.to_json())
+        self.done.take(item)
+        self._line({"block": item.to_json()} if isinstance(item, Block) else item.to_json())
 
     def remove(self) -> None:
         """All runs stand in the result."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,46 +11,30 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.loaded import Loaded
 from sysdyn.cli.run.running import Ran, Request
 from sysdyn.cli.sweep.axes import CHOICES
+from sysdyn.cli.sweep.in_core import InCore, thinned
+from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.study import Case
 from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.runtime.many.batch import NotApplicableError
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.trace.trace import Trace
 
-ROWS = 256
-"""Of a thinned trace at most."""
-
-
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """What is kept of a run.  exit: as `simulate` ends; reason: why it is not 0; end, least, most by traced name; time
-    and traces: thinned, where the scene has an interval.
-    """
-
-    run: int
-    exit: int
-    met: bool
-    reason: str = ""
-    method: str = ""
-    error_estimate: float | None = None
-    steps: int = 0
-    cpu_s: float = 0.0
-    end: dict[str, float] | None = None
-    least: dict[str, float] | None = None
-    most: dict[str, float] | None = None
-    time: list[float] | None = None
-    traces: dict[str, list[float]] | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """For the journal; numbers to the last bit."""
-        return asdict(self)
+Task = tuple[int, Case]
+"""Number of a run, and what it takes."""
 
 
 class Runner:
-    """Runs cases of one request; what compiles differently is loaded once each."""
+    """Runs cases of one request; what compiles differently is loaded once each.
 
-    def __init__(self, request: Request) -> None:
-        self.request = request
-        self._loaded: dict[tuple[tuple[str, str], ...], Loaded] = {}
+    keep: end, extrema or traces of each run; core: many at once where that can be; loaded: what is loaded already.
+    """
+
+    def __init__(
+        self, request: Request, keep: str = "traces", *, core: bool = True, loaded: Loaded | None = None
+    ) -> None:
+        self.request, self.keep, self.core = request, keep, core
+        self._loaded: dict[tuple[tuple[str, str], ...], Loaded] = {} if loaded is None else {(): loaded}
+        self._in_core: dict[Any, InCore | str] = {}
 
     def loaded(self, choices: tuple[tuple[str, str], ...] = ()) -> Loaded:
         """The model under choices that are no numbers."""
@@ -59,9 +44,7 @@ class Runner:
 
     def __call__(self, number: int, case: Case) -> Kept:
         """A run that cannot be made is kept with its reason."""
-        choices = tuple((n, str(v)) for n, v in case.items() if n in CHOICES or n.startswith("level "))
-        names = {name for name, _ in choices}
-        settings = {name: value for name, value in case.items() if name not in names}
+        choices, settings = _parted(case)
         report = Report()
         try:
             ran = self.loaded(choices).run(settings, report)
@@ -73,7 +56,49 @@ class Runner:
             return Kept(number, 3, False, str(error))
         if ran is None:
             return Kept(number, 1, False, _first(report.diagnostics))
-        return _kept(number, ran, report)
+        return _kept(number, ran, report, self.keep)
+
+    def chunk(self, tasks: Sequence[Task]) -> tuple[list[Item], list[Task]]:
+        """What is kept of the tasks that the core could run, and those that need a run of their own."""
+        groups: dict[Any, list[Task]] = {}
+        for number, case in tasks:
+            choices, settings = _parted(case)
+            groups.setdefault((choices, tuple(settings)), []).append((number, case))
+        found, left = list[Item](), list[Task]()
+        for (choices, names), group in groups.items():
+            way = self.way(choices, names)
+            if isinstance(way, str):
+                left += group
+                continue
+            block, places = way.run([number for number, _ in group], [case for _, case in group])
+            found += [block] if block is not None else []
+            left += [group[k] for k in places]
+        return found, left
+
+    def way(self, choices: tuple[tuple[str, str], ...], names: tuple[str, ...]) -> InCore | str:
+        """The core's way for cases with these names, or why there is none."""
+        key = choices, names
+        if key not in self._in_core:
+            try:
+                self._in_core[key] = InCore(self.loaded(choices), names, self.keep) if self.core else "not asked for"
+            except NotApplicableError as error:
+                self._in_core[key] = str(error)
+            except (ModelError, UsageError, SolverFailure):
+                self._in_core[key] = "the text's own numbers do not run"
+        return self._in_core[key]
+
+    def said(self, case: Case) -> str:
+        """Why cases like this one are run one by one; "" where they are not."""
+        choices, settings = _parted(case)
+        way = self.way(choices, tuple(settings))
+        return way if isinstance(way, str) else ""
+
+
+def _parted(case: Case) -> tuple[tuple[tuple[str, str], ...], dict[str, Any]]:
+    """Choices of a case that are no numbers; its other settings."""
+    choices = tuple((n, str(v)) for n, v in case.items() if n in CHOICES or n.startswith("level "))
+    names = {name for name, _ in choices}
+    return choices, {name: value for name, value in case.items() if name not in names}
 
 
 def _chosen(request: Request, choices: tuple[tuple[str, str], ...]) -> Request:
@@ -99,12 +124,13 @@ def _first(diagnostics: Any) -> str:
     return f"{errors[0].code}: {errors[0].message}" if errors else "it could not be run"
 
 
-def _kept(number: int, ran: Ran, report: Report) -> Kept:
+def _kept(number: int, ran: Ran, report: Report, keep: str) -> Kept:
     o = ran.outcome
     trace = o.traced
     values = {name: np.asarray(trace[name]) for name in trace.names}
     some = trace.time.size > 0
-    time, traces = _thinned(ran, trace, values) if some else (None, None)
+    time, traces = _thinned(ran, trace, values) if some and keep == "traces" else (None, None)
+    extrema = some and keep != "end"
     return Kept(
         number,
         ran.exit,
@@ -115,8 +141,8 @@ def _kept(number: int, ran: Ran, report: Report) -> Kept:
         int(o.statistics["steps"]),
         float(o.timings["cpu_integrate_s"]),
         {n: float(v[-1]) for n, v in values.items()} if some else None,
-        {n: float(v.min()) for n, v in values.items()} if some else None,
-        {n: float(v.max()) for n, v in values.items()} if some else None,
+        {n: float(v.min()) for n, v in values.items()} if extrema else None,
+        {n: float(v.max()) for n, v in values.items()} if extrema else None,
         time,
         traces,
     )
@@ -130,8 +156,5 @@ def _thinned(
     if scene is None or scene.every is None or scene.start is None:
         return None, None
     evaluate = ran.prepared.binding.evaluate
-    begin, step, end = evaluate(scene.start), evaluate(scene.every), float(trace.time[-1])
-    number = round((end - begin) / step)
-    grid = begin + step * np.arange(0, number + 1, -(-(number + 1) // ROWS))
-    place = np.clip(np.searchsorted(trace.time, grid + 1e-9 * step, side="right") - 1, 0, None)
+    grid, place = thinned(evaluate(scene.start), evaluate(scene.every), trace.time)
     return grid.tolist(), {name: v[place].tolist() for name, v in values.items()}

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.sweep.one_run import Kept
+from sysdyn.cli.sweep.kept import Done
 from sysdyn.cli.sweep.study import Case
 
 
 def write(
     path: Path,
     cases: Sequence[Case],
-    done: Mapping[int, Kept],
+    done: Done,
     units: Mapping[str, str],
     attributes: Mapping[str, Any],
     *,
@@ -54,60 +54,66 @@ def _fixed(column: Any) -> Any:
 
 
 def _columns(
-    cases: Sequence[Case], done: Mapping[int, Kept], units: Mapping[str, str], *, timings: bool
+    cases: Sequence[Case], done: Done, units: Mapping[str, str], *, timings: bool
 ) -> list[tuple[str, Any, str | None]]:
     """(name, values [run], unit) of every data set of one dimension."""
     found: list[tuple[str, Any, str | None]] = []
     for name in cases[0]:
         values = [case[name] for case in cases]
-        number = all(isinstance(v, float) for v in values)
-        column = np.array(values, dtype=float if number else object)
+        plain = all(isinstance(v, float) for v in values)
+        column = np.array(values, dtype=float if plain else object)
         found.append((f"set.{name}".replace("/", "\u2215"), column, units.get(name)))
-    rows = [done.get(k) for k in range(len(cases))]
+    number = len(cases)
     for group, label in (("end", "end"), ("least", "min"), ("most", "max")):
-        for name in _traced(done):
-            column = np.array([_number(r, group, name) for r in rows])
-            found.append((f"{label}.{name}", column, units.get(name)))
-    estimates = [np.nan if r is None or r.error_estimate is None else r.error_estimate for r in rows]
-    plain: list[tuple[str, Any]] = [
-        ("exit", np.array([-1 if r is None else r.exit for r in rows])),
-        ("met", np.array([0 if r is None else int(r.met) for r in rows])),
-        ("reason", np.array(["not run yet" if r is None else r.reason for r in rows], dtype=object)),
-        ("method", np.array(["" if r is None else r.method for r in rows], dtype=object)),
-        ("steps", np.array([0 if r is None else r.steps for r in rows])),
-        ("error_estimate", np.array(estimates)),
-    ]
-    if timings:
-        plain.append(("cpu_s", np.array([np.nan if r is None else r.cpu_s for r in rows])))
-    return [*found, *((name, column, None) for name, column in plain)]
+        found += [(f"{label}.{name}", column, units.get(name)) for name, column in done.columns(group, number)]
+    beside = _plain(done, number).items()
+    return [*found, *((name, column, None) for name, column in beside if timings or name != "cpu_s")]
 
 
-def _traced(done: Mapping[int, Kept]) -> list[str]:
-    return list(next((r.end for _, r in sorted(done.items()) if r.end), {}) or {})
+def _plain(done: Done, number: int) -> dict[str, Any]:
+    """What every run has, by name: values [number]."""
+    table: dict[str, Any] = {
+        "exit": np.full(number, -1),
+        "met": np.zeros(number, dtype=int),
+        "reason": np.full(number, "not run yet", dtype=object),
+        "method": np.full(number, "", dtype=object),
+        "steps": np.zeros(number, dtype=int),
+        "error_estimate": np.full(number, np.nan),
+        "cpu_s": np.full(number, np.nan),
+    }
+    for k, r in done.singles.items():
+        estimate = np.nan if r.error_estimate is None else r.error_estimate
+        values = r.exit, int(r.met), r.reason, r.method, r.steps, estimate, r.cpu_s
+        for name, value in zip(table, values, strict=True):
+            table[name][k] = value
+    for b in done.blocks:
+        columns = 0, 1, "", b.method, b.steps, b.estimate, b.cpu_s
+        for name, column in zip(table, columns, strict=True):
+            table[name][b.runs] = column
+    return table
 
 
-def _number(kept: Kept | None, group: str, name: str) -> float:
-    values = None if kept is None else getattr(kept, group)
-    return float("nan") if values is None else float(values.get(name, float("nan")))
-
-
-def _traces(file: Any, run: Any, number: int, done: Mapping[int, Kept], units: Mapping[str, str]) -> None:
+def _traces(file: Any, run: Any, number: int, done: Done, units: Mapping[str, str]) -> None:
     """trace.NAME [run, time] on the instants of the longest run; a run that ended earlier is NaN behind its end."""
-    some = [r for r in done.values() if r.time and r.traces]
-    if not some:
+    some = [r for r in done.singles.values() if r.time and r.traces]
+    blocks = [b for b in done.blocks if b.time.size]
+    times = [np.array(r.time) for r in some] + [b.time for b in blocks]
+    if not times:
         return
-    longest = max(some, key=lambda r: len(r.time or ()))
-    assert longest.time is not None
-    time = file.create_dataset("time", data=np.array(longest.time), track_times=False)
+    longest = max(times, key=len)
+    time = file.create_dataset("time", data=longest, track_times=False)
     time.make_scale("time")
     time.attrs["units"] = "s"
-    for name in _traced(done):
-        table = np.full((number, len(longest.time)), np.nan)
+    for name in done.names():
+        table = np.full((number, len(longest)), np.nan)
         for r in some:
             assert r.time is not None
             assert r.traces is not None
-            if r.time == longest.time[: len(r.time)]:
+            if np.array_equal(r.time, longest[: len(r.time)]):
                 table[r.run, : len(r.time)] = r.traces[name]
+        for b in blocks:
+            if np.array_equal(b.time, longest[: b.time.size]):
+                table[b.runs, : b.time.size] = b.traces[:, b.names.index(name)]
         data = file.create_dataset(f"trace.{name}", data=table, track_times=False)
         data.dims[0].attach_scale(run)
         data.dims[1].attach_scale(time)

@@ -105,7 +105,8 @@ class StudyFile:
     options: dict[str, Any]
 
 
-_KEYS = {"file": str, "scene": str, "model": str, "sample": str, "runs": int, "seed": int, "output": str, "jobs": int}
+_TEXTS, _NUMBERS = ("file", "scene", "model", "sample", "output", "keep"), ("runs", "seed", "jobs")
+_KEYS: dict[str, type] = {**dict.fromkeys(_TEXTS, str), **dict.fromkeys(_NUMBERS, int)}
 
 
 def read(path: str) -> StudyFile:
@@ -128,10 +129,19 @@ def read(path: str) -> StudyFile:
     return StudyFile(str(Path(path).parent / said["file"]), lines, {k: v for k, v in said.items() if k != "file"})
 
 
-def _line(path: str, name: str, value: Any) -> str:
-    """A line of [over] as --over takes it."""
+def line(name: str, value: Any) -> str:
+    """What a name takes (numbers, texts, or one text), as --over says it; UsageError where it is neither."""
     if isinstance(value, str):
         return f"{name} {value}" if value.lstrip().startswith("~") else f"{name} = {value}"
-    if isinstance(value, list) and value and all(isinstance(v, int | float | str) for v in value):
-        return f"{name} = {', '.join(map(str, value))}"
-    raise UsageError(f'{path}: {name} = {value!r}: a list, or a text as --over takes it: "1 N/m .. 2 N/m : 5"')
+    some = np.atleast_1d(np.asarray(value, dtype=object)).tolist() if value is not None else []
+    if some and all(isinstance(v, int | float | str | np.number) and not isinstance(v, bool) for v in some):
+        return f"{name} = {', '.join(v if isinstance(v, str) else repr(float(v)) for v in some)}"
+    raise UsageError(f'{name} = {value!r}: a list, or a text as --over takes it: "1 N/m .. 2 N/m : 5"')
+
+
+def _line(path: str, name: str, value: Any) -> str:
+    """A line of [over] as --over takes it."""
+    try:
+        return line(name, value)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from None

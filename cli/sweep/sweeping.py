@@ -5,19 +5,20 @@ The file is written anew every REFRESH seconds and at the end, also of a run tha
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from sysdyn.cli.run import lock
 from sysdyn.cli.run.running import Request, model_digest, version
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import Journal
-from sysdyn.cli.sweep.one_run import Kept, Runner
+from sysdyn.cli.sweep.kept import Done, Item, Kept
+from sysdyn.cli.sweep.one_run import Runner, Task
 from sysdyn.cli.sweep.study import Case, Study
 from sysdyn.cli.sweep.workers import results as worked
 from sysdyn.dsl import load
@@ -29,25 +30,43 @@ REFRESH = 10.0
 """Seconds between two versions of the file, at least ten times what writing one takes."""
 
 FORETOLD = 16
-"""Runs after which the time left is said: workers begin slowly."""
+"""Runs after the first result after which the time left is said."""
 
 Progress = Callable[[float, float | None], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """What came of a sweep.  cases and kept [runs]; resumed: runs that stood in the journal."""
+    """What came of a sweep.  cases [runs]; resumed: runs that stood in the journal; alone: why runs were made one by
+    one, outside the core ("": they were not).
+    """
 
     output: Path
     cases: tuple[Case, ...]
-    kept: tuple[Kept, ...]
+    done: Done
     units: dict[str, str]
     resumed: int
+    alone: str = ""
+
+    @property
+    def kept(self) -> tuple[Kept, ...]:
+        """Of each run, one by one."""
+        return tuple(self.done[k] for k in range(len(self.cases)))
+
+    @property
+    def exits(self) -> set[int]:
+        """Of the runs; those of a block are met."""
+        return {k.exit for k in self.done.singles.values()} | ({0} if self.done.blocks else set())
+
+    @property
+    def met(self) -> bool:
+        """Every run was."""
+        return all(k.met for k in self.done.singles.values())
 
     @property
     def failed(self) -> tuple[Kept, ...]:
         """Runs that did not end as asked, were not met, or whose expectations failed."""
-        return tuple(k for k in self.kept if k.exit)
+        return tuple(k for _, k in sorted(self.done.singles.items()) if k.exit)
 
 
 def axes_of(runner: Runner, texts: tuple[str, ...]) -> list[Axis]:
@@ -72,16 +91,30 @@ def _evaluate(runner: Runner) -> Evaluate:
     return value
 
 
-def sweep(request: Request, study: Study, output: Path, jobs: int, progress: Progress, *, timings: bool) -> Swept:
-    """Runs what the journal does not hold yet."""
-    runner = Runner(request)
+def sweep(
+    request: Request,
+    study: Study,
+    output: Path,
+    jobs: int,
+    progress: Progress,
+    *,
+    timings: bool,
+    keep: str = "traces",
+    dask: str | None = None,
+    runner: Runner | None = None,
+) -> Swept:
+    """Runs what the journal does not hold yet.
+
+    keep: end, extrema or traces of each run; dask: address of a scheduler whose workers run them; runner: of the
+    request where it is loaded already.
+    """
+    runner = runner or Runner(request, keep)
     cases = tuple(study.cases())
-    first = cases[0]
-    runner.loaded().bound({n: v for n, v in first.items() if n not in CHOICES and not n.startswith("level ")})
+    runner.loaded().bound({n: v for n, v in cases[0].items() if n not in CHOICES and not n.startswith("level ")})
     target = runner.loaded().target
     sha = model_digest(target)
     texts = lock.hashes(target.document.file.source, target.document.file.items)
-    digest = study.digest(request=replace(request, output=None), texts=texts, version=version())
+    digest = study.digest(request=replace(request, output=None), texts=texts, version=version(), keep=keep)
     units = _units(runner)
     attributes = {
         "Conventions": "CF-1.11",
@@ -97,14 +130,17 @@ def sweep(request: Request, study: Study, output: Path, jobs: int, progress: Pro
         resumed = len(journal.done)
         tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
         left = len(cases) - resumed
-        began = written = time.monotonic()
+        written = time.monotonic()
+        first: tuple[float, int] | None = None
         cost = 0.0
         try:
-            for kept in worked(request, tasks, min(jobs, max(left, 1))):
-                journal.take(kept)
+            for item in _items(request, tasks, left, min(jobs, max(left, 1)), keep, dask, runner):
+                journal.take(item)
                 now = time.monotonic()
                 number = len(journal.done) - resumed
-                ahead = (now - began) / number * (left - number) if number > FORETOLD else None
+                first = first or (now, number)  # workers begin slowly: what comes behind the first result tells
+                more = number - first[1]
+                ahead = (now - first[0]) / more * (left - number) if more > FORETOLD else None
                 progress(len(journal.done) / len(cases), ahead)
                 if now - written > max(REFRESH, 10.0 * cost):
                     results.write(output, cases, journal.done, units, attributes, timings=timings)
@@ -112,9 +148,20 @@ def sweep(request: Request, study: Study, output: Path, jobs: int, progress: Pro
                     cost = written - now
         finally:
             results.write(output, cases, journal.done, units, attributes, timings=timings)
-        kept_ = tuple(journal.done[k] for k in range(len(cases)))
         journal.remove()
-    return Swept(output, cases, kept_, units, resumed)
+    alone = runner.said(cases[0]) if journal.done.singles else ""
+    return Swept(output, cases, journal.done, units, resumed, alone)
+
+
+def _items(
+    request: Request, tasks: Iterator[Task], left: int, jobs: int, keep: str, dask: str | None, runner: Runner
+) -> Iterator[Item]:
+    """What is kept of the tasks, by whoever runs them."""
+    if dask is None:
+        return worked(request, tasks, left, jobs, keep, runner=runner)
+    from sysdyn.cli.sweep.on_dask import results as spread
+
+    return spread(request, tasks, left, dask, keep)
 
 
 def _units(runner: Runner) -> dict[str, str]:
@@ -127,14 +174,15 @@ def _units(runner: Runner) -> dict[str, str]:
 
 def summary(found: Swept) -> dict[str, dict[str, float]]:
     """Least, median and largest end value of each traced quantity, over the runs that are met."""
-    good = [k.end for k in found.kept if k.exit in (0, 1) and k.met and k.end]
-    names = list(good[0]) if good else []
+    good = np.ones(len(found.cases), dtype=bool)
+    for k, kept in found.done.singles.items():
+        good[k] = kept.exit in (0, 1) and kept.met and bool(kept.end)
     table: dict[str, dict[str, float]] = {}
-    for name in names:
-        values = sorted(end[name] for end in good if not math.isnan(end[name]))
-        if values:
-            middle = 0.5 * (values[(len(values) - 1) // 2] + values[len(values) // 2])
-            table[name] = {"least": values[0], "median": middle, "largest": values[-1]}
+    for name, column in found.done.columns("end", len(found.cases)):
+        values = np.sort(column[good & ~np.isnan(column)])
+        if values.size:
+            middle = 0.5 * (values[(values.size - 1) // 2] + values[values.size // 2])
+            table[name] = {"least": float(values[0]), "median": float(middle), "largest": float(values[-1])}
     return table
 
 
@@ -145,6 +193,8 @@ def to_json(found: Swept) -> dict[str, Any]:
         "runs": len(found.cases),
         "resumed": found.resumed,
         "over": list(found.cases[0]),
+        "in_core": len(found.cases) - len(found.done.singles),
+        "alone": found.alone,
         "failed": [
             {"run": k.run, "exit": k.exit, "reason": k.reason, "settings": found.cases[k.run]} for k in found.failed
         ],

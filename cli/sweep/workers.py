@@ -1,133 +1,120 @@
 """Processes that run cases side by side.
 
-A worker that dies takes its run with it: that run is begun again by another, and named after DEATHS of them.
+A worker takes a chunk of cases, hands back what the core made of them, and what needs runs of their own, which are then
+given out one by one.  A worker that dies takes its chunk with it: its cases are begun again one by one, and a run that
+was alone in DEATHS of these is named.
 """
 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import signal
+import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from multiprocessing.connection import Connection
 
+from sysdyn.cli.run.crew import DEATHS, Crew, Serve
 from sysdyn.cli.run.running import Request
-from sysdyn.cli.sweep.one_run import Kept, Runner
-from sysdyn.cli.sweep.study import Case
+from sysdyn.cli.sweep.kept import Item, Kept
+from sysdyn.cli.sweep.one_run import Runner, Task
 
-DEATHS = 3
-"""Workers that a run may kill."""
-_CONTEXT = multiprocessing.get_context("spawn")
-
-Task = tuple[int, Case]
-Serve = Callable[[Connection, Request], None]
+FIRST, LARGEST = 8, 1024
+"""Cases of a first chunk, and at most."""
+LASTS = 0.25
+"""s: what a chunk should take."""
 
 
-def serve(pipe: Connection, request: Request) -> None:
-    """A worker: tasks from the pipe until it is closed."""
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Cases for one worker; alone: one, for a run of its own."""
+
+    tasks: tuple[Task, ...]
+    alone: bool = False
+
+
+Answer = tuple[list[Item], list[Task]]
+
+
+def answer(runner: Runner, chunk: Chunk) -> Answer:
+    """What came of a chunk, and what needs runs of their own."""
+    if chunk.alone:
+        return [runner(*task) for task in chunk.tasks], []
+    return runner.chunk(chunk.tasks)
+
+
+def serve(pipe: Connection, request: Request, keep: str) -> None:
+    """A worker: chunks from the pipe until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who steers ends it
-    runner = Runner(request)
+    runner = Runner(request, keep)
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
-            number, case = pipe.recv()
-            pipe.send(runner(number, case))
+            pipe.send(answer(runner, pipe.recv()))
 
 
 @dataclass(slots=True)
-class _Worker:
-    process: BaseProcess
-    pipe: Connection
-    task: Task | None = None
+class Queue:
+    """Chunks of tasks, as large as takes LASTS; what needs a run of its own comes first.  jobs: workers."""
 
+    tasks: Iterator[Task]
+    left: int
+    jobs: int
+    again: deque[Task] = field(default_factory=deque)
+    deaths: dict[int, int] = field(default_factory=dict)
+    size: int = FIRST
+    more: bool = True
 
-def results(request: Request, tasks: Iterable[Task], jobs: int, serve: Serve = serve) -> Iterator[Kept]:
-    """What is kept of each task, as it is ready; jobs 1: in this process.  serve: what a worker does."""
-    if jobs == 1:
-        runner = Runner(request)
-        for number, case in tasks:
-            yield runner(number, case)
-        return
-    crew = _Crew(request, iter(tasks), jobs, serve)
-    try:
-        yield from crew.results()
-    finally:
-        crew.end()
+    def next(self) -> Chunk | None:
+        """A chunk; None where there is none."""
+        if self.again:
+            return Chunk((self.again.popleft(),), alone=True)
+        tasks = tuple(islice(self.tasks, max(1, min(self.size, self.left // (2 * self.jobs)))))
+        self.left -= len(tasks)
+        self.more = bool(tasks)
+        return Chunk(tasks) if tasks else None
 
+    def took(self, job: Chunk, answer: Answer, seconds: float) -> Iterator[Item]:
+        """How long a chunk took tells how large the next ones are."""
+        self.again.extend(answer[1])
+        if answer[0] and not job.alone:
+            wanted = int(len(job.tasks) * LASTS / max(seconds, 1e-6))
+            self.size = max(1, min(wanted, 4 * self.size, LARGEST))
+        yield from answer[0]
 
-class _Crew:
-    def __init__(self, request: Request, tasks: Iterator[Task], jobs: int, serve: Serve) -> None:
-        self.request, self.tasks, self.serve = request, tasks, serve
-        self.again: deque[Task] = deque()
-        self.deaths: dict[int, int] = {}
-        self.workers = [w for w in (self._begin() for _ in range(jobs)) if w is not None]
-
-    def _begin(self) -> _Worker | None:
-        """A worker with a task; None where there is no task."""
-        task = self._next()
-        if task is None:
-            return None
-        mine, other = _CONTEXT.Pipe()
-        process = _CONTEXT.Process(target=self.serve, args=(other, self.request), daemon=True)
-        process.start()
-        other.close()
-        worker = _Worker(process, mine)
-        self._give(worker, task)
-        return worker
-
-    def _next(self) -> Task | None:
-        return self.again.popleft() if self.again else next(self.tasks, None)
-
-    def _give(self, worker: _Worker, task: Task | None) -> None:
-        worker.task = task
-        if task is None:
-            worker.pipe.close()
+    def died(self, job: Chunk, how: str) -> Iterator[Kept]:
+        """The runs that a worker died of go to others one by one, or one is named."""
+        if not job.alone:
+            self.again.extend(job.tasks)
             return
-        with contextlib.suppress(BrokenPipeError):  # it died meanwhile: seen when it is waited for
-            worker.pipe.send(task)
-
-    def results(self) -> Iterator[Kept]:
-        """Until every task is done."""
-        while self.workers:
-            ready = wait([w.pipe for w in self.workers])
-            for worker in [w for w in self.workers if w.pipe in ready]:
-                try:
-                    kept: Kept = worker.pipe.recv()
-                except (EOFError, OSError):
-                    found = self._died(worker)
-                    if found is not None:
-                        yield found
-                    continue
-                self._give(worker, self._next())
-                if worker.task is None:
-                    self.workers.remove(worker)
-                yield kept
-
-    def _died(self, worker: _Worker) -> Kept | None:
-        """The run that a worker died of goes to another, or is named."""
-        worker.process.join()
-        worker.pipe.close()
-        self.workers.remove(worker)
-        task, named = worker.task, None
-        assert task is not None
-        number, code = task[0], worker.process.exitcode
-        self.deaths[number] = self.deaths.get(number, 0) + 1
-        if self.deaths[number] < DEATHS:
+        task = job.tasks[0]
+        self.deaths[task[0]] = self.deaths.get(task[0], 0) + 1
+        if self.deaths[task[0]] < DEATHS:
             self.again.append(task)
         else:
-            how = f"signal {-code}" if code is not None and code < 0 else f"exit {code}"
-            named = Kept(number, 4, False, f"its worker died {DEATHS} times ({how})")
-        new = self._begin()
-        if new is not None:
-            self.workers.append(new)
-        return named
+            yield Kept(task[0], 4, False, f"its worker died {DEATHS} times ({how})")
 
-    def end(self) -> None:
-        """No worker outlives the one who steers."""
-        for worker in self.workers:
-            worker.pipe.close()
-            worker.process.terminate()
-        for worker in self.workers:
-            worker.process.join(5.0)
+
+def results(
+    request: Request,
+    tasks: Iterable[Task],
+    number: int,
+    jobs: int,
+    keep: str = "traces",
+    serve: Serve = serve,
+    runner: Runner | None = None,
+) -> Iterator[Item]:
+    """What is kept of `number` tasks, as it is ready; jobs 1: in this process (by `runner`, where it is given).
+
+    serve: what a worker does.
+    """
+    queue = Queue(iter(tasks), number, jobs)
+    if jobs > 1:
+        yield from Crew(queue, jobs, serve, (request, keep)).results()
+        return
+    runner = runner or Runner(request, keep)
+    while (chunk := queue.next()) is not None:
+        began = time.monotonic()
+        found = answer(runner, chunk)
+        yield from queue.took(chunk, found, time.monotonic() - began)

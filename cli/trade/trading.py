@@ -13,6 +13,7 @@ from pathlib import Path
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.running import Request, check_tolerances
+from sysdyn.cli.trade.ahead import Asked, Runs, ahead
 from sysdyn.cli.trade.measuring import Bench, Limits
 from sysdyn.cli.trade.reference import reference
 from sysdyn.cli.trade.search import Search
@@ -35,10 +36,11 @@ def trade(
     full: bool = False,
     budget: float | None = None,
     progress: Callable[[float, float | None], None] | None = None,
+    jobs: int = 1,
 ) -> Traded | None:
     """Measure; None where the report says why the scene cannot run.  Raises NoReference.
 
-    full: every combination at every tolerance; budget [s] of wall time for all.
+    full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead.
     """
     check_tolerances(request)
     if request.rtol is not None or request.atol is not None:
@@ -56,13 +58,24 @@ def trade(
     kept, known = reference(bench, budget)
     limit = None if budget is None else began + budget
 
+    def wall() -> float:
+        return SECONDS if limit is None else max(limit - time.monotonic(), 1e-3)
+
+    combinations = list(bench.combinations())
+    made_ahead: Runs = {}
+    if jobs > 1:
+        made_ahead = ahead([Asked(request, folder, c, kept, known.until, full, wall()) for c in combinations], jobs)
+
     def measure(combination: Combination, tolerance: float, most: float) -> Measured | str:
-        left = SECONDS if limit is None else max(limit - time.monotonic(), 1e-3)
+        left = wall()
         steps = max(math.ceil(most / (HISTORY * bench.size(combination)[0])), LEAST) if math.isfinite(most) else None
+        made = made_ahead.get((combination, tolerance))
+        if isinstance(made, str) or (made is not None and (steps is None or made.steps < steps)):
+            return made
         return bench.measure(combination, tolerance, kept, known.until, Limits(steps, left))
 
     search = Search(bench.accuracy, known.uncertainty, measure, limit, progress)
-    (search.full if full else search.thrifty)(list(bench.combinations()))
+    (search.full if full else search.thrifty)(combinations)
     return Traded(
         target.name,
         bench.accuracy,

@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import FORMULATIONS
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import ACCURACY, Ran, Request, check_tolerances, integrate, options_of, ready
 from sysdyn.cli.run.targets import Target
@@ -44,15 +45,54 @@ JUDGED = ("E907", "E909", "E920", "E921", "E930", "E931", "E932", "E933", "E934"
 
 
 def verify(
-    request: Request, report: Report, folder: Path, progress: Callable[[float, float | None], None] | None = None
+    request: Request,
+    report: Report,
+    folder: Path,
+    progress: Callable[[float, float | None], None] | None = None,
+    jobs: int = 1,
 ) -> Verified | None:
-    """Run and compare; None where the report says why the reference cannot run.  Errors pass as those of `run`."""
+    """Run and compare; None where the report says why the reference cannot run.  Errors pass as those of `run`.
+
+    jobs: formulations side by side, each in a process of its own.
+    """
     check_tolerances(request)
     if request.method not in (None, "auto", *METHODS):
         raise UsageError(f"--method {request.method}: verify compares {' and '.join(METHODS)}")
     document = targets.read(request.file, report)
     target = targets.one(document, request.file, request.model, request.scene, report)
-    return None if target is None else _Verification(request, target, report, folder, progress).all()
+    return None if target is None else _Verification(request, target, report, folder, progress).all(jobs)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What came of one formulation; said: findings of the reference."""
+
+    runs: tuple[Run, ...]
+    refusals: tuple[Refusal, ...]
+    twins: tuple[Twins, ...]
+    left_out: dict[str, str]
+    found: dict[tuple[str, object], tuple[Diagnostic, list[str]]]
+    bounds: dict[str, float]
+    span: tuple[float, float]
+    finer: Run | None
+    said: tuple[Diagnostic, ...]
+
+
+def _part(asked: tuple[Request, Path, str | None]) -> _Part:
+    """One formulation (None: the reference) in a process of its own."""
+    request, folder, name = asked
+    report = Report()
+    target = targets.one(targets.read(request.file, report), request.file, request.model, request.scene, report)
+    assert target is not None
+    before = set(report)
+    own = _Verification(request, target, report, folder, None)
+    own._formulation(name)
+    runs = tuple(replace(run, outcome=replace(run.outcome, failure=None)) for run in own.runs)
+    finer = own.finer and replace(own.finer, outcome=replace(own.finer.outcome, failure=None))
+    said = tuple(item for item in report if item not in before)
+    return _Part(
+        runs, tuple(own.refusals), tuple(own.twins), own.left_out, own.found, own.bounds, own.span, finer, said
+    )
 
 
 class _Verification:
@@ -78,8 +118,10 @@ class _Verification:
         self.span = (0.0, 0.0)
         self.finer: Run | None = None
 
-    def all(self) -> Verified | None:
+    def all(self, jobs: int = 1) -> Verified | None:
         """Every formulation, then the comparison."""
+        if jobs > 1:
+            return self._side_by_side(jobs)
         self._formulation(None)
         if not self.runs or self.finer is None:
             self._tell()
@@ -90,6 +132,41 @@ class _Verification:
                 self._formulation(name)
         self._tell()
         return self._compared(self.finer)
+
+    def _side_by_side(self, jobs: int) -> Verified | None:
+        """The same by processes: what they find is taken in in the order of formulations, not of their ends."""
+        silent = Report()
+        with ex.fresh():
+            first = ready(self.request, self.target, silent)
+        others = [name for name in FORMULATIONS if first and name not in ("auto", first.formulation)]
+        items = [(self.request, self.folder, name) for name in (None, *others)]
+        parts: dict[int, _Part] = {}
+        for k, part in each(_part, items, jobs):
+            if isinstance(part, Lost):
+                raise RuntimeError(f"the process of {items[k][2] or 'the reference'} died ({part.how})")
+            parts[k] = part
+            self.done = round(self.planned * len(parts) / len(items))
+            self._advance(0.0, None)
+        for k in range(len(items)):
+            self._take(parts[k])
+            if k == 0 and (not self.runs or self.finer is None):
+                self._tell()
+                return None
+        self._tell()
+        assert self.finer is not None
+        return self._compared(self.finer)
+
+    def _take(self, part: _Part) -> None:
+        """What came of a formulation."""
+        self.runs += part.runs
+        self.refusals += part.refusals
+        self.twins += part.twins
+        self.left_out |= part.left_out
+        for key, (item, names) in part.found.items():
+            self.found.setdefault(key, (item, []))[1].extend(names)
+        self.report.extend(part.said)
+        if part.finer is not None:
+            self.bounds, self.span, self.finer = part.bounds, part.span, part.finer
 
     # --- runs ---------------------------------------------------------------------------------------------------
 

@@ -180,6 +180,11 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
     return failed;
 }
 
+int *sd_linear_pivoted(sd_linear *linear)
+{
+    return linear->sparse ? &linear->sparse->pivoted : NULL;
+}
+
 static void scaled_solve(sd_linear *linear, sd_number *x)
 {
     if (linear->dense)

@@ -44,5 +44,7 @@ void sd_linear_free(sd_linear *linear);
 int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_linear_solve(sd_linear *linear, sd_number *x);
+/* set to 0: the next factorisation chooses its pivots anew; NULL for dense ones, which always do */
+int *sd_linear_pivoted(sd_linear *linear);
 
 #endif

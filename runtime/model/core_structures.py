@@ -377,3 +377,70 @@ class Run(c.Structure):
         ("magnitude", _P),
         ("beyond", _D),
     ]
+
+
+class Region(c.Structure):
+    """sd_region."""
+
+    _fields_ = [("at", _P), ("copy", _P), ("size", _L)]
+
+
+class Pass(c.Structure):
+    """sd_pass."""
+
+    _fields_ = [
+        ("run", _P),
+        ("region", _P),
+        *[(name, _I) for name in ["regions", "n"]],
+        *[(name, _P) for name in ["y", "yd", "start_rate", "differential"]],
+        *[(name, _P) for name in ["magnitude", "met", "magnitude0", "rtol", "h_max"]],
+        ("longest", _D),
+    ]
+
+
+class RunClaim(c.Structure):
+    """sd_claim."""
+
+    _fields_ = [*[(name, _I) for name in ["moment", "op", "left", "right", "within"]], ("at", _D)]
+
+
+class RunSamples(c.Structure):
+    """sd_samples."""
+
+    _fields_ = [("time", _P), ("value", _P), ("late", _P), ("number", _I), ("room", _I)]
+
+
+class Many(c.Structure):
+    """sd_many."""
+
+    _fields_ = [
+        ("p", _P),
+        *[(name, _I) for name in ["parameters", "written", "columns", "observed"]],
+        *[(name, _P) for name in ["start", "region"]],
+        ("regions", _I),
+        *[(name, _P) for name in ["y0", "yd0", "anchored", "size"]],
+        ("smallest", _D),
+        *[(name, _P) for name in ["jy0", "jyd0", "counts", "jy", "jyd"]],
+        *[(name, _I) for name in ["flows", "inertias"]],
+        *[(name, _P) for name in ["inertia_row", "inertia_column", "inertia_entry", "inertia_rate"]],
+        *[(name, _P) for name in ["inertia_sign", "inertia"]],
+        *[(name, _D) for name in ["t0", "t1"]],
+        *[(name, _P) for name in ["alike", "state"]],
+        ("alikes", _I),
+        ("tau", _D),
+        ("passes", Pass * 2),
+        *[(name, _P) for name in ["column", "target", "unit", "unit_of"]],
+        *[(name, _I) for name in ["units", "known"]],
+        *[(name, _D) for name in ["late", "power", "credit", "finest"]],
+        ("tolerance", _D * 2),
+        ("max_steps", _L),
+        ("energy", _D),
+        ("claim", _P),
+        *[(name, _I) for name in ["claims", "keep"]],
+        ("thin", _P),
+        ("thins", _I),
+        ("sample", RunSamples * 3),
+        *[(name, _I) for name in ["stride", "seen", "rows", "thinned", "broken", "judged"]],
+        ("last_time", _D),
+        *[(name, _P) for name in ["end", "least", "most", "thick", "work", "kind"]],
+    ]

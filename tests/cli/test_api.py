@@ -89,5 +89,5 @@ def test_arrays_of_parameters_are_read_back(tmp_path):
 
 
 def test_what_the_module_offers():
-    names = {"Diagnostic", "Model", "ModelError", "Module", "NotMet", "SolverFailure", "Trace", "UsageError"}
+    names = {"Diagnostic", "Model", "ModelError", "Module", "NotMet", "SolverFailure", "Sweep", "Trace", "UsageError"}
     assert set(api.__all__) == names | {"check", "compile_model", "load", "simulate"}

@@ -1,8 +1,9 @@
 """`sysdyn golden`: a project's goldens recorded, checked, sabotaged, accepted."""
 
 import json
+import os
 import shutil
-import sys
+import signal
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from schema import NUMBER, conforms, envelope
-from sysdyn.cli.golden import book
+from sysdyn.cli.golden import book, jobs
 from sysdyn.cli.main import run
 from texts import PENDULUM, run_json
 
@@ -260,33 +261,40 @@ def test_a_size_that_is_too_small(project, capsys):
     assert not (project / "golden/small/golden.toml").exists()
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-def test_broken_goldens_are_said(project, capsys, jobs):
+@pytest.mark.parametrize("number", ["1", "2"])
+def test_broken_goldens_are_said(project, capsys, number):
     trace = Path("golden/spring/ring.h5")
     trace.write_bytes(trace.read_bytes()[:3000])
     Path("golden/pendulum/swing.json").write_text("{}")
-    assert run(["golden", "check", "--jobs", jobs]) == 5
+    assert run(["golden", "check", "--jobs", number]) == 5
     out = capsys.readouterr().out
     assert "not readable as a trace" in out
     assert "swing.json" in out
     assert out.startswith("4 of 8 checks failed")
 
 
-def test_a_check_that_is_killed_costs_no_other(project, capsys, monkeypatch):
-    killed = project / "python"
-    killed.write_text(
-        f"""#!/bin/sh
-case "$*" in *pendulum*) kill -9 $$;; esac
-exec {sys.executable} "$@"
-"""
-    )
-    killed.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(killed))
-    code, found = run_json(capsys, "golden", "check", "--jobs", "2")
-    assert code == 5
-    messages = {c["golden"]: c["message"] for c in found["result"]["checks"]}
-    assert "killed by signal 9" in messages["pendulum/swing"]
-    assert messages["spring/ring"].startswith("equal")
+def deadly(asked):
+    """Kills its process at one golden, always."""
+    if asked.golden.label == "pendulum/swing":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return jobs.checked(asked)
+
+
+def test_a_check_that_is_killed_costs_no_other(project):
+    asked = [jobs.Asked(golden, (), (), ("c",), False) for golden in book.find(Path("golden"), ())]
+    found = {case.golden: case for cases in jobs.in_processes(asked, 2, deadly) for case in cases}
+    assert found["pendulum/swing"].exit == 5
+    assert "killed by signal 9" in found["pendulum/swing"].message
+    assert found["spring/ring"].message.startswith("equal")
+
+
+def test_two_processes_find_what_one_finds(project, capsys):
+    def shown(found):
+        return [{k: v for k, v in check.items() if k != "seconds"} for check in found["result"]["checks"]]
+
+    one, two = (run_json(capsys, "golden", "check", "--jobs", n) for n in "12")
+    assert one[0] == two[0] == 0
+    assert shown(one[1]) == shown(two[1])
 
 
 BROKEN_BOOKS = ["", "[", "version = 9", "version = 1\nmodel = 3", "version = 1\nmodel = 'a'\nscenes = 4"]

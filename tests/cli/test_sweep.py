@@ -17,7 +17,7 @@ from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.axes import Axis, axis
 from sysdyn.cli.sweep.journal import Journal
-from sysdyn.cli.sweep.one_run import Kept
+from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.study import study
 
 SPRING = """
@@ -200,24 +200,25 @@ def test_a_study_file(spring, capsys):
 # --- what dies --------------------------------------------------------------------------------------------------------
 
 
-def deadly(pipe, request):
+def deadly(pipe, request, keep):
     """A worker that dies of run 3, always, and of run 5 the first time."""
     marker = Path(request.output)
     while True:
         try:
-            number, _ = pipe.recv()
+            tasks = pipe.recv().tasks
         except EOFError:
             return
-        if number == 3 or (number == 5 and not marker.exists()):
-            if number == 5:
+        numbers = [number for number, _ in tasks]
+        if 3 in numbers or (5 in numbers and not marker.exists()):
+            if 5 in numbers:
                 marker.touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        pipe.send(Kept(number, 0, True))
+        pipe.send(([Kept(number, 0, True) for number in numbers], []))
 
 
 def test_a_run_that_kills_its_worker_is_named_and_nothing_else_is_lost(tmp_path):
     request = Request("none.sd", output=str(tmp_path / "marker"))
-    found = {k.run: k for k in workers.results(request, [(n, {}) for n in range(12)], 2, deadly)}
+    found = {k.run: k for k in workers.results(request, [(n, {}) for n in range(12)], 12, 2, "end", deadly)}
     assert sorted(found) == list(range(12))
     assert found[3].exit == 4
     assert "died 3 times (signal 9)" in found[3].reason
@@ -252,7 +253,7 @@ def test_a_journal_of_another_study_is_not_taken(tmp_path):
     path = tmp_path / ".a.h5.runs"
     path.write_text(path.read_text() + '{"run": 1, "ex')  # cut short by a kill
     with Journal(tmp_path / "a.h5", "one") as journal:
-        assert journal.done == {0: Kept(0, 0, True, end={"x": 1.0})}
+        assert journal.done.singles == {0: Kept(0, 0, True, end={"x": 1.0})}
     with pytest.raises(UsageError, match="another study"):
         Journal(tmp_path / "a.h5", "two")
 

@@ -181,6 +181,14 @@ def test_two_trades_are_equal_but_for_seconds(tmp_path, capsys):
     assert one == two
 
 
+@pytest.mark.parametrize("options", [[], ["--full", "--method", "radau", "--formulation", "lagrangian"]])
+def test_runs_made_ahead_change_nothing(tmp_path, capsys, options):
+    file = write(tmp_path, PENDULUM)
+    one, two = (run_json(capsys, "trade", str(file), "--no-timings", "--jobs", n, *options) for n in "12")
+    assert one == two
+    assert one[0] == 0
+
+
 def test_runs_that_are_not_met_are_kept_and_never_chosen():
     def made(work, error, reason="", method="bdf"):
         return Measured(Combination("lagrangian", "2", method), 1e-3, error, 0.1, 9, work, 0.0, 1e-3, 0.0, reason)

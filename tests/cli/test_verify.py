@@ -460,3 +460,14 @@ def test_horizon_is_the_last_instant_before_the_first_difference():
     assert (until, beyond.variable, beyond.time) == (1.0, "x", 2.0)
     assert horizon(one, one, {"x": 0.1}) == (3.0, None)
     assert horizon(one, trace([0, 1], x=[9, 9]), {"x": 0.1})[0] == -np.inf
+
+
+@pytest.mark.parametrize("name", ["pendulum", "redundant_pendulum", "coulomb_slide", "incline_friction"])
+def test_processes_side_by_side_find_what_one_finds(name, capsys):
+    """Runs, gaps, refusals, warnings and exit code, in the same order, whatever ends first."""
+    model = str(Path(__file__).parents[2] / "models" / "seed" / f"{name}.sd")
+    one, two = (run_json(capsys, "verify", model, "--no-timings", "--jobs", n) for n in "12")
+    for _, found in (one, two):
+        for item in found["result"]["runs"]:
+            item.pop("trace")
+    assert one == two

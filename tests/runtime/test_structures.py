@@ -14,7 +14,9 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs = [("Frame", "sd_frame"), ("Call", "sd_call"), ("System", "sd_system"), ("Linear", "sd_linear")]
     pairs += [("Bdf", "sd_bdf"), ("Settle", "sd_settle"), ("Stepper", "sd_stepper"), ("Radau", "sd_radau")]
     pairs += [("LeastNorm", "sd_least_norm"), ("Run", "sd_run"), ("Ledgers", "sd_ledgers"), ("Record", "sd_record")]
-    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau")]
+    pairs += [("Many", "sd_many"), ("Pass", "sd_pass"), ("Region", "sd_region"), ("RunClaim", "sd_claim")]
+    pairs += [("RunSamples", "sd_samples")]
+    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau", "many")]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
         lines.append(f'printf("%zu\\n", sizeof({tag}));')

@@ -1,0 +1,112 @@
+/* Many runs of one model that differ in numbers alone, one after the other without anything between them.
+ *
+ * Everything that depends on the structure (patterns, orders, places) is set up once, at a nominal run.  A run begins by
+ * putting every structure back as it was set up, so that what comes of it depends on its own numbers and on nothing that
+ * ran before: results are equal bit for bit whatever the order, and whoever runs them.
+ * Start: the anchored unknowns as the run's text gives them, everything else from the nominal start by one settling.
+ * Accuracy: a draft and finer runs compared at instants of the one before, as runtime/integrate/accuracy.py has it.
+ * A run that fails, misses its accuracy or a ledger, breaks a claim, or whose structure is another than the nominal's
+ * is handed back without a result: the caller runs it on its own, and says what is the matter.
+ */
+#ifndef SYSDYN_MANY_H
+#define SYSDYN_MANY_H
+
+#include "run.h"
+
+enum sd_many_state {
+    SD_MANY_DONE = 0,
+    SD_MANY_START = 1,     /* no consistent start, or one that moves what was anchored */
+    SD_MANY_STRUCTURE = 2, /* entries of the Jacobian vanish or appear, pivots vanish, inertia is negative */
+    SD_MANY_FAILED = 3,    /* an integration did not come to its end */
+    SD_MANY_ACCURACY = 4,  /* not reached, or not known */
+    SD_MANY_ENERGY = 5,    /* a ledger does not balance */
+    SD_MANY_CLAIM = 6      /* an expectation does not hold */
+};
+
+/* a structure as it was set up */
+typedef struct sd_region {
+    void *at;
+    const void *copy;
+    int64_t size; /* bytes */
+} sd_region;
+
+/* one integration, set up: the draft's, or that of every finer run */
+typedef struct sd_pass {
+    sd_run *run;
+    const sd_region *region;     /* [regions] */
+    int32_t regions;
+    int32_t n;                   /* unknowns of the form */
+    double *y, *yd, *start_rate; /* [n] */
+    const int32_t *differential; /* [n] 1: its rate is a start's */
+    double *magnitude, *met;     /* [n] of the stepper */
+    const double *magnitude0;    /* [n] of the nominal start */
+    double *rtol, *h_max;        /* of the stepper */
+    double longest;              /* step [s] */
+} sd_pass;
+
+/* an expectation: value[left] op value[right], value[within] granted; moment 0 always, 1 finally, 2 at an instant */
+typedef struct sd_claim {
+    int32_t moment, op, left, right, within; /* op: 0 ==, 1 !=, 2 <, 3 <=, 4 >, 5 >=; within -1: nothing */
+    double at;
+} sd_claim;
+
+/* what a run hands to the comparison: instants, values, and what they move by within the time tolerance */
+typedef struct sd_samples {
+    double *time, *value, *late; /* [room], [room][columns] */
+    int32_t number, room;
+} sd_samples;
+
+typedef struct sd_many {
+    double *p;                   /* [parameters] that every block reads */
+    int32_t parameters, written, columns, observed;
+    /* the start */
+    sd_settle *start;
+    const sd_region *region;
+    int32_t regions;
+    const double *y0, *yd0;      /* [written] the nominal start */
+    const int32_t *anchored;     /* [written] 1: as the text gives it */
+    const double *size;          /* [written] magnitudes */
+    double smallest;             /* pivot of the start's matrix at the nominal start */
+    const double *jy0, *jyd0;    /* [entries] of the start's system at the nominal start */
+    const int32_t *counts;       /* [entries] 1: jy0 counts beside the others of its row, 2: jyd0 does */
+    double *jy, *jyd;
+    int32_t flows, inertias;     /* the inertia M [flows, flows]: its entries among those */
+    const int32_t *inertia_row, *inertia_column, *inertia_entry, *inertia_rate; /* rate 1: of jyd */
+    const double *inertia_sign;
+    double *inertia;             /* [flows][flows] */
+    double t0, t1;
+    /* magnitudes */
+    const int32_t *alike, *state; /* [n] number of the kind and unit; 1: state whose magnitude nobody named */
+    int32_t alikes;
+    double tau;                  /* time scale of the start [s] */
+    /* accuracy */
+    sd_pass passes[2];
+    const int32_t *column;       /* [columns] place among the observed */
+    const double *target;        /* [columns] relative; infinite: free */
+    const int32_t *unit, *unit_of; /* [columns], [written]; unit_of -1: none */
+    int32_t units, known;        /* known 1: instants of comparison are set up, else steps of the run before */
+    double late;                 /* time tolerance of comparisons [s] */
+    double power, credit, finest; /* of the method's law */
+    double tolerance[2];         /* of the draft, of the run behind it */
+    int64_t max_steps;
+    double energy;               /* part of a ledger's turnover that its balance may be */
+    const sd_claim *claim;
+    int32_t claims;
+    int32_t keep;                /* 0 end values, 1 extrema too, 2 and rows `thin` of the trace */
+    const int32_t *thin;         /* [thins] ascending numbers of rows of the trace */
+    int32_t thins;
+    /* at work */
+    sd_samples sample[3];        /* own of the last run; own of this one; this one's at instants of the last */
+    int32_t stride, seen, rows, thinned, broken, judged;
+    double last_time;
+    double *end, *least, *most, *thick; /* [columns] x 3, [columns][thins]: where the run's results go */
+    double *work;                /* [3 n + 4 columns + 2 units + alikes] */
+    int32_t *kind;               /* [room] */
+} sd_many;
+
+/* one run after the other: p [runs][parameters], anchor [runs][written] values of anchored unknowns; state [runs] as
+ * above; steps [runs]; estimate [runs]; cpu [runs] seconds; end, least, most [runs][columns]; thick [runs][columns][thins] */
+void sd_many_runs(sd_many *many, int32_t runs, const double *p, const double *anchor, int32_t *state, int64_t *steps,
+                  double *estimate, double *cpu, double *end, double *least, double *most, double *thick);
+
+#endif

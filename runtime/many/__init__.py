@@ -1,0 +1,1 @@
+"""Many runs of one model that differ in numbers alone."""

@@ -1,0 +1,86 @@
+"""Which unknowns every run's start takes from its own text, so that the rows determine everything else.
+
+An initial value that did not move at the nominal start is an anchor; what nobody wrote, and nothing determines, stays
+where the nominal start left it if that is where it was guessed.  Where the rows then leave nothing open, the start of a
+run is unique near the nominal one: it is what the search of start.py finds for guesses that need not move.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats, Initial, Ints
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.settled import Settler
+
+Mask = NDArray[np.bool_]
+AGREES = 1e-12
+"""Of its magnitude: an initial value that moved by less did not move."""
+OPEN = 1e-7
+"""Component of a null vector of unit length from which an unknown is open."""
+RANK = 1e-10
+"""Singular values below this part of the largest are none."""
+LARGEST = 400
+"""Unknowns with their rates that are looked at: full matrices."""
+STATE = ("q", "f", "p", "s")
+
+
+def guesses(at: Ints, written: int, initial: tuple[Initial, ...]) -> tuple[Floats, Mask]:
+    """Initial values by unknown [written], 0 where there is none, and which are written; at: places of families."""
+    found, said = np.zeros(written), np.zeros(written, dtype=bool)
+    fixed = np.zeros(written, dtype=bool)
+    for item in sorted(initial, key=lambda item: item.fixed):
+        places = at[item.family] + item.positions
+        found[places] = np.where(fixed[places], found[places], item.values)
+        fixed[places] |= item.fixed
+        said[places] = True
+    return found, said
+
+
+def anchors(settler: Settler, system: System, t: float, point: tuple[Floats, Floats], magnitude: Floats) -> Mask | None:
+    """Which unknowns [written] are anchors; None where the rows leave something open beside them.
+
+    point: y, yd [written] of the nominal start.
+    """
+    n = system.form.written
+    if n + settler.rates.size > LARGEST:
+        return None
+    guess, said = guesses(system.form.at, n, system.description.initial)
+    state = np.isin(system.kinds[:n], STATE)
+    stayed = np.abs(point[0] - guess) <= AGREES * np.maximum(magnitude[:n], np.abs(guess))
+    anchored = said & stayed & state
+    may = ~said & stayed & state
+    matrix = _scaled(settler, t, point, magnitude)
+    while True:
+        free = np.concatenate([~anchored, np.ones(settler.rates.size, dtype=bool)])
+        null = _null(matrix[:, free])
+        component = np.zeros(free.size)
+        component[free] = np.abs(null).max(axis=0, initial=0.0) if null.size else 0.0
+        if not (component[:n] > OPEN).any():
+            return anchored
+        choice = np.where(may & ~anchored, component[:n], 0.0)
+        k = int(np.argmax(choice))
+        if choice[k] <= OPEN:
+            return None
+        anchored[k] = True
+
+
+def _scaled(settler: Settler, t: float, point: tuple[Floats, Floats], magnitude: Floats) -> Floats:
+    """The settled rows' Jacobian by unknowns and rates [rows, written + rates] in magnitudes, rows scaled to 1."""
+    system = settler.system
+    jy, jyd = system.jacobian(t, *point)
+    matrix = np.hstack([system.dense(jy), system.dense(jyd)[:, settler.rates]]) * settler.scale
+    matrix[~np.isfinite(matrix)] = 0.0
+    size = np.abs(matrix).max(axis=1, initial=0.0)
+    return np.asarray(matrix / np.where(size > 0.0, size, 1.0)[:, None])
+
+
+def _null(matrix: Floats) -> Floats:
+    """Null vectors as rows [k, columns]."""
+    if not matrix.shape[1]:
+        return np.zeros((0, 0))
+    if not matrix.shape[0]:
+        return np.eye(matrix.shape[1])
+    _, sigma, vectors = np.linalg.svd(matrix)
+    rank = int((sigma > RANK * sigma.max(initial=0.0)).sum())
+    return np.asarray(vectors[rank:])

@@ -1,0 +1,403 @@
+"""Many runs in the core, one after the other: structures are set up once at a nominal run, and put back for each.
+
+Received: the nominal start with its structure, the options of a run and the method that the nominal run took; then the
+numbers of the runs.  Handed back: `Finished`.  A run without a result (`state` is not DONE) is the caller's.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate import accuracy
+from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, RATIO, STRETCH
+from sysdyn.runtime.integrate.common_instants import MOST, drafted, joined
+from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.integrate.options import Options, choose_method
+from sysdyn.runtime.integrate.request import LONGEST, Request
+from sysdyn.runtime.integrate.runs import ROUGH, Runs, Way
+from sysdyn.runtime.judgement import allowed
+from sysdyn.runtime.many.anchors import anchors
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.scales import alike
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.simulate import alternatives, counted, formed
+from sysdyn.runtime.start.settled import HELD, Settler
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.structure.structure import DENSE, Structure
+
+DONE = 0
+WHY = ("", "start", "structure", "stopped", "accuracy", "energy", "claim")
+"""What kept a run from a result, by its state."""
+END, EXTREMA, TRACES = 0, 1, 2
+"""What is kept of a run: end values alone, least and largest too, rows of its trace too."""
+COUNTS = 1e-9
+"""Of the largest entry of a row: what is less is round-off, or may as well vanish."""
+FREELY = 0.25
+"""Longest step as part of the span where nothing in the rows depends on time: no event of a source can be missed."""
+
+
+class NotApplicableError(Exception):
+    """Why runs of a model cannot be made this way: a sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """An expectation on observed quantities: names of its sides (within None: nothing is granted); operator; moment
+    always, finally, or at an instant [s].
+    """
+
+    left: str
+    right: str
+    within: str | None
+    operator: str
+    moment: str
+    at: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """Of runs [k]: state (DONE, or what `WHY` names), steps, estimate (relative), cpu [s]; end, least, most [k,
+    quantities]; traces [k, quantities, rows kept].
+    """
+
+    state: Ints
+    steps: Ints
+    estimate: Floats
+    cpu: Floats
+    end: Floats
+    least: Floats
+    most: Floats
+    traces: Floats
+
+
+def way_of(
+    written: System, start: ConsistentState, facts: Structure, options: Options, method: str
+) -> tuple[Way, ConsistentState]:
+    """The way with the method that a nominal run took, and the start in its layout."""
+    written, start, facts = counted(written, start, facts, options)
+    system, index, _ = formed(written, start, facts, options)
+    first = Way(choose_method(options), system, index, "")
+    ways = (first,) if options.method != "auto" else alternatives(first, written, start, options)
+    found = next((way for way in ways if way.method == method), None)
+    if found is None:
+        raise NotApplicableError(f"the nominal run took method {method}")
+    return found, start
+
+
+def obstacle(options: Options) -> str | None:
+    """Why runs with these options are made one by one; None where nothing is in the way."""
+    if options.accuracy is None and not options.accuracy_on:
+        return "the solver's own tolerances are given: there is no accuracy to be controlled"
+    if options.rtol is not None or options.atol is not None or options.method == "euler":
+        return "the solver's own tolerances are given: there is no accuracy to be controlled"
+    if options.events:
+        return "the model has events"
+    if options.stops is not None and np.isfinite(np.asarray(options.stops)).any():
+        return "the text jumps or has kinks in time"
+    if options.redundancy == "minimum_norm":
+        return "redundancy minimum_norm"
+    if options.accuracy_check:
+        return "a second opinion is asked for"
+    if options.max_wall is not None:
+        return "the wall time of a run is limited"
+    return None
+
+
+class Batch:
+    """Structures for runs of one model, set up at its nominal start.
+
+    keep: END, EXTREMA or TRACES; thin: numbers of the rows of the trace that are kept; free: nothing in the rows
+    depends on time.  Raises NotApplicableError.
+    """
+
+    def __init__(
+        self,
+        way: Way,
+        start: ConsistentState,
+        options: Options,
+        *,
+        keep: int = END,
+        thin: NDArray[np.integer] | None = None,
+        claims: tuple[Claim, ...] = (),
+        free: bool = False,
+    ) -> None:
+        why = obstacle(options)
+        if why is not None:
+            raise NotApplicableError(why)
+        if keep == END and not claims:
+            options = replace(options, every=None, at=())
+        self.options, self.way = replace(options, output=None, progress=None, watch=None), way
+        self._alive: list[Any] = []  # what the core has addresses of
+        self.runs = Runs(start, self.options, way)
+        if self.runs.meters or not self.runs.columns:
+            raise NotApplicableError("accuracy is asked of a meter" if self.runs.meters else "nothing is traced")
+        self.system, self.start = way.system, start
+        self.columns = tuple(column.name for column in self.runs.columns)
+        self._thin = np.ascontiguousarray([] if thin is None or keep != TRACES else thin, dtype=np.int32)
+        law = LAWS[way.method]
+        self._targets = self._wanted()
+        finest = float(np.min(self._targets, initial=1.0))
+        tolerance = law.tolerance(finest if finest < 1.0 else 1e-4)
+        draft = min(max(tolerance, law.finest) / RATIO, LOOSEST)
+        fine = max(min(tolerance, RATIO * draft), law.finest)
+        longest = FREELY if free and way.method == "dopri" and keep == END else LONGEST
+        try:
+            self.passes = tuple(self._pass(k, (draft, fine)[k], longest) for k in (0, 1))
+        except (SolverFailure, MemoryError) as error:
+            raise NotApplicableError(f"the structures cannot be set up: {error}") from error
+        self.core = lib.Many()
+        self._begin()
+        self._measure(longest, law, draft, fine)
+        self._claims(claims)
+        self.core.keep = keep
+
+    def _kept(self, array: Any) -> int | None:
+        """Address of an array that lives as long as this."""
+        self._alive.append(array)
+        return lib.pointer(array)
+
+    def _wanted(self) -> Floats:
+        options, names = self.options, list(self.runs.compared)
+        target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
+        for name, wanted in options.accuracy_on:
+            target[names.index(name)] = wanted
+        return target
+
+    def _pass(self, number: int, tolerance: float, longest: float) -> Integration:
+        """The structures of the draft (0), or of the runs behind it (1)."""
+        runs, options = self.runs, self.options
+        runs.controlled = True
+        request: Request = runs.request(tolerance, None, longest)
+        instants, kinds = runs.instants, runs.kinds
+        if runs.common is not None:
+            instants, kinds = (joined if number else drafted)(instants, kinds, runs.common)
+        request = replace(
+            request,
+            instants=instants,
+            instant_kinds=kinds,
+            h_max=min(longest * (options.t_end - options.t_start), options.longest or np.inf),
+            settled_to=0.0 if number else ROUGH * tolerance,
+            max_wall=None,
+        )
+        made = Integration(self.system, self.start, request)
+        if self.way.method == "dopri":
+            made.method.contents.patience = request.stiff_steps
+        return made
+
+    def _regions(self, made: list[tuple[int, int]], zero: list[int | None]) -> tuple[Any, int]:
+        """Regions (address, bytes) as they are now, and integers that begin at 0."""
+        found = [(at, size, bytes(c.string_at(at, size))) for at, size in made]
+        found += [(at, 4, bytes(4)) for at in zero if at]
+        regions = (lib.Region * max(len(found), 1))()
+        for k, (at, size, content) in enumerate(found):
+            buffer = c.create_string_buffer(content, size)
+            self._alive.append(buffer)
+            regions[k] = lib.Region(at=at, copy=c.addressof(buffer), size=size)
+        self._alive.append(regions)
+        return regions, len(found)
+
+    @staticmethod
+    def _settled(settler: Settler) -> list[tuple[int, int]]:
+        core = settler.core.contents
+        moves = core.unknowns + core.rates
+        return [(c.addressof(core), c.sizeof(lib.Settle)), (core.scale, 8 * moves)]
+
+    def _fill(self, k: int, longest: float) -> None:
+        """Pass k of the core."""
+        made, system = self.passes[k], self.system
+        core = made.method.contents
+        states = [(c.addressof(core), c.sizeof(core)), (c.addressof(made.run_.contents), c.sizeof(lib.Run))]
+        settlers = [made.settler, *([made._project] if hasattr(made, "_project") else [])]
+        zero = [lib.core.sd_linear_pivoted(made.linear)]
+        for settler in settlers:
+            states += self._settled(settler)
+            zero.append(lib.core.sd_linear_pivoted(settler.linear))
+        if made.underlying is not None:
+            states.append((c.addressof(made.underlying.core.contents), c.sizeof(lib.Underlying)))
+        if made.method._complex:
+            zero.append(lib.core.sd_linear_z_pivoted(made.method._complex))
+        # observers read the audit's families behind the unknowns
+        rooms = [np.zeros(max(system.form.extended, system.unknowns) + 8) for _ in range(3)]
+        made.run_.contents.start_rate = lib.pointer(rooms[2])
+        regions, number = self._regions(states, zero)
+        kind = type(core)
+        field = self.core.passes[k]
+        field.run, field.region, field.regions = c.addressof(made.run_.contents), c.addressof(regions), number
+        field.n = system.unknowns
+        field.y, field.yd, field.start_rate = (self._kept(room) for room in rooms)
+        field.differential = self._kept(made.roles.differential.astype(np.int32))
+        field.magnitude, field.met = lib.pointer(made.magnitude), lib.pointer(made._met)
+        field.magnitude0 = self._kept(made.magnitude.copy())
+        field.rtol = c.addressof(core) + kind.rtol.offset
+        field.h_max = c.addressof(core) + kind.h_max.offset
+        field.longest = longest
+
+    def _begin(self) -> None:
+        """The start of every run."""
+        many, system, made = self.core, self.system, self.passes[1]
+        n = system.form.written
+        y, yd = (np.ascontiguousarray(item[:n]) for item in (self.start.y, self.start.yd))
+        found = anchors(made.settler, system, self.start.t, (y, yd), made.magnitude)
+        if found is None:
+            raise NotApplicableError("initial values of the text leave the start open, or move for its sake")
+        self.anchored = found
+        settler = made._settler("settled", found)
+        settled = settler.system
+        # rows written with room for what settles: the buffers of both passes are used
+        extended = np.zeros(settled.form.extended), np.zeros(settled.form.extended)
+        extended[0][:n], extended[1][:n] = y, yd
+        core = settler.core.contents
+        core.hold = HELD
+        a, b = extended[0].copy(), extended[1].copy()
+        failed = lib.core.sd_settle_point(settler.core, self.start.t, lib.pointer(a), lib.pointer(b))
+        settled.failure.check()
+        if failed:
+            raise NotApplicableError("the nominal start does not settle")
+        jy, jyd = settled.jacobian(self.start.t, a[:n], b[:n])
+        core.hold, core.ready = HELD, 0
+        many.smallest = settler.linear.contents.smallest
+        regions, number = self._regions(self._settled(settler), [lib.core.sd_linear_pivoted(settler.linear)])
+        many.start, many.region, many.regions = c.addressof(core), c.addressof(regions), number
+        self._alive += [settler, settled]
+        many.y0, many.yd0 = self._kept(y.copy()), self._kept(yd.copy())
+        many.anchored = self._kept(found.astype(np.int32))
+        many.size = self._kept(made.magnitude[:n].copy())
+        many.jy0, many.jyd0 = self._kept(np.append(jy, 0.0)), self._kept(np.append(jyd, 0.0))
+        counts = 1 * _counts(settled, jy, settler.scale[:n]) + 2 * _counts(settled, jyd, self._rates(settler, n))
+        many.counts = self._kept(np.append(counts, 0).astype(np.int32))
+        many.jy, many.jyd = self._kept(np.zeros(jy.size + 1)), self._kept(np.zeros(jy.size + 1))
+        self._inertia(settled)
+
+    @staticmethod
+    def _rates(settler: Settler, n: int) -> Floats:
+        """Magnitudes of the rates [n]; 0 of those that occur nowhere."""
+        found = np.zeros(n)
+        found[settler.rates] = settler.scale[n:]
+        return found
+
+    def _inertia(self, settled: System) -> None:
+        """Where the entries of M stand (structure/inertia.py)."""
+        many, form = self.core, settled.form
+        n = form.written
+        flows = np.flatnonzero(settled.kinds[:n] == "f")
+        if flows.size > DENSE:
+            raise NotApplicableError(f"more than {DENSE} flows")
+        place = np.full(max(settled.unknowns, 1), -1, dtype=np.int64)
+        place[flows] = np.arange(flows.size)
+        families = {f.owner: k for k, f in enumerate(settled.description.families) if f.kind == "f"}
+        columns = settled.pattern.columns_of()
+        parts: list[tuple[Any, Any, Any, int, float]] = []
+        for group, family, first in form.groups:
+            row = settled.description.rows[family]
+            owner = families.get(row.owner)
+            if group not in ("dynamics", "momentum") or owner is None:
+                continue
+            here = (settled.pattern.row >= first) & (settled.pattern.row < first + row.size)
+            entries = np.flatnonzero(here & (place[columns] >= 0))
+            number = place[form.at[owner] + (settled.pattern.row[entries] - first)]
+            dynamic = group == "dynamics"
+            parts.append((number, place[columns[entries]], entries, int(dynamic), 1.0 if dynamic else -1.0))
+        sizes = [len(part[2]) for part in parts]
+
+        def joined_(k: int) -> Any:
+            return np.concatenate([np.zeros(0), *(np.asarray(part[k]) for part in parts)]).astype(np.int32)
+
+        many.flows, many.inertias = flows.size, sum(sizes)
+        many.inertia_row, many.inertia_column, many.inertia_entry = (self._kept(joined_(k)) for k in range(3))
+        rate = np.repeat(np.array([p[3] for p in parts], dtype=np.int32), sizes)
+        many.inertia_rate = self._kept(rate)
+        many.inertia_sign = self._kept(np.repeat(np.array([p[4] for p in parts], dtype=float), sizes))
+        many.inertia = self._kept(np.zeros(flows.size**2 + 1))
+
+    def _measure(self, longest: float, law: Any, draft: float, fine: float) -> None:
+        """Magnitudes, quantities, accuracy and room."""
+        many, options, runs, system = self.core, self.options, self.runs, self.system
+        n, columns = system.form.written, len(self.columns)
+        span = options.t_end - options.t_start
+        many.p, many.parameters = lib.pointer(system.description.p), system.description.p.size
+        many.written, many.columns, many.observed = n, columns, self.passes[1].observed
+        many.t0, many.t1 = options.t_start, options.t_end
+        number = alike(system)[:n].astype(np.int32)
+        state = np.isin(system.kinds[:n], ("q", "f", "p", "s")) & (system.nominal[:n] == 0.0)
+        many.alike, many.state = self._kept(number), self._kept(state.astype(np.int32))
+        many.alikes = int(number.max(initial=0)) + 1
+        many.tau = self.passes[1]._time
+        for k in (0, 1):
+            self._fill(k, min((STRETCH, 1.0)[k] * longest * span, options.longest or np.inf))
+        many.column = self._kept(np.array([column.place for column in runs.columns], dtype=np.int32))
+        many.target = self._kept(self._targets)
+        families = system.description.families
+        units: dict[str, int] = {}
+        own = [units.setdefault(column.unit, len(units)) for column in runs.columns]
+        of = np.full(n, -1, dtype=np.int32)
+        for family, first in zip(families, system.form.at, strict=False):
+            if family.size and first + family.size <= n and family.unit in units:
+                of[first : first + family.size] = units[family.unit]
+        many.unit, many.unit_of = self._kept(np.array(own, dtype=np.int32)), self._kept(of)
+        many.units, many.known = len(units), int(runs.common is not None)
+        asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
+        many.late = min(accuracy.TIMING, accuracy.SHARE * asked) * span
+        many.power, many.credit, many.finest = law.power, law.credit, law.finest
+        many.tolerance[0], many.tolerance[1] = draft, fine
+        many.max_steps = min(options.max_steps or 2**62, 2**62)
+        many.energy = allowed(options)
+        many.thin, many.thins = self._kept(np.append(self._thin, np.int32(-1))), self._thin.size
+        room = max(2 * MOST + 4, 0 if runs.common is None else runs.common.size + 4)
+        for k in range(3):
+            many.sample[k] = lib.RunSamples(
+                time=self._kept(np.zeros(room)),
+                value=self._kept(np.zeros(room * columns + 1)),
+                late=self._kept(np.zeros(room * columns + 1)),
+                number=0,
+                room=room,
+            )
+        many.kind = self._kept(np.zeros(room, dtype=np.int32))
+        many.work = self._kept(np.zeros(3 * system.unknowns + 4 * columns + 2 * len(units) + many.alikes + 8))
+
+    def _claims(self, claims: tuple[Claim, ...]) -> None:
+        """Expectations that the core looks at."""
+        place = {name: k for k, name in enumerate(self.runs.names)}
+        made = (lib.RunClaim * max(len(claims), 1))()
+        for k, claim in enumerate(claims):
+            within = -1 if claim.within is None else place[claim.within]
+            moment = {"always": 0, "finally": 1}.get(claim.moment, 2)
+            op = ("==", "!=", "<", "<=", ">", ">=").index(claim.operator)
+            made[k] = lib.RunClaim(moment, op, place[claim.left], place[claim.right], within, claim.at)
+        self._alive.append(made)
+        self.core.claim, self.core.claims = c.addressof(made), len(claims)
+
+    def run(self, p: Floats, anchor: Floats) -> Finished:
+        """Runs with numbers p [k, parameters] and initial values anchor [k, written] (guesses of all unknowns)."""
+        number, columns = len(p), len(self.columns)
+        p, anchor = np.ascontiguousarray(p), np.ascontiguousarray(anchor)
+        found = Finished(
+            np.zeros(number, dtype=np.int32),
+            np.zeros(number, dtype=np.int64),
+            np.zeros(number),
+            np.zeros(number),
+            np.full((number, columns), np.nan),
+            np.full((number, columns), np.nan),
+            np.full((number, columns), np.nan),
+            np.full((number, columns, self._thin.size), np.nan),
+        )
+        before = self.system.description.p.copy()
+        names = ("state", "steps", "estimate", "cpu", "end", "least", "most", "traces")
+        results = (lib.pointer(getattr(found, name)) for name in names)
+        lib.core.sd_many_runs(c.byref(self.core), number, lib.pointer(p), lib.pointer(anchor), *results)
+        self.system.description.p[:] = before
+        self.system.failure.check()
+        return found
+
+
+def _counts(system: System, values: Floats, scale: Floats) -> NDArray[np.bool_]:
+    """Which entries are more than round-off beside the largest of their row, in magnitudes of the unknowns [n]."""
+    size = np.abs(values) * scale[system.pattern.columns_of()]
+    largest = np.zeros(system.rows + 1)
+    np.maximum.at(largest, system.pattern.row, size)
+    return np.asarray((size > COUNTS * largest[system.pattern.row]) & (values != 0.0))
