@@ -150,10 +150,8 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
             raise ModelError(found)
     with _timed("descriptor", timings):
         lowered = replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation)
-        form, branches = with_book_signs(lowered), ()
-        if traced:
-            form, branches = frozen(form, network.place)
-            network = replace(network, parameters=(*network.parameters, *branches))
+        form, branches = frozen(with_book_signs(lowered), network) if traced else (with_book_signs(lowered), ())
+        network = replace(network, parameters=(*network.parameters, *branches))
         form = scaled(form)
         descriptor.verify_descriptor(form)
     with _timed("program", timings):

@@ -3,7 +3,7 @@
 The branch is a parameter (a number that events set), so a row is smooth while a piece lasts:
 
     LIVE    as the text says               ABOVE, BELOW    the branch of u > 0, of u < 0
-    SLIDES  u = 0 is held, and the text's value lies between its two branches: (1 + s)/2 of the one, (1 - s)/2 of the other
+    SLIDES  u = 0 is held, and the value lies between its two branches: (1 + s)/2 of the one, (1 - s)/2 of the other
 
 The sense s is an implicit unknown of its own, closed by the row  s - branch = 0, or u = 0 while it slides: the
 sliding of Filippov 1988 (Utkin's equivalent control, the same where rows are affine in s).  Only surfaces at which a
@@ -12,8 +12,10 @@ row jumps have one; a form without kinks is handed on as it is.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
+from sysdyn.compiler.forms.broken import broken
 from sysdyn.compiler.forms.descriptor import (
     BLOCKS,
     Block,
@@ -47,7 +49,7 @@ from sysdyn.dsl.model.expression import (
     topological,
     var,
 )
-from sysdyn.dsl.model.network import Parameter
+from sysdyn.dsl.model.network import Network, Parameter, Table
 from sysdyn.dsl.model.units import NONE, si
 from sysdyn.dsl.text.diagnostics import Place
 
@@ -55,15 +57,26 @@ LIVE, ABOVE, BELOW, SLIDES = 0.0, 1.0, -1.0, 2.0
 READ = ("observe", "observe_rate", "observe_scale", "initial")
 
 
-def frozen(form: DescriptorForm, place: Place) -> tuple[DescriptorForm, tuple[Parameter, ...]]:
-    """The form with frozen branches, and the parameters that hold them; place: of the model."""
-    found = surfaces(form)
+def frozen(form: DescriptorForm, network: Network) -> tuple[DescriptorForm, tuple[Parameter, ...]]:
+    """The form of a network with frozen branches, and the parameters that hold them."""
+    tables, place = {t.name: t for t in network.tables}, network.place
+    form = replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
+    found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction))
     if not found:
         return form, ()
     freezer = _Freezer(form, found)
     parameters = (Parameter(k.branch, (), si(NONE), (const(LIVE),), (), form.rows[s.row].place or place)
                   for k, s in zip(freezer.kinks, found, strict=True))  # fmt: skip
     return freezer.form(place), tuple(parameters)
+
+
+def _opened(block: Block, tables: Mapping[str, Table]) -> Block:
+    """A block with its tables of straight pieces written out."""
+    kernels = (
+        replace(k, rows=tuple(replace(s, expression=broken(s.expression, tables)) for s in k.rows))
+        for k in block.kernels
+    )
+    return replace(block, kernels=tuple(kernels))
 
 
 class _Freezer:
@@ -80,7 +93,7 @@ class _Freezer:
 
     def _settle_senses(self) -> None:
         """No sense where u has no rate, or where a row is not affine in it: sliding could not be solved for."""
-        for k, s in enumerate(self.surfaces):
+        for k in range(len(self.surfaces)):
             if self._rate(k) is None:
                 self.sense[k] = None
         for name in ("dynamics", "gamma", "lambda", "momentum", "phi", "psi", "phi_reaction", "psi_reaction"):
@@ -146,7 +159,8 @@ class _Freezer:
         mine = found.u in self.number
         if node.op == "cmp":
             level = ABOVE if (found.above is YES) == mine else BELOW
-            return either(both(compare("==", self.branch[k], const(LIVE)), live), compare("==", self.branch[k], const(level)))
+            as_said = both(compare("==", self.branch[k], const(LIVE)), live)
+            return either(as_said, compare("==", self.branch[k], const(level)))
         above, below = (self._again(n) for n in ((found.above, found.below) if mine else (found.below, found.above)))
         return self._branches(k, (above, below), live, held)
 
@@ -172,7 +186,8 @@ class _Freezer:
         between = add(mul(weight, self.done[then]), mul(sub(const(1.0), weight), self.done[other]))
         if held:
             return between
-        return conditional(either(*(compare("==", self.branch[k], const(SLIDES)) for k in slides)), between, live)
+        now = either(*(compare("==", self.branch[k], const(SLIDES)) for k in slides))
+        return conditional(now, between, live)
 
     def _weight(self, test: Node, held: bool) -> Node:
         """How much of a condition is true: 1 or 0, (1 + s)/2 of a relation that slides."""
@@ -236,10 +251,9 @@ class _Freezer:
         made = (*blocks, *(Block(name, (Kernel((), tuple(new)),)) for name, new in added.items()))
         order = {name: number for number, name in enumerate(BLOCKS)}
         ordered = sorted(made, key=lambda b: order.get(b.name, len(order)))
-        return replace(
-            self.before, families=(*families[:last], *senses, *families[last:]), rows=tuple(rows), blocks=tuple(ordered), shapes=tuple(shapes),
-            kinks=self.kinks,
-        )  # fmt: skip
+        with_senses = (*families[:last], *senses, *families[last:])
+        form = replace(self.before, families=with_senses, rows=tuple(rows), shapes=tuple(shapes), kinks=self.kinks)
+        return replace(form, blocks=tuple(ordered))
 
     def _block(self, block: Block, new: list[Summand]) -> Block:
         kernels = []

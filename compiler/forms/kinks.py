@@ -87,14 +87,18 @@ def watched(node: Node) -> Sided | None:
     return None if any(n.op in ("index", "reduce") for n in topological([found.u])) else found
 
 
-def surfaces(form: DescriptorForm) -> tuple[Surface, ...]:
-    """All surfaces at which a row is not smooth; none where they are more than MOST."""
+def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> tuple[Surface, ...]:
+    """All surfaces at which a row is not smooth; none where they are more than MOST.
+
+    directions: parameters of friction in the plane, which the contact itself keeps on one side.
+    """
     roots = list(_roots(form))
     first: dict[Node, int] = {}
     for root, row in roots:
         for node in topological([root]):
             found = watched(node)
-            if found is not None and neg(found.u) not in first:
+            own = found is not None and any(n.op == "param" and n.data in directions for n in topological([found.u]))
+            if found is not None and not own and neg(found.u) not in first:
                 first.setdefault(found.u, row)
     if not 0 < len(first) <= MOST:
         return ()

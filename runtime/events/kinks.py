@@ -1,8 +1,8 @@
 """Laws whose branch follows the sign of a switching function: which branch holds from an instant on.
 
-The branch stands in p (compiler/forms/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero.  A branch
-fits where its function has that sign, or is zero and does not move to the other side; where both branches drive it back,
-the law slides between them (Filippov 1988), and leaves by the side whose sense reaches 1.
+The branch stands in p (compiler/forms/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero.  A
+branch fits where its function has that sign, or is zero and does not move to the other side; where both branches drive
+it back, the law slides between them (Filippov 1988), and leaves by the side whose sense reaches 1.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Kinks:
         self._turned = {}
 
     def begin(self, values: Floats) -> bool:
-        """Branches by the values of a start at which all are live; whether one law jumps, so that it may follow anew."""
+        """Branches by the values of a start at which all are live; whether a law jumps, so that all is found anew."""
         for kink in self.kinks:
             on = abs(values[kink.value]) <= self.observer.zero(kink.value)
             self.p[kink.branch] = (ABOVE if kink.jumps else LIVE) if on else np.sign(values[kink.value])
