@@ -41,6 +41,10 @@ class Determined:
     def _singular(self, t: float, y: Floats, yd: Floats) -> bool:
         return self._system.unknowns <= DENSE and self.nullity(t, y, yd) > 0
 
+    def leaves(self, t: float, y: Floats, yd: Floats) -> int:
+        """The same, 0 of models too large to ask."""
+        return self.nullity(t, y, yd) if self._system.unknowns <= DENSE else 0
+
     def nullity(self, t: float, y: Floats, yd: Floats) -> int:
         """How many directions the equations with the present active set leave open."""
         key = tuple(self.contacts.active.tolist())

@@ -327,23 +327,36 @@ class Handler:
     def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
         """The point with the active set that fits a little later, None where none differs.
 
-        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.
+        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.  A set that leaves
+        something open (both arms of a bridge) is one that nothing has told apart yet: it is taken where none is better.
         """
-        assert self.restart is not None
         y, yd = point
-        kept = self.contacts.active.copy(), self.p.copy()
+        kept, open_ = (self.contacts.active.copy(), self.p.copy()), None
         for later in AHEAD:
             time = later * self.contacts.time
-            try:
-                self.determined.fit(t + time, y + time * yd, yd, self.restart.struck)
-            except NoActiveSetError:
-                continue
-            found = self.restart.struck(t, y, yd) if self.contacts.state() != stood else None
-            if found is not None:
-                return found[0], found[1]
+            found = self._later(t, time, (y, yd), stood)
+            if found is not None and self.determined.leaves(t, *found) == 0:
+                return found
+            if found is not None and open_ is None:
+                open_ = found, self.contacts.active.copy(), self.p.copy()
             self.contacts.active[:], self.p[:] = kept
             self.contacts.apply()
-        return None
+        if open_ is None:
+            return None
+        self.contacts.active[:], self.p[:] = open_[1:]
+        self.contacts.apply()
+        return open_[0]
+
+    def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...]) -> Point | None:
+        """The point at t with the active set that fits `time` (s) later; None where that is the one that stood."""
+        assert self.restart is not None
+        y, yd = point
+        try:
+            self.determined.fit(t + time, y + time * yd, yd, self.restart.struck)
+        except NoActiveSetError:
+            return None
+        found = self.restart.struck(t, y, yd) if self.contacts.state() != stood else None
+        return None if found is None else (found[0], found[1])
 
     def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
         assert self.restart is not None
