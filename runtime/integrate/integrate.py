@@ -299,7 +299,7 @@ class Integration:
         lib.core.sd_run_restart(self.run_, t, label, *pointers)
 
     def _resolve(self, t: float) -> None:
-        """No magnitude asks for more than round-off leaves: contents that have grown are summed where flows are zero."""
+        """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero."""
         jy, _ = self.system.jacobian(t, self.y, self.yd)
         open_ = np.where(self._carries, 0.0, noise(self.system, self.y, jy, self._time))
         np.maximum(self.magnitude, UNRESOLVED * open_ / max(self.request.rtol, 1e-15), out=self.magnitude)
