@@ -65,7 +65,7 @@ def judge(folder, drawn, **options):
         return verdict("hung", f"not ended after {LONGEST} s")
     except ModelError as error:
         return verdict("refused", str(error.diagnostics[0].message))
-    except Exception as error:  # noqa: BLE001 (whatever it is, it is a fault)
+    except Exception as error:
         return verdict("fault", f"{type(error).__name__}: {error}")
     said = "; ".join(f"{d.code} {d.message}" for d in report.diagnostics if d.severity == "error")
     if found is None:

@@ -136,7 +136,8 @@ def sampled(dice):
     """A mass that a sampled PI controller with limits moves to its set point."""
     m, ts = _log(dice, 0.5, 5), _log(dice, 5e-3, 5e-2)
     kp, kd, ki = 4.0 * m, 3.0 * m, 0.5 * m
-    body = ["coord x: translation = 0 m", f"energy T* = 1/2*({m} kg)*x'^2", "discrete F: N = 0 N", "discrete I: N = 0 N"]
+    body = ["coord x: translation = 0 m", f"energy T* = 1/2*({m} kg)*x'^2"]
+    body += ["discrete F: N = 0 N", "discrete I: N = 0 N"]
     body += [f"every {ts} s {{"]
     body += [f"  I := clip(I + ({ki * ts:g} N/m)*(1 m - x), -1 N, 1 N)"]
     body += [f"  F := clip(({kp:g} N/m)*(1 m - x) - ({kd:g} N.s/m)*x' + I, -{m:g} N, {m:g} N)", "}"]
