@@ -23,6 +23,7 @@ from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.conjugates import with_book_signs
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.forms.floating import anchored
+from sysdyn.compiler.forms.frozen import frozen
 from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
@@ -155,7 +156,9 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
             raise ModelError(found)
     with _timed("descriptor", timings):
         lowered = replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation)
-        form = scaled(with_book_signs(lowered))
+        form, branches = frozen(with_book_signs(lowered), network) if traced else (with_book_signs(lowered), ())
+        network = replace(network, parameters=(*network.parameters, *branches))
+        form = scaled(form)
         descriptor.verify_descriptor(form)
     with _timed("program", timings):
         program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))

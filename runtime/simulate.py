@@ -220,7 +220,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
         return replace(way, reason=NOT_STIFF), replace(way, method="radau"), replace(way, method="bdf")
     if options.index != "auto":
         return replace(way, reason=f"index {way.name} was asked for"), other
-    if options.events:
+    if options.events and not options.events.bends:
         return replace(way, reason="events"), other
     if way.system.form.scales or written.left_out:
         return replace(way, reason="steep laws" if way.system.form.scales else "redundant constraints"), other

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.binding.binding import places_of
+from sysdyn.compiler.forms.descriptor import Frozen
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Event, Switch
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
-from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Happened, Plan, Relation, Sampled, When
+from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Happened, Kink, Plan, Relation, Sampled, When
 from sysdyn.runtime.model.description import RowFamily, element
 from sysdyn.runtime.model.system import System
 
@@ -21,7 +22,7 @@ ZENO = 8
 def plan(prepared: Prepared, system: System, rest: float = 1e-6) -> Plan:
     """The plan of a bound model; ModelError where the values make none.  rest: see plan.Plan."""
     network = prepared.network
-    if not network.events and not network.switches:
+    if not network.events and not network.switches and not prepared.compiled.form.kinks:
         return Plan()
     return _Planner(prepared, system).plan(rest)
 
@@ -64,7 +65,14 @@ class _Planner:
         contacts = tuple(self._contact(k, s) for k, s in enumerate(network.switches))
         limits = dict(network.scene.limits) if network.scene else {}
         limit = round(self.prepared.binding.evaluate(limits["events"])) if "events" in limits else None
-        return Plan(tuple(self.relations), whens, sampled, contacts, limit, rest)
+        kinks = tuple(self._kink(k) for k in self.prepared.compiled.form.kinks)
+        return Plan(tuple(self.relations), whens, sampled, contacts, kinks, limit, rest)
+
+    def _kink(self, k: Frozen) -> Kink:
+        rate = -1 if k.rate is None else self.row[k.rate]
+        above, below = (self.row[name] for name in k.slide) if k.slide else (-1, -1)
+        branch = self.prepared.compiled.program.scalars.index(k.branch)
+        return Kink(k.text, k.label, branch, self.row[k.value], rate, above, below, k.jumps)
 
     def _when(self, event: Event) -> When:
         assert event.condition is not None

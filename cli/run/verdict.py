@@ -34,10 +34,11 @@ _CAUSES = {
     "max_events": ("E934", "the limit of events is reached"),
     "chatter": ("E930", "events follow each other without end at one instant"),
     "complementarity": ("E930", "no set of constraints that hold fits: each one asks for another"),
+    "slides": ("E930", "a law jumps there and both its branches drive it back: no motion follows either"),
     "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }
-_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict")
+_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict", "slides")
 _REMEDIES = {
     "E704": "one event for both, or conditions that do not become true together",
     "E930": "another --method or --index, a looser --accuracy, or a smoother law there",

@@ -20,10 +20,11 @@ from sysdyn.dsl.text.diagnostics import Place
 
 
 def structure(form: DescriptorForm, program: Program, network: Network) -> dict[str, Any]:
-    """What the runtime needs beside the code: families, rows, blocks, constraints that hold at times; no numbers of a
-    binding.
+    """What the runtime needs beside the code: families, rows, blocks, constraints that hold at times, places in p of
+    laws that may slide; no numbers of a binding.
     """
     return {
+        "branches": [program.scalars.index(k.branch) for k in form.kinks if k.slide],
         "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches],
         "families": [_family(f) for f in form.families],
         "rows": [_row(r) for r in form.rows],
@@ -74,6 +75,7 @@ def manifest(
 ) -> dict[str, Any]:
     """The object of manifest.json."""
     scene = network.scene.name if network.scene is not None else None
+    branches = {k.branch for k in form.kinks}
     return {
         "version": 1,
         "model": network.model,
@@ -85,6 +87,7 @@ def manifest(
         "parameters": [
             {"name": p.name, "unit": p.unit.text, "value": _plain(_in_unit(binding.values[p.name], p.unit))}
             for p in network.parameters
+            if p.name not in branches
         ],
         "structure": structure(form, program, network),
     }

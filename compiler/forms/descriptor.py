@@ -111,6 +111,23 @@ class Pin:
 
 
 @dataclass(frozen=True, slots=True)
+class Frozen:
+    """A switching function whose branch events set (frozen.py): the parameter that holds it, its text, the row that it
+    stands in; rows of block observe: value, rate, 1 - sense and 1 + sense (() where it does not slide); jumps: whether
+    a row does at its zero.
+    """
+
+    branch: str
+    text: str
+    label: str
+    place: Place | None
+    value: str
+    rate: str | None
+    slide: tuple[str, ...]
+    jumps: bool
+
+
+@dataclass(frozen=True, slots=True)
 class DescriptorForm:
     """One formulation: unknowns in the order of `at`, rows in the order of `to`."""
 
@@ -123,6 +140,7 @@ class DescriptorForm:
     shapes: tuple[tuple[str, Shape], ...]  # of coordinates, unknowns, states, rows `initial` and `ledger`, by owner
     hulls: tuple[tuple[str, tuple[tuple[tuple[Node, ...], Nest, Place], ...]], ...]  # where each label is declared
     covers: tuple[tuple[str, tuple[tuple[Nest, Node], ...]], ...] = ()  # families that momenta cover in part
+    kinks: tuple[Frozen, ...] = ()
 
     def block(self, name: str) -> Block | None:
         """The block of that name; None where it has no rows."""

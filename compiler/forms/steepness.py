@@ -21,11 +21,37 @@ NONNEGATIVE = frozenset(("exp", "cosh", "abs", "hypot", "step"))
 
 def steep(root: Node) -> bool:
     """Whether an unknown enters by anything but sums, products, constant powers and mild functions."""
-    for node in topological([root]):
+    for node in _met(root):
         mild = node.op in ("sum", "mul", "var", "reduce") or (node.op == "call" and node.data in MILD)
-        if not mild and any(v.op == "var" for v in variables(node)):
+        if not mild and not _frozen(node) and any(v.op == "var" for v in variables(node)):
             return True
     return False
+
+
+def _live(node: Node) -> bool:
+    """Whether a relation says that a branch is as the text says (frozen.py): while a piece lasts it is not."""
+    named = node.op == "cmp" and node.args[0].op == "param" and node.args[0].data.startswith("#branch")
+    return named and node.args[1].op == "const" and node.args[1].data == 0.0
+
+
+def _frozen(node: Node) -> bool:
+    """Whether a conditional, or a condition, changes at events alone."""
+    met = _met(node.args[0] if node.op == "cond" else node)
+    return node.op in ("cond", "and", "or", "not") and not any(n.op == "var" for n in met)
+
+
+def _met(root: Node) -> list[Node]:
+    """The nodes below root that count while branches are frozen."""
+    found: dict[Node, None] = {}
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        if node in found:
+            continue
+        found[node] = None
+        live = node.op in ("cond", "and") and _live(node.args[0])
+        stack += node.args if not live else (node.args[2:] if node.op == "cond" else ())
+    return list(found)
 
 
 def magnitude(root: Node) -> Node:

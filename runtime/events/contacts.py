@@ -26,6 +26,8 @@ FAINT = 1e-3
 """Of the magnitude of an unknown."""
 NEAR, BESIDE = 3, 60
 """Members that change at once, and trials, where an active set contradicts itself."""
+MANY = 2
+"""Diodes that change at once, at least: fewer are turned one by one."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
 
@@ -124,7 +126,7 @@ class Contacts:
         contact = self.contacts[k]
         self.active[k] = not self.active[k]
         if contact.kind == "friction":
-            self.p[contact.sense] = 0.0 if self.active[k] else np.sign(values[contact.multiplier])
+            self.p[contact.sense] = 0.0 if self.active[k] else np.sign(values[contact.multiplier]) or 1.0
         elif contact.kind == "planar":
             self._direct(contact, values[list(contact.aim[2:4])])
             self.p[contact.sense] = 0.0 if self.active[k] else 1.0
@@ -137,19 +139,22 @@ class Contacts:
 
     def wrong(self, values: Floats, impulses: Floats) -> int:
         """The first contact whose condition does not hold; -1 where all do."""
+        return next(self._wrongs(values, impulses), -1)
+
+    def _wrongs(self, values: Floats, impulses: Floats) -> Iterator[int]:
+        """Contacts whose condition does not hold."""
         for k, contact in enumerate(self.contacts):
             test = _TESTS.get(contact.kind, Contacts._unilateral)
             if contact.kind == "follows":
                 continue
             if contact.kind == "guarded":
                 if bool(values[contact.guard]) != bool(self.active[k]):
-                    return k
+                    yield k
             elif self.bar(k, values):
                 if self.active[k]:
-                    return k
+                    yield k
             elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
-                return k
-        return -1
+                yield k
 
     def bar(self, k: int, values: Floats) -> bool:
         """Whether the guard of an inequality says that it is not there."""
@@ -173,6 +178,8 @@ class Contacts:
 
     def _friction(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero, sense = self.observer.zero, float(self.p[c.sense])
+        if values[c.bound] == 0.0:  # no friction: it does not hold, whatever holds the bodies (a latch, another law)
+            return bool(self.active[k] or sense == 0.0)
         if self.active[k]:
             return bool(abs(values[c.multiplier]) > values[c.bound] * (1.0 + 1e-9) + zero(c.multiplier))
         if sense == 0.0:
@@ -196,6 +203,7 @@ class Contacts:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
         seen: set[tuple[float, ...]] = set()
         changed: list[int] = []
+        fewest = len(self.contacts)
         for _ in range(TRIALS * (1 + len(self.contacts))):
             self.apply()
             state = self.state()
@@ -206,11 +214,15 @@ class Contacts:
             if found is None:
                 break
             values = self.observer(t, found[0], found[1])
-            k = self.wrong(values, found[2])
-            if k < 0:
+            wrong = list(self._wrongs(values, found[2]))
+            if not wrong:
                 return found[0], found[1]
-            changed.append(k)
-            self.turn(k, values)
+            # diodes all at once while they become fewer (Judice and Pires 1994), else the first
+            block = MANY < len(wrong) < fewest and all(self.contacts[k].kind == "psi" for k in wrong)
+            fewest = min(fewest, len(wrong))
+            for k in wrong if block else wrong[:1]:
+                changed.append(k)
+                self.turn(k, values)
         names = dict.fromkeys(self.contacts[k].name for k in changed[-6:] or range(min(len(self.contacts), 6)))
         raise NoActiveSetError(tuple(names))
 

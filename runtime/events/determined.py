@@ -14,12 +14,15 @@ from functools import cached_property
 import numpy as np
 from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError, Settle
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 
 DENSE = 300
 """Unknowns up to which matrices are full; larger models are taken as they come."""
+NOTHING = 1e-9
+"""Of a unit vector: a contact's share of what is open."""
 GENERIC = 0.7310585786300049
 """Of dF/dyd beside dF/dy: at it a regular pencil is a regular matrix."""
 
@@ -32,7 +35,7 @@ class Determined:
     def __init__(self, contacts: Contacts) -> None:
         self.contacts = contacts
         contacts.singular = self._singular
-        self._regular: dict[tuple[bool, ...], int] = {}
+        self._regular: dict[tuple[bool, ...], tuple[int, Floats]] = {}
 
     @cached_property
     def _system(self) -> System:
@@ -41,17 +44,34 @@ class Determined:
     def _singular(self, t: float, y: Floats, yd: Floats) -> bool:
         return self._system.unknowns <= DENSE and self.nullity(t, y, yd) > 0
 
+    def leaves(self, t: float, y: Floats, yd: Floats) -> int:
+        """The same, 0 of models too large to ask."""
+        return self.nullity(t, y, yd) if self._system.unknowns <= DENSE else 0
+
     def nullity(self, t: float, y: Floats, yd: Floats) -> int:
         """How many directions the equations with the present active set leave open."""
+        return self._open(t, y, yd)[0]
+
+    def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats]:
+        """The same; how much the row of each contact has to do with it [contacts]: what has nothing cannot close it."""
         key = tuple(self.contacts.active.tolist())
         if key not in self._regular:
             system, n = self._system, self._system.form.written
             jy, jyd = system.jacobian(t, y[:n], yd[:n])
             if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
-                return 0
+                return 0, np.zeros(len(key))
             e, b = equilibrated(system.dense(jyd), system.dense(jy))
-            sigma = decomposed(b + GENERIC * e)[1]
-            self._regular[key] = sigma.size - count(sigma, CERTAIN)
+            left, sigma, _ = decomposed(b + GENERIC * e)
+            some = count(sigma, CERTAIN)
+            part = np.zeros(len(key))
+            if some < sigma.size:
+                rows, _, number, _ = switch_rows(system.description, system.form)
+                share = np.linalg.norm(left[rows, some:], axis=1)
+                at = np.array([c.number for c in self.contacts.contacts])
+                total = np.zeros(len(system.description.switches.places))
+                np.maximum.at(total, number, share)
+                part = total[at]
+            self._regular[key] = sigma.size - some, part
         return self._regular[key]
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle, turned: Sequence[int] = ()) -> Point:
@@ -75,8 +95,10 @@ class Determined:
         """Points of neighbouring active sets that fit too and leave less open."""
         contacts, (open_, turned) = self.contacts, what
         values, before = contacts.observer(t, *point), contacts.active.copy()
+        part = self._open(t, *point)[1]
+        order = [k for k in np.argsort(-part, kind="stable") if part[k] > NOTHING]
         for pivots in (False, True):
-            for k in sorted(range(len(contacts.contacts)), key=lambda k: k in turned):
+            for k in sorted(order, key=lambda k: k in turned):
                 contact = contacts.contacts[k]
                 small = abs(values[contact.value]) <= contacts.observer.zero(contact.value)
                 if contact.kind not in ("psi", "phi") or not small:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
 from sysdyn.runtime.events.determined import Determined
+from sysdyn.runtime.events.kinks import Kinks, NoBranchError
 from sysdyn.runtime.events.locate import Dense, crossing
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Assignment, Condition, Happened, Plan
@@ -43,12 +44,13 @@ Standing = tuple[Floats, NDArray[np.bool_]]
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """A row of block observe on the side 1 or -1 of zero; relation or contact: whose it is, the other -1."""
+    """A row of block observe on the side 1 or -1 of zero; relation, contact or kink: whose it is, the others -1."""
 
     relation: int
     contact: int
     row: int
     side: int
+    kink: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,7 @@ class Handler:
         self.observer = Observer(system, rtol)
         self.contacts = Contacts(plan.contacts, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
+        self.kinks = Kinks(plan.kinks, self.observer, self.p)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
         self.bounces: dict[int, Bounce] = {}
@@ -116,6 +119,8 @@ class Handler:
                 found.append(Watched(-1, k, c.upper if sticks else c.value, 1))
             elif c.kind in ("phi", "psi"):
                 found.append(Watched(-1, k, c.multiplier if sticks else c.value, 1))
+        for k in range(len(self.plan.kinks)):
+            found += [Watched(-1, -1, row, side, k) for row, side in self.kinks.rows(k)]
         return found
 
     def core(self) -> Any:
@@ -134,8 +139,10 @@ class Handler:
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], 1.0)
         self.truth = [self._holds(w.condition, ()) for w in self.plan.whens]
-        due = self.due(t)
-        return self.fire(t, y, yd, due) if due else None
+        due, anew = self.due(t), self.kinks.begin(values)
+        if due:
+            return self.fire(t, y, yd, due)
+        return self.settled(t, y, yd, self._words()) if anew else None
 
     def _side(self, k: int, value: float, before: float) -> float:
         relation = self.plan.relations[k]
@@ -191,6 +198,9 @@ class Handler:
 
     def _rate(self, watched: Watched) -> int:
         """The row of the rate of what is watched, where there is one."""
+        if watched.kink >= 0:
+            kink = self.plan.kinks[watched.kink]
+            return kink.rate if watched.row == kink.value else -1
         if watched.contact < 0:
             return -1
         contact = self.plan.contacts[watched.contact]
@@ -201,12 +211,15 @@ class Handler:
     ) -> Point | None:
         """The point after everything that happens at t; None where nothing changes.  which: of the watched."""
         self._count(t)
-        said = [self.contacts.word(k) for k in range(len(self.plan.contacts))]
+        said, stood = self._words(), self.kinks.state()
+        self.kinks.anew()
         crossed = [w.relation for w in which if w.relation >= 0]
         for w in which:
             if w.relation >= 0:
                 self.side[w.relation] = -float(w.side)
-        changed = bool(samples)
+            if w.kink >= 0:
+                self.kinks.cross(w.kink, w.row, w.side)
+        changed = bool(samples) or any(w.kink >= 0 for w in which)
         y, yd = y.copy(), yd.copy()
         assigned: list[tuple[str, tuple[Assignment, ...]]] = [
             (self.plan.sampled[k].name, self.plan.sampled[k].assignments) for k in samples
@@ -224,7 +237,9 @@ class Handler:
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
         if not (changed or touched):
             return None
-        return self._followed(t, self.settled(t, y, yd, said, touched))
+        point = self._followed(t, self.settled(t, y, yd, said, touched))
+        self.happened += self.kinks.happened(t, stood)
+        return point
 
     def _followed(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""
@@ -232,13 +247,37 @@ class Handler:
             fired = self._risen(())
             if not fired:
                 return point
-            said = [self.contacts.word(k) for k in range(len(self.plan.contacts))]
+            said = self._words()
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
             self._renew(t, y, point[1])
             point = self.settled(t, y, point[1], said)
         raise SolverFailure("chatter", t, 0.0, self._names())
 
     def settled(
+        self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
+    ) -> Point:
+        """The consistent point with the constraints and the branches that hold from now on."""
+        point = self._constrained(t, y, yd, said, touched)
+        try:
+            while self.kinks.turn(self.observer(t, *point)):
+                point = self._constrained(t, *point, self._words())
+        except NoBranchError as error:
+            raise SolverFailure("slides" if error.pushed else "chatter", t, 0.0, ", ".join(error.names)) from error
+        return point
+
+    def anew(self, t: float, y: Floats, yd: Floats) -> Point:
+        """The point behind an instant at which nothing but the text jumps."""
+        stood = self.kinks.state()
+        self.kinks.anew()
+        point = self.settled(t, y, yd, self._words())
+        self.happened += self.kinks.happened(t, stood)
+        return point
+
+    def _words(self) -> list[str]:
+        """How the contacts stand."""
+        return [self.contacts.word(k) for k in range(len(self.plan.contacts))]
+
+    def _constrained(
         self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
     ) -> Point:
         """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
@@ -288,23 +327,36 @@ class Handler:
     def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
         """The point with the active set that fits a little later, None where none differs.
 
-        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.
+        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.  A set that leaves
+        something open (both arms of a bridge) is one that nothing has told apart yet: it is taken where none is better.
         """
-        assert self.restart is not None
         y, yd = point
-        kept = self.contacts.active.copy(), self.p.copy()
+        kept, open_ = (self.contacts.active.copy(), self.p.copy()), None
         for later in AHEAD:
             time = later * self.contacts.time
-            try:
-                self.determined.fit(t + time, y + time * yd, yd, self.restart.struck)
-            except NoActiveSetError:
-                continue
-            found = self.restart.struck(t, y, yd) if self.contacts.state() != stood else None
-            if found is not None:
-                return found[0], found[1]
+            found = self._later(t, time, (y, yd), stood)
+            if found is not None and self.determined.leaves(t, *found) == 0:
+                return found
+            if found is not None and open_ is None:
+                open_ = found, self.contacts.active.copy(), self.p.copy()
             self.contacts.active[:], self.p[:] = kept
             self.contacts.apply()
-        return None
+        if open_ is None:
+            return None
+        self.contacts.active[:], self.p[:] = open_[1:]
+        self.contacts.apply()
+        return open_[0]
+
+    def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...]) -> Point | None:
+        """The point at t with the active set that fits `time` (s) later; None where that is the one that stood."""
+        assert self.restart is not None
+        y, yd = point
+        try:
+            self.determined.fit(t + time, y + time * yd, yd, self.restart.struck)
+        except NoActiveSetError:
+            return None
+        found = self.restart.struck(t, y, yd) if self.contacts.state() != stood else None
+        return None if found is None else (found[0], found[1])
 
     def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
         assert self.restart is not None

@@ -79,6 +79,24 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
+class Kink:
+    """A switching function: where it is zero, a law changes its branch.
+
+    value, rate: rows (rate -1 where it has none); branch: place in p, see kinks.py; above, below: rows 1 - sense and
+    1 + sense of a law that jumps and may slide between its branches (else -1); element: whose law.
+    """
+
+    name: str
+    element: str
+    branch: int
+    value: int
+    rate: int = -1
+    above: int = -1
+    below: int = -1
+    jumps: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """limit: of events; rest: an impact left slower than this part of the fastest is the last."""
 
@@ -86,11 +104,18 @@ class Plan:
     whens: tuple[When, ...] = ()
     sampled: tuple[Sampled, ...] = ()
     contacts: tuple[Contact, ...] = ()
+    kinks: tuple[Kink, ...] = ()
     limit: int | None = None
     rest: float = 1e-6
 
     def __bool__(self) -> bool:
-        return bool(self.whens or self.sampled or self.contacts)
+        return bool(self.whens or self.sampled or self.contacts or self.kinks)
+
+    @property
+    def bends(self) -> bool:
+        """Whether laws change their branches, and nothing else happens."""
+        others = self.whens or self.sampled or self.contacts
+        return bool(self.kinks) and not others and not any(kink.jumps for kink in self.kinks)
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ from sysdyn.runtime.integrate.unknown_roles import Roles, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
-from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, unresolved
+from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise, unresolved
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.runtime.start.settled import Settler
@@ -63,6 +63,7 @@ class Integration:
         # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, start.t, jyd, request.index)
+        self._carries = self.roles.state
         state = np.isin(system.kinds, ("q", "f"))
         # a tolerance below what round-off leaves open is one that no step meets
         self._least = np.where(state, UNRESOLVED * unresolved(system, self.y, jy), 0.0) / max(request.rtol, 1e-15)
@@ -295,8 +296,15 @@ class Integration:
         self.y[:n], self._start_rate[:n] = point
         self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
         self.begin_to_move(t)
+        self._resolve(t)
         pointers = (lib.pointer(item) for item in (self.y, self.yd, *before))
         lib.core.sd_run_restart(self.run_, t, label, *pointers)
+
+    def _resolve(self, t: float) -> None:
+        """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero."""
+        jy, _ = self.system.jacobian(t, self.y, self.yd)
+        open_ = np.where(self._carries, 0.0, noise(self.system, self.y, jy, self._time))
+        np.maximum(self.magnitude, UNRESOLVED * open_ / max(self.request.rtol, 1e-15), out=self.magnitude)
 
     def begin_to_move(self, t: float) -> None:
         """Unknowns that stood at zero so far, of unknown size, and whose rates say only now how large they will be."""

@@ -156,10 +156,9 @@ class Pieces:
 
     def jump(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
         """The point behind an instant at which the text jumps."""
-        said = [self.handler.contacts.word(k) for k in range(len(self.handler.plan.contacts))]
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
-        point = found or self.handler.settled(t, y, yd, said)
+        point = found or self.handler.anew(t, y, yd)
         self._bounce(t)
         self._watch()
         return point

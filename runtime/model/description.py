@@ -134,7 +134,8 @@ class Initial:
 @dataclass(frozen=True, slots=True)
 class Description:
     """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts, orders: of the index
-    forms made so far (model/system.py, integrate/relaxation.py), which need be found once.
+    forms made so far (model/system.py, integrate/relaxation.py), which need be found once; branches: places in p of
+    laws that may slide (events/kinks.py).
     """
 
     families: tuple[Family, ...]
@@ -144,6 +145,7 @@ class Description:
     ix: Ints
     initial: tuple[Initial, ...]
     switches: Switches
+    branches: tuple[int, ...] = ()
     layouts: dict[Any, Any] = field(default_factory=dict, compare=False, init=False)
     orders: dict[Any, Ints] = field(default_factory=dict, compare=False, init=False)
 
@@ -264,6 +266,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         ix=np.ascontiguousarray(binding["ix"], dtype=np.int32),
         initial=tuple(_initial(item, names) for item in binding.get("initial", ())),
         switches=Switches(tuple(_switched(item, families, shapes) for item in structure.get("switches", ()))),
+        branches=tuple(int(place) for place in structure.get("branches", ())),
     )
 
 

@@ -195,6 +195,34 @@ def unresolved(system: System, y: Floats, jy: Floats) -> Floats:
     return found
 
 
+def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
+    """What round-off leaves open of each unknown [unknowns] in steps of `time` (s): flows are differences of their
+    displacements over it, and multipliers balance what flows make of that.
+    """
+    rows, columns = system.pattern.row.astype(np.int64), system.pattern.columns_of()
+    form, found = system.form, unresolved(system, y, jy)
+    found[form.k_f] = np.maximum(found[form.k_f], found[form.k_q] / time)
+    balance = np.zeros(system.rows, dtype=bool)
+    for group, family, first in form.groups:
+        if group == "dynamics":
+            balance[first : first + system.description.rows[family].size] = True
+    slope = np.where(np.isfinite(jy), np.abs(jy), 0.0)
+    take = balance[rows] & (slope > 0.0)
+    i, j, slope = rows[take], columns[take], slope[take]
+    multiplier = np.isin(system.kinds[j], ("kappa", "mu", "e"))
+    leading = np.zeros(system.rows)
+    np.maximum.at(leading, i[multiplier], slope[multiplier])
+    told = multiplier & (slope >= GROUP * leading[i])
+    for _ in range(_SWEEPS):
+        row = np.zeros(system.rows)
+        np.maximum.at(row, i, slope * np.where(multiplier | (system.kinds[j] == "f"), found[j], 0.0))
+        before = found.copy()
+        np.maximum.at(found, j[told], row[i[told]] / slope[told])
+        if (found == before).all():
+            break
+    return found
+
+
 def _with_momentum(system: System) -> NDArray[np.bool_]:
     """Unknowns of coordinates whose momenta are unknowns [unknowns]."""
     families = system.description.families

@@ -39,6 +39,10 @@ class Layout:
     reads_rate: Ints
 
 
+SETS = 4096
+"""Active sets whose rows are kept."""
+
+
 class System:
     """A model in one index form.  y, yd [unknowns], r [rows]; all in SI units."""
 
@@ -160,20 +164,31 @@ class System:
             v=lib.pointer(self._scratch),
             stop=lib.pointer(self.failure.flag),
         )
+        self._sets: dict[bytes, tuple[Any, Any]] = {}
         self.switch()
         self.description.switches.join(self)
 
     def switch(self) -> None:
         """Rows of constraints that do not hold read "multiplier = 0"."""
+        key = self.description.switches.active.tobytes()
+        if key not in self._sets:
+            if len(self._sets) >= SETS:
+                self._sets.clear()
+            self._sets[key] = self._set_of_rows()
+        self._held, pointers = self._sets[key]
+        self.held, cleared = self._held[:2], self._held[4]
+        core = self.core
+        core.held, core.clear = self.held[0].size, cleared.size
+        core.held_row, core.held_unknown, core.held_slot, core.held_rate, core.cleared = pointers
+
+    def _set_of_rows(self) -> tuple[Any, Any]:
+        """Arrays of the present active set, and their addresses."""
         rows, unknowns, slots, number = self._may_hold
         now = (number < 0) | ~np.append(self.description.switches.active, True)[number]
-        self.held = row, unknown = rows[now], unknowns[now]
+        row, unknown = rows[now], unknowns[now]
         cleared = np.flatnonzero(np.isin(self.pattern.row, row)).astype(np.int32)
-        self._held = row, unknown, slots[now].copy(), self._reads_rate[now], cleared
-        core = self.core
-        core.held, core.clear = row.size, cleared.size
-        arrays = map(lib.pointer, self._held)
-        core.held_row, core.held_unknown, core.held_slot, core.held_rate, core.cleared = arrays
+        held = row, unknown, slots[now].copy(), self._reads_rate[now], cleared
+        return held, tuple(map(lib.pointer, held))
 
     def idle_multipliers(self) -> Ints:
         """Places of the multipliers of constraints that do not hold now."""

@@ -25,6 +25,9 @@ MAX_INDEX = 6
 ROUSED = 1e-2
 """Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""
 
+SLIDES = 2.0
+"""Of a branch (events/kinks.py)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Structure:
@@ -157,10 +160,23 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
     return pencil_index(system.dense(jyd), system.dense(jy)), ()
 
 
+def _sliding_index(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
+    """The index that the model may come to where laws slide that can: whose sense their function's rate contains."""
+    p, (index, undetermined) = system.description.p, index_of(system, state)
+    for place in system.description.branches:
+        before = p[place]
+        p[place] = SLIDES
+        most, _ = index_of(system, state)
+        p[place] = before
+        if index is not None and most == 2:
+            index = max(index, most)
+    return index, undetermined
+
+
 def _highest_index(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
     """The index that the model may come to, with every constraint that may hold, as far as they are independent."""
     switches = system.description.switches
-    index, undetermined = index_of(system, state)
+    index, undetermined = _sliding_index(system, state)
     if not switches.places or index is None:
         return index, undetermined
     before = switches.active.copy()

@@ -1,0 +1,80 @@
+"""Tables of straight pieces, and the held ends of smooth ones, as conditionals: their nodes are switching functions.
+
+    linear, hold     c0 + c1 (u - x_k) between two nodes
+    pchip, cubic     the table between its ends, held outside
+
+A method of higher order crosses a corner at the cost of many small steps; kinks.py watches each node instead.  Tables
+of many nodes stay tables, as do those of two arguments and those that stop a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from sysdyn.dsl.model.expression import (
+    Node,
+    compare,
+    conditional,
+    const,
+    linear,
+    rebuild,
+    sub,
+    topological,
+    variables,
+)
+from sysdyn.dsl.model.expression import table as looked_up
+from sysdyn.dsl.model.network import Table
+
+MOST = 32
+"""Nodes of a table that are watched one by one."""
+
+
+def broken(root: Node, tables: Mapping[str, Table]) -> Node:
+    """An expression with its tables of straight pieces written out."""
+    if not any(n.op == "table" for n in topological([root])):
+        return root
+    done: dict[Node, Node] = {}
+    for node in topological([root]):
+        args = tuple(done[a] for a in node.args)
+        table = tables.get(node.data[0]) if node.op == "table" else None
+        apart = table is not None and _apart(table, node)
+        done[node] = _pieces(table, args[0], node.data[1]) if table and apart else rebuild(node, args)
+    return done[root]
+
+
+def _apart(table: Table, node: Node) -> bool:
+    if len(node.args) > 1 or table.outside == "stop" or not isinstance(node.data[1], int):
+        return False
+    inner = topological(node.args)
+    unknown = any(v.op == "var" for v in variables(node.args[0])) and all(n.op != "index" for n in inner)
+    straight = table.method in ("linear", "hold") and len(table.points[0]) <= MOST
+    return unknown and (straight or (table.method in ("pchip", "cubic") and table.outside == "clamp"))
+
+
+def _pieces(table: Table, u: Node, order: int) -> Node:
+    points, values = table.points[0], table.values
+    ends = [const(values[k] if order == 0 else 0.0) for k in (0, -1)]
+    if table.method in ("pchip", "cubic"):
+        inside = looked_up(table.name, u, order=order)
+        below = conditional(compare("<", u, const(points[0])), ends[0], inside)
+        return conditional(compare(">", u, const(points[-1])), ends[1], below)
+    slopes = [
+        0.0 if table.method == "hold" else (b - a) / (y - x)
+        for x, y, a, b in zip(points, points[1:], values, values[1:], strict=False)
+    ]
+    inner = [_line(x, v, s, u, order) for x, v, s in zip(points, values, slopes, strict=False)]
+    first, last = (inner[0], inner[-1]) if table.outside == "extend" else ends
+    if table.method == "hold":
+        last = ends[1]
+    pieces = [first, *inner, last]
+    found = pieces[-1]
+    for x, piece in zip(reversed(points), reversed(pieces[:-1]), strict=True):
+        found = conditional(compare("<", u, const(x)), piece, found)
+    return found
+
+
+def _line(x: float, value: float, slope: float, u: Node, order: int) -> Node:
+    """A straight piece that is `value` at x, or its derivative."""
+    if order:
+        return const(slope if order == 1 else 0.0)
+    return linear(value, ((slope, sub(u, const(x))),))

@@ -1,0 +1,214 @@
+"""Kinks and jumps of a text on unknowns: the switching functions whose sign says which branch holds.
+
+    abs(x), sign(x), step(x)     u = x            max(a, b), min(a, b), a > b     u = a - b
+    table of straight pieces     u = x - node, one for each node between two pieces (broken.py)
+
+Where u is zero the text has a kink, or jumps; a text with two continuous derivatives of its value there (f abs(f)) has
+neither for a method and is left alone.  Which of the three it is, is asked of the expressions on the surface u = 0, at
+sampled values of everything else.  Received: a descriptor form; returned: its `Surface`s, in the order of the text.
+Loops keep what they have (a family is one row here): what stands in one is integrated through.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.dsl.model.expression import (
+    Node,
+    compare,
+    const,
+    derivative,
+    evaluate,
+    neg,
+    rebuild,
+    sub,
+    topological,
+    variables,
+)
+
+JUDGED = ("dynamics", "phi_reaction", "psi_reaction", "momentum", "phi", "psi", "gamma", "lambda")
+"""Blocks whose rows say how smooth the motion is: others are derivatives of these, or only read."""
+JUMPS, KINK, SMOOTH = 0, 1, 2
+"""The least derivative that jumps."""
+SAMPLES = 5
+TOUCHES = 1e-7
+"""Of the magnitudes of both sides: what differs by less does not jump."""
+BESIDE = 0.5
+MOST = 200
+"""Surfaces of one model: more cost each step more than they save."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """u = 0: where the branch changes; jumps: whether a row does there; row: the first row family that has it."""
+
+    u: Node
+    jumps: bool
+    row: int
+
+
+@dataclass(frozen=True, slots=True)
+class Sided:
+    """An operation whose branch is the sign of u: values on both sides; turned: u is the negative of its own."""
+
+    u: Node
+    above: Node
+    below: Node
+
+
+YES, NO = compare("==", const(0.0), const(0.0)), compare("!=", const(0.0), const(0.0))
+
+
+def sided(node: Node) -> Sided | None:
+    """The two branches of an operation; None of one without."""
+    if node.op == "call" and node.data in ("abs", "sign", "step"):
+        (x,) = node.args
+        pairs = {"abs": (x, neg(x)), "sign": (const(1.0), const(-1.0)), "step": (const(1.0), const(0.0))}
+        return Sided(x, *pairs[node.data])
+    if node.op == "call" and node.data in ("max", "min"):
+        a, b = node.args
+        return Sided(sub(a, b), a, b) if node.data == "max" else Sided(sub(a, b), b, a)
+    if node.op == "cmp" and node.data in (">", ">=", "<", "<="):
+        a, b = node.args
+        return Sided(sub(a, b), YES, NO) if node.data[0] == ">" else Sided(sub(a, b), NO, YES)
+    return None
+
+
+def watched(node: Node) -> Sided | None:
+    """The branches of an operation on unknowns outside all loops."""
+    found = sided(node)
+    if found is None or not any(v.op == "var" for v in variables(found.u)):
+        return None
+    if any(v.op == "var" and (v.data[1] == "audit" or v.data[2]) for v in variables(found.u)):
+        return None
+    return None if any(n.op in ("index", "reduce") for n in topological([found.u])) else found
+
+
+def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> tuple[Surface, ...]:
+    """All surfaces at which a row is not smooth; none where they are more than MOST.
+
+    directions: parameters of friction in the plane, which the contact itself keeps on one side.
+    """
+    roots = list(_roots(form))
+    first: dict[Node, int] = {}
+    for root, row in roots:
+        for node in topological([root]):
+            found = watched(node)
+            own = found is not None and any(n.op == "param" and n.data in directions for n in topological([found.u]))
+            if found is not None and not own and neg(found.u) not in first:
+                first.setdefault(found.u, row)
+    if not 0 < len(first) <= MOST:
+        return ()
+    kept = []
+    for u, row in first.items():
+        level = min((smoothness(root, u) for root, _ in roots), default=SMOOTH)
+        if level < SMOOTH:
+            kept.append(Surface(u, level == JUMPS, row))
+    return tuple(kept)
+
+
+def _roots(form: DescriptorForm) -> Iterator[tuple[Node, int]]:
+    for name in JUDGED:
+        block = form.block(name)
+        for kernel in block.kernels if block is not None else ():
+            for summand in kernel.rows:
+                yield summand.expression, summand.row
+
+
+def side(root: Node, u: Node, above: bool) -> Node:
+    """The branch of an expression on one side of u = 0."""
+    done: dict[Node, Node] = {}
+    for node in topological([root]):
+        found = watched(node)
+        if found is not None and (found.u is u or found.u is neg(u)):
+            done[node] = done_of(found.above if (found.u is u) == above else found.below, done)
+        else:
+            done[node] = rebuild(node, tuple(done[a] for a in node.args))
+    return done[root]
+
+
+def done_of(branch: Node, done: dict[Node, Node]) -> Node:
+    """A branch with what has been done to its parts."""
+    for node in topological([branch]):
+        if node not in done:
+            done[node] = rebuild(node, tuple(done[a] for a in node.args))
+    return done[branch]
+
+
+# -- how smooth ----------------------------------------------------------------------------------------------
+
+
+def smoothness(root: Node, u: Node) -> int:
+    """JUMPS, KINK or SMOOTH: of an expression where u = 0."""
+    above, below = side(root, u, above=True), side(root, u, above=False)
+    if above is below:
+        return SMOOTH
+    moved = next((v for v in sorted(variables(u), key=lambda n: n.number) if v.op == "var"), None)
+    if moved is None:
+        return SMOOTH
+    slopes = [derivative(node, moved) for node in (u, above, below)]
+    found = SMOOTH
+    for k in range(SAMPLES):
+        values = _on_surface(u, slopes[0], moved, k)
+        if values is None:  # nothing is known of it: what the operation itself does
+            found = min(found, KINK if _continuous(root, u) else JUMPS)
+            continue
+        both = (above, below, slopes[1], slopes[2])
+        beside = {**values, moved: values[moved] + BESIDE}
+        try:
+            here, there = _values(both, values), _values(both, beside)
+        except (ArithmeticError, ValueError, KeyError, TypeError):
+            return JUMPS
+        if _apart(here[:2], there[:2]):
+            return JUMPS
+        if _apart(here[2:], there[2:]):
+            found = KINK
+    return found
+
+
+def _values(nodes: tuple[Node, ...], values: Mapping[Node, float]) -> list[float]:
+    return evaluate(nodes, lambda node: _look(node, values))
+
+
+def _apart(here: list[float], there: list[float]) -> bool:
+    """Whether two values differ on the surface, against what they are there and beside it."""
+    known = [abs(x) for x in (*here, *there) if math.isfinite(x)]
+    return not all(map(math.isfinite, here)) or abs(here[0] - here[1]) > TOUCHES * sum(known)
+
+
+def _continuous(root: Node, u: Node) -> bool:
+    """Whether the operations at u = 0 are continuous there themselves."""
+    on = [n for n in topological([root]) if (s := watched(n)) is not None and (s.u is u or s.u is neg(u))]
+    return all(n.op == "call" and n.data in ("abs", "min", "max") for n in on)
+
+
+def _on_surface(u: Node, slope: Node, moved: Node, number: int) -> Mapping[Node, float] | None:
+    """Values of the leaves with u = 0, by Newton on one unknown; None where it finds none."""
+    leaves = [n for n in topological([u]) if n.op in ("var", "param", "time")]
+    values = {n: _sample(k, number) for k, n in enumerate(leaves)}
+    for _ in range(50):
+        try:
+            at, by = evaluate((u, slope), lambda n: _look(n, values))
+        except (ArithmeticError, ValueError, TypeError):
+            return None
+        if not math.isfinite(at) or not math.isfinite(by) or by == 0.0:
+            return None
+        change = at / by
+        values[moved] -= change
+        if abs(change) <= 1e-15 * max(abs(values[moved]), 1e-300):
+            return values
+    return values if abs(change) <= 1e-12 * (abs(values[moved]) + 1.0) else None
+
+
+def _sample(k: int, number: int) -> float:
+    return 0.3 + ((k + 1) * 0.6180339887 + number * 0.7548776662) % 1.0
+
+
+def _look(node: Node, values: Mapping[Node, float]) -> float:
+    """A leaf's value: sampled; of a table, a smooth function's."""
+    if node.op == "table":
+        return 0.7
+    return values[node] if node in values else _sample(node.number, 0)

@@ -1,0 +1,113 @@
+"""Laws whose branch follows the sign of a switching function: which branch holds from an instant on.
+
+The branch stands in p (compiler/forms/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero.  A
+branch fits where its function has that sign, or is zero and does not move to the other side; where both branches drive
+it back, the law slides between them (Filippov 1988), and leaves by the side whose sense reaches 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from sysdyn.runtime.events.observer import Observer
+from sysdyn.runtime.events.plan import Happened, Kink
+from sysdyn.runtime.model.description import Floats
+
+LIVE, ABOVE, BELOW, SLIDES = 0.0, 1.0, -1.0, 2.0
+WORDS = {LIVE: "= 0", ABOVE: "> 0", BELOW: "< 0", SLIDES: "slides"}
+TURNS = 4
+"""Of one kink at one instant: more, and its branches contradict each other."""
+FULL = 1e-9
+"""Of a sense: what it may pass its end by."""
+
+
+class NoBranchError(Exception):
+    """No branch of these laws fits: kinks; pushed: both branches drive it back, yet it cannot slide."""
+
+    def __init__(self, names: tuple[str, ...], *, pushed: bool) -> None:
+        super().__init__(", ".join(names))
+        self.names, self.pushed = names, pushed
+
+
+class Kinks:
+    """The branches of a model; p: its parameters, where they stand."""
+
+    def __init__(self, kinks: tuple[Kink, ...], observer: Observer, p: Floats) -> None:
+        self.kinks, self.observer, self.p = kinks, observer, p
+        self._turned: dict[int, list[float]] = {}
+
+    def state(self) -> list[float]:
+        """The branches."""
+        return [float(self.p[k.branch]) for k in self.kinks]
+
+    def rows(self, k: int) -> Sequence[tuple[int, int]]:
+        """Rows of kink k, and the sides of zero whose other one ends a piece."""
+        kink, branch = self.kinks[k], self.p[self.kinks[k].branch]
+        if branch == SLIDES:
+            return ((kink.above, 1), (kink.below, 1))
+        return ((kink.value, int(branch)),) if branch else ((kink.value, 1), (kink.value, -1))
+
+    def cross(self, k: int, row: int, side: int) -> None:
+        """What kink k becomes where the row has changed its side."""
+        kink = self.kinks[k]
+        sliding = self.p[kink.branch] == SLIDES
+        branch = (ABOVE if row == kink.above else BELOW) if sliding else float(-side)
+        self.p[kink.branch] = branch
+        self._turned[k] = [branch]
+
+    def anew(self) -> None:
+        """A new instant: nothing has turned yet."""
+        self._turned = {}
+
+    def begin(self, values: Floats) -> bool:
+        """Branches by the values of a start at which all are live; whether a law jumps, so that all is found anew."""
+        for kink in self.kinks:
+            on = abs(values[kink.value]) <= self.observer.zero(kink.value)
+            self.p[kink.branch] = (ABOVE if kink.jumps else LIVE) if on else np.sign(values[kink.value])
+        self.anew()
+        return any(kink.jumps for kink in self.kinks)
+
+    def turn(self, values: Floats) -> bool:
+        """Turns the first kink whose branch does not fit; whether there was one."""
+        for k, kink in enumerate(self.kinks):
+            better = self._better(k, kink, values)
+            if better is not None:
+                seen = self._turned.setdefault(k, [])
+                seen.append(better)
+                if len(seen) > TURNS:
+                    raise NoBranchError(self._named(), pushed=kink.jumps)
+                self.p[kink.branch] = better
+                return True
+        return False
+
+    def _named(self) -> tuple[str, ...]:
+        return tuple(f"{self.kinks[k].name} ({self.kinks[k].element})" for k in self._turned)
+
+    def _better(self, k: int, kink: Kink, values: Floats) -> float | None:
+        """The branch that kink k should have; None where it fits."""
+        branch, zero = float(self.p[kink.branch]), self.observer.zero
+        value = float(values[kink.value])
+        if branch == LIVE:
+            return None if abs(value) <= zero(kink.value) else float(np.sign(value))
+        if branch == SLIDES:
+            if values[kink.above] < -FULL:
+                return ABOVE
+            return BELOW if values[kink.below] < -FULL else None
+        if branch * value > zero(kink.value):
+            return None
+        if branch * value >= -zero(kink.value):
+            if kink.rate < 0 or branch * values[kink.rate] >= -zero(kink.rate):
+                return None
+            if kink.above >= 0 and branch in self._turned.get(k, ()):
+                return SLIDES  # it came from the other side, and is driven back to it
+        return -branch
+
+    def happened(self, t: float, before: Sequence[float]) -> list[Happened]:
+        """What has changed."""
+        found = []
+        for kink, was in zip(self.kinks, before, strict=True):
+            now = float(self.p[kink.branch])
+            if now != was:
+                found.append(Happened(t, kink.name, kink.element, WORDS[was], WORDS[now]))
+        return found

@@ -1,0 +1,125 @@
+"""Kinks and jumps of laws on unknowns as events, against closed forms; sliding; what must stay as it was."""
+
+import math
+
+import numpy as np
+import pytest
+from sysdyn.api import simulate
+
+ACCURACY = 1e-9
+
+DRIVEN = """
+model m {
+  param c = 2 N
+  coord x: translation = 0 m
+  init x' = 1 m/s
+  energy T* = 1/2*(1 kg)*x'^2
+  work 3 N*sin(2*pi*(1 Hz)*t) - c*sign(x') on x
+}
+scene s of m { time 0 s to 3 s; trace x, x'; accuracy 1e-9 }
+"""
+STOP = """
+model m {
+  coord x: translation = 0.1 m
+  energy T* = 1/2*(1 kg)*x'^2
+  work (1 kN/m)*max(-x, 0 m) - (9.81 N) on x
+}
+scene s of m { time 0 s to 3 s; trace x, x'; accuracy 1e-8 }
+"""
+RELAY = """
+model m {
+  state T: K = 20 K
+  dynamic T' = -(T - (10 K))/(10 s) + (if T < 22 K then 2 K/s else 0 K/s)
+}
+scene s of m { time 0 s to 60 s; trace T; accuracy 1e-9 }
+"""
+TABLE = """
+table F(x: m) -> N linear clamp [ (-1, -1), (-0.2, 0), (0.3, 0), (1, 3) ]
+model m {
+  coord x: translation = 0.9 m
+  energy T* = 1/2*(1 kg)*x'^2
+  work -F(x) on x
+}
+scene s of m { time 0 s to 1 s; trace x, x'; accuracy 1e-9 }
+"""
+SMOOTH = """
+model m {
+  coord x: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2
+  work -(1 N)*x/(1 m) - (1 kg/m)*abs(x')*x' on x
+}
+scene s of m { time 0 s to 3 s; trace x; accuracy 1e-6 }
+"""
+
+
+def run(text, tmp_path, **options):
+    file = tmp_path / "m.sd"
+    file.write_text(text)
+    return simulate(file, scene="s", output=tmp_path / "m.h5", **options)
+
+
+def events(trace):
+    return [(float(e.time), e.before, e.after) for e in trace.events]
+
+
+@pytest.mark.parametrize("method", ["auto", "bdf", "radau"])
+def test_friction_by_sign_slides(method, tmp_path):
+    """It leaves rest where the force passes c: sin(2 pi t) = 2/3; the same motion as of set-valued friction."""
+    trace = run(DRIVEN, tmp_path, method=method)
+    leaves = [t for t, before, after in events(trace) if before == "slides"]
+    first = math.asin(2.0 / 3.0) / (2.0 * math.pi)
+    assert np.allclose(leaves, [1.0 + first + 0.5 * k for k in range(len(leaves))], atol=1e-10, rtol=0.0)
+    assert len(leaves) == 4
+    assert json_of(trace)["steps"] < 8000
+    other = run(DRIVEN.replace("work 3 N", "content D = c*abs(x')\n  work 3 N").replace(" - c*sign(x')", ""), tmp_path)
+    assert abs(trace["x"][-1] - other["x"][-1]) < 10 * ACCURACY
+
+
+def json_of(trace):
+    return dict(trace.statistics)
+
+
+@pytest.mark.parametrize("method", ["auto", "bdf", "radau", "dopri"])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_elastic_stop(method, formulation, tmp_path):
+    """Free flight and half an oscillation about the deflection, in turn."""
+    trace = run(STOP, tmp_path, method=method, formulation=formulation)
+    g, k, h = 9.81, 1000.0, 0.1
+    w, v, fall = math.sqrt(k), math.sqrt(2 * g * h), math.sqrt(2 * h / g)
+    inside = 2.0 / w * (math.pi - math.atan(v * w / g))
+    exact = []
+    t = fall
+    while t < 3.0:
+        exact.append(t)
+        t += inside if len(exact) % 2 else 2.0 * fall
+    assert np.allclose([t for t, _, _ in events(trace)], exact, atol=3e-8, rtol=0.0)
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+def test_relay_slides(method, tmp_path):
+    """Held at 22 K from t = 10 ln(10/8) on."""
+    trace = run(RELAY, tmp_path, method=method)
+    ((time, before, after),) = events(trace)
+    assert (before, after) == ("< 0", "slides")
+    assert abs(time - 10.0 * math.log(1.25)) < 1e-8
+    assert abs(trace["T"][-1] - 22.0) < 1e-9
+
+
+def test_relay_without_events_ran_for_ever(tmp_path):
+    trace = run(RELAY, tmp_path)
+    assert json_of(trace)["steps"] < 1000
+
+
+@pytest.mark.parametrize("method", ["auto", "bdf", "radau"])
+def test_linear_table(method, tmp_path):
+    """A spring of slope 30/7 N/m about 0.3 m, then free motion."""
+    trace = run(TABLE, tmp_path, method=method)
+    w = math.sqrt(3.0 / 0.7)
+    quarter, speed = math.pi / 2 / w, 0.6 * w
+    assert abs(events(trace)[0][0] - quarter) < 1e-9
+    exact = 0.3 - speed * (1.0 - quarter)
+    assert abs(trace["x"][-1] - exact) < 10 * ACCURACY
+
+
+def test_twice_differentiable_law_has_no_events(tmp_path):
+    assert not run(SMOOTH, tmp_path).events
