@@ -119,6 +119,14 @@ static void integrate(sd_run *run, double to)
         integrate_nodes(run, to == *stepper->t ? 1.0 : (to - from) / (*stepper->t - from));
         return;
     }
+    if (stepper->part_y) {
+        sample(run, to);
+        for (int32_t k = 0; k < stepper->nodes; k++) {
+            audit(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k], run->sample);
+            weigh(run, (to - from) * stepper->node_weight[k]);
+        }
+        return;
+    }
     memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
     weigh(run, half / 6.0);
     for (int k = -1; k <= 1; k += 2) {

@@ -14,7 +14,8 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs = [("Frame", "sd_frame"), ("Call", "sd_call"), ("System", "sd_system"), ("Linear", "sd_linear")]
     pairs += [("Bdf", "sd_bdf"), ("Settle", "sd_settle"), ("Stepper", "sd_stepper"), ("Radau", "sd_radau")]
     pairs += [("LeastNorm", "sd_least_norm"), ("Run", "sd_run"), ("Ledgers", "sd_ledgers"), ("Record", "sd_record")]
-    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau")]
+    pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
+    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau", "dopri", "energy")]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
         lines.append(f'printf("%zu\\n", sizeof({tag}));')
