@@ -68,7 +68,8 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
     energy->audited = audited;
     energy->stepper = (sd_stepper){energy, system, energy->n, &energy->t, &energy->t_end, energy->phi, energy->yd,
                                    &energy->taken, step, dense, NULL, start, S, sd_energy_c, sd_energy_b,
-                                   energy->stage.y, energy->stage.rate, energy->side.y, energy->side.rate, 0};
+                                   energy->stage.y, energy->stage.rate, energy->side.y, energy->side.rate,
+                                   &energy->h_used, 0};
     return energy;
 }
 
@@ -363,6 +364,7 @@ int sd_energy_step(sd_energy *energy)
     memcpy(energy->phi, energy->raw, size);
     memcpy(energy->yd, energy->inner_d, size);
     energy->h_used = energy->h;
+    energy->from_t = energy->t;
     energy->t = t;
     energy->steps++;
     energy->taken++;
@@ -383,7 +385,7 @@ int sd_energy_step(sd_energy *energy)
 /* the point at t within the last step by a shorter one; 0 done */
 static int within(sd_energy *energy, double t)
 {
-    double from = energy->t - energy->h_used, h = t - from;
+    double from = energy->from_t, h = t - from;
     sd_energy_guess(energy, &energy->stage, 0.0, h / energy->h_used, &energy->side);
     guess_algebraic(energy);
     if (sd_energy_collocate(energy, &energy->side, from, energy->from, energy->from_rest, h, energy->inner,
@@ -405,7 +407,7 @@ static int within(sd_energy *energy, double t)
 /* the cubic of both ends: where a shorter step cannot be made */
 static void cubic(sd_energy *energy, double t)
 {
-    double h = energy->h_used, x = (t - (energy->t - h)) / h;
+    double h = energy->h_used, x = (t - energy->from_t) / h;
     for (int32_t i = 0; i < energy->n; i++) {
         double a = energy->from[i], b = energy->phi[i], da = h * energy->from_d[i], db = h * energy->yd[i];
         double c2 = 3.0 * (b - a) - 2.0 * da - db, c3 = da + db - 2.0 * (b - a);

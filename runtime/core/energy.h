@@ -62,7 +62,7 @@ typedef struct sd_energy {
     int32_t inner_ready;
     double *phi, *yd, *rest;  /* [n] the last accepted point; rests of its compensated sums */
     double *from, *from_d, *from_rest; /* [n] where the last step began */
-    double from_energy;
+    double from_t, from_energy;
     sd_collocation stage, side; /* of the last step; of halves and of values within a step */
     double *raw, *half, *half_rest, *inner, *inner_d, *trial, *old_y, *old_rate;
     double *begin, *position, *velocity; /* [n] where a symmetric step begins, [rows] what it misses */

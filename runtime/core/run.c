@@ -92,7 +92,7 @@ static double share(const sd_stepper *stepper, int32_t k, double to)
 static void integrate_nodes(sd_run *run, double part)
 {
     const sd_stepper *stepper = run->stepper;
-    double from = run->t_from, h = *stepper->t - from;
+    double from = run->t_from, h = stepper->length ? *stepper->length : *stepper->t - from;
     if (part < 1.0) { /* the whole step takes nothing of its start */
         memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
         weigh(run, h * share(stepper, -1, part));

@@ -42,6 +42,7 @@ typedef struct sd_stepper {
     double *const *node_y, *const *node_yd;
     double *const *part_y, *const *part_yd; /* y, yd [n] at the nodes of the part of the step up to where `dense` was asked
                                              * last, which is a step of its own; NULL: it is not */
+    const double *length;      /* of the last step, which t does not resolve after many; NULL: the difference of its ends */
     int32_t collocated;        /* 1: at most three nodes; a polynomial through them and the start serves within the step */
 } sd_stepper;
 

@@ -110,7 +110,7 @@ class Stepper(c.Structure):
         ("n", _I),
         *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
         ("nodes", _I),
-        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd"]],
+        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
         ("collocated", _I),
     ]
 
@@ -282,6 +282,7 @@ class Energy(c.Structure):
         ("dense_t", _D),
         ("inner_ready", _I),
         *[(name, _P) for name in ["phi", "yd", "rest", "from", "from_d", "from_rest"]],
+        ("from_t", _D),
         ("from_energy", _D),
         *[(name, Collocation) for name in ["stage", "side"]],
         *[(name, _P) for name in ["raw", "half", "half_rest", "inner", "inner_d", "trial", "old_y", "old_rate"]],
