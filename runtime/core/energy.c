@@ -19,7 +19,7 @@
 #define FAILURES 40      /* of slopes in one step */
 #define FIRST 1e-2       /* of the span */
 #define TWO_PI 6.283185307179586477
-#define VECTORS 20       /* of n, beside the stages */
+#define VECTORS 21       /* of n, beside the stages */
 
 static int step(void *energy)
 {
@@ -42,7 +42,7 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
     if (!energy)
         return NULL;
     size_t m = (size_t)(extended > system->unknowns ? extended : system->unknowns) + 1;
-    energy->memory = calloc((VECTORS + 4 * S) * m + (size_t)audited + 1, sizeof(double));
+    energy->memory = calloc((VECTORS + 4 * S) * m + 4 * (size_t)audited + 1, sizeof(double));
     if (!energy->memory) {
         free(energy);
         return NULL;
@@ -52,7 +52,7 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
                                  &energy->from_rest, &energy->raw,     &energy->half,  &energy->half_rest, &energy->inner,
                                  &energy->inner_d, &energy->trial,     &energy->old_y, &energy->old_rate, &energy->ee,
                                  &energy->weight,  &energy->begin,     &energy->position, &energy->velocity,
-                                 &energy->sample};
+                                 &energy->base,    &energy->sample};
     for (int i = 0; i < VECTORS; i++, next += m)
         *vectors[i] = next;
     for (int i = 0; i < S; i++, next += 4 * m) {
@@ -61,7 +61,10 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
         energy->side.y[i] = next + 2 * m;
         energy->side.rate[i] = next + 3 * m;
     }
-    energy->sample = next; /* the last, longer than a vector perhaps */
+    energy->sample = next; /* the last ones, longer than a vector perhaps */
+    energy->work = energy->sample + audited;
+    energy->moves = energy->work + audited;
+    energy->inner_moves = energy->moves + audited;
     energy->system = system;
     energy->underlying = underlying;
     energy->n = system->unknowns;
@@ -69,7 +72,7 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
     energy->stepper = (sd_stepper){energy, system, energy->n, &energy->t, &energy->t_end, energy->phi, energy->yd,
                                    &energy->taken, step, dense, NULL, start, S, sd_energy_c, sd_energy_b,
                                    energy->stage.y, energy->stage.rate, energy->side.y, energy->side.rate,
-                                   &energy->h_used, 0};
+                                   &energy->h_used, energy->moves, energy->inner_moves, 0};
     return energy;
 }
 
@@ -286,29 +289,30 @@ static int stands(sd_energy *energy)
 /* the raw step moved onto everything, its slopes, and the new sum of the energy */
 static int complete(sd_energy *energy, double t)
 {
-    double target = energy->energy, lost = energy->lost;
-    if (energy->audit) { /* compensated */
-        double move = lost - sd_energy_drained(energy, &energy->stage, energy->t, energy->h);
-        double next = target + move;
-        lost = (target - next) + move;
-        target = next;
-    }
-    int again, cause = sd_energy_symmetric(energy, t, target, &again);
+    int again;
+    double target = energy->energy - (energy->audit ? sd_energy_drained(energy, &energy->stage, energy->t, energy->h) : 0.0);
+    int cause = sd_energy_symmetric(energy, t, target, &again);
     if (cause == SD_FINE && again)
         cause = sd_energy_collocate(energy, &energy->stage, energy->t, energy->begin, energy->rest, energy->h, energy->raw,
                                     energy->from_rest);
     memcpy(energy->inner_d, energy->stage.rate[S - 1], (size_t)energy->n * sizeof(double));
     if (cause == SD_FINE && again) /* it is moved with slopes of its own, as the start was */
         cause = sd_underlying_slopes(energy->underlying, t, energy->raw, energy->inner_d);
-    if (cause == SD_FINE)
-        cause = sd_energy_balance(energy, t, energy->raw, energy->inner_d, target);
+    if (cause)
+        return cause;
+    double drained = energy->audit ? sd_energy_drained(energy, &energy->stage, energy->t, energy->h) : 0.0;
+    double start = energy->audit ? energy->moves[2] - energy->moves[3] : 0.0;
+    cause = sd_energy_balance(energy, t, energy->raw, energy->inner_d, energy->energy - drained - start, energy->moves);
     if (cause == SD_FINE)
         cause = sd_underlying_slopes(energy->underlying, t, energy->raw, energy->inner_d);
     if (cause)
         return cause;
     energy->from_energy = energy->energy;
-    energy->energy = target;
-    energy->lost = lost;
+    if (energy->audit) { /* compensated */
+        double move = energy->lost - drained - (energy->moves[2] - energy->moves[3]);
+        energy->energy = energy->from_energy + move;
+        energy->lost = (energy->from_energy - energy->energy) + move;
+    }
     return SD_FINE;
 }
 
@@ -398,7 +402,8 @@ static int within(sd_energy *energy, double t)
     double target = energy->from_energy;
     if (energy->audit)
         target -= sd_energy_drained(energy, &energy->side, from, h);
-    if (sd_energy_balance(energy, t, energy->inner, energy->side.rate[S - 1], target))
+    memset(energy->inner_moves, 0, (size_t)energy->audited * sizeof(double));
+    if (sd_energy_balance(energy, t, energy->inner, energy->side.rate[S - 1], target, energy->inner_moves))
         return 1;
     memcpy(energy->inner_d, energy->side.rate[S - 1], (size_t)energy->n * sizeof(double));
     return sd_underlying_slopes(energy->underlying, t, energy->inner, energy->inner_d);

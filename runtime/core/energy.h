@@ -66,7 +66,9 @@ typedef struct sd_energy {
     sd_collocation stage, side; /* of the last step; of halves and of values within a step */
     double *raw, *half, *half_rest, *inner, *inner_d, *trial, *old_y, *old_rate;
     double *begin, *position, *velocity; /* [n] where a symmetric step begins, [rows] what it misses */
-    double *sample;           /* [audited] */
+    double *base;             /* [n] from where a point is moved onto the balance */
+    double *sample, *work;    /* [audited] one of the rows of block audit; what a move of displacements took */
+    double *moves, *inner_moves; /* [audited] what such moves took in the last step; within it */
     double *ee, *weight, *memory;
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, taken;
@@ -89,8 +91,9 @@ int sd_energy_collocate(sd_energy *energy, sd_collocation *stage, double t, cons
 /* slopes guessed at t + (first + part c_i) of the step of `known` */
 void sd_energy_guess(const sd_energy *energy, const sd_collocation *known, double first, double part,
                      sd_collocation *guess);
-/* energy_balance.c: x in y [n] moved onto the constraints and onto T + V = energy at t; rate [n]: slopes near it */
-int sd_energy_balance(sd_energy *energy, double t, double *y, const double *rate, double target);
+/* energy_balance.c: x in y [n] moved onto the constraints and onto T + V = target at t, less what the move of displacements
+ * dissipates and more what it is supplied with, which `gained` [audited] gains; rate [n]: slopes near it */
+int sd_energy_balance(sd_energy *energy, double t, double *y, const double *rate, double target, double *gained);
 /* The last point moved by the contrary of half of what the raw step to t misses of the constraints and of T + V = target, in
  * `begin`; again 0: it misses nothing */
 int sd_energy_symmetric(sd_energy *energy, double t, double target, int *again);

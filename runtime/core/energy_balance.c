@@ -47,6 +47,31 @@ static void along(const sd_energy *energy, const double *from, const double *rat
         y[system->k_q[l]] -= part * tau * tau * rate[system->k_f[l]];
 }
 
+/* energy->work := what the rows of block audit give for the move of displacements from base to y, their powers for flows as
+ * large as the moves */
+static void work(sd_energy *energy, double t, const double *base, const double *y, const double *rate)
+{
+    const sd_system *system = energy->system;
+    double *point = energy->old_y;
+    memcpy(point, base, (size_t)energy->n * sizeof *point);
+    memset(energy->work, 0, (size_t)energy->audited * sizeof(double));
+    for (int side = 1; side >= 0; side--) {
+        for (int32_t l = 0; l < system->kinematics; l++)
+            point[system->k_f[l]] = side ? y[system->k_q[l]] - base[system->k_q[l]] : 0.0;
+        memset(energy->sample, 0, (size_t)energy->audited * sizeof(double));
+        energy->audit->rows(&energy->audit->frame, t, point, rate, energy->sample);
+        for (int32_t k = 2; k < energy->audited; k++)
+            energy->work[k] += side ? energy->sample[k] : -energy->sample[k];
+    }
+}
+
+/* what T + V is off at y, which was moved there from the base */
+static double off(sd_energy *energy, double t, const double *y, const double *rate, double target)
+{
+    work(energy, t, energy->base, y, rate);
+    return sd_energy_content(energy, t, y, rate) + (energy->work[2] - energy->work[3]) - target;
+}
+
 /* trial := y moved by `part`, on the constraints; what its energy is off, in `miss` */
 static int moved(sd_energy *energy, double t, const double *y, const double *rate, double part, double target,
                  double *miss)
@@ -54,7 +79,7 @@ static int moved(sd_energy *energy, double t, const double *y, const double *rat
     along(energy, y, rate, part, energy->trial);
     int cause = sd_underlying_project(energy->underlying, t, energy->trial, rate);
     if (cause == SD_FINE)
-        *miss = sd_energy_content(energy, t, energy->trial, rate) - target;
+        *miss = off(energy, t, energy->trial, rate, target);
     return cause;
 }
 
@@ -63,6 +88,7 @@ int sd_energy_symmetric(sd_energy *energy, double t, double target, int *again)
     sd_underlying *u = energy->underlying;
     double *start = energy->begin, miss = 0.0, size = 0.0;
     *again = 0;
+    memset(energy->moves, 0, (size_t)energy->audited * sizeof(double));
     memcpy(start, energy->raw, (size_t)energy->n * sizeof *start);
     int cause = sd_underlying_project(u, t, start, energy->stage.rate[SD_ENERGY_STAGES - 1]);
     if (cause)
@@ -85,18 +111,17 @@ int sd_energy_symmetric(sd_energy *energy, double t, double target, int *again)
         return cause;
     u->goal_position = energy->position;
     u->goal_velocity = energy->velocity;
-    cause = sd_energy_balance(energy, energy->t, start, energy->inner_d, energy->energy - 0.5 * miss);
+    cause = sd_energy_balance(energy, energy->t, start, energy->inner_d, energy->energy - 0.5 * miss, energy->moves);
     u->goal_position = u->goal_velocity = NULL;
     *again = cause == SD_FINE;
     return cause;
 }
 
-int sd_energy_balance(sd_energy *energy, double t, double *y, const double *rate, double target)
+/* y moved along the direction of the energy until nothing is off */
+static int balance(sd_energy *energy, double t, double *y, const double *rate, double target)
 {
-    int cause = sd_underlying_project(energy->underlying, t, y, rate);
-    if (cause || !energy->audit)
-        return cause;
-    double miss = sd_energy_content(energy, t, y, rate) - target, enough = ROUND_OFF * DBL_EPSILON * energy->content, now;
+    int cause;
+    double miss = off(energy, t, y, rate, target), now, enough = ROUND_OFF * DBL_EPSILON * energy->content;
     if (fabs(miss) <= enough)
         return SD_FINE;
     if ((cause = moved(energy, t, y, rate, TRIAL, target, &now)))
@@ -114,4 +139,17 @@ int sd_energy_balance(sd_energy *energy, double t, double *y, const double *rate
         miss = now;
     }
     return SD_FINE;
+}
+
+int sd_energy_balance(sd_energy *energy, double t, double *y, const double *rate, double target, double *gained)
+{
+    memcpy(energy->base, y, (size_t)energy->n * sizeof *y);
+    int cause = sd_underlying_project(energy->underlying, t, y, rate);
+    if (cause || !energy->audit)
+        return cause;
+    cause = balance(energy, t, y, rate, target);
+    work(energy, t, energy->base, y, rate);
+    for (int32_t k = 2; k < energy->audited; k++)
+        gained[k] += energy->work[k];
+    return cause;
 }

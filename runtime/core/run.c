@@ -104,6 +104,8 @@ static void integrate_nodes(sd_run *run, double part)
         audit(run, from + stepper->node[k] * h, stepper->node_y[k], stepper->node_yd[k], run->sample);
         weigh(run, h * weight);
     }
+    for (int32_t k = 2; stepper->moves && k < run->audited; k++)
+        run->integral[k] += stepper->moves[k];
 }
 
 /* run->integral [audited]: of the powers from the start of the last step to `to`, within that step */
@@ -125,6 +127,8 @@ static void integrate(sd_run *run, double to)
             audit(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k], run->sample);
             weigh(run, (to - from) * stepper->node_weight[k]);
         }
+        for (int32_t k = 2; stepper->part_moves && k < run->audited; k++)
+            run->integral[k] += stepper->part_moves[k];
         return;
     }
     memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));

@@ -110,7 +110,7 @@ class Stepper(c.Structure):
         ("n", _I),
         *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
         ("nodes", _I),
-        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
+        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length", "moves", "part_moves"]],
         ("collocated", _I),
     ]
 
@@ -287,7 +287,7 @@ class Energy(c.Structure):
         *[(name, Collocation) for name in ["stage", "side"]],
         *[(name, _P) for name in ["raw", "half", "half_rest", "inner", "inner_d", "trial", "old_y", "old_rate"]],
         *[(name, _P) for name in ["begin", "position", "velocity"]],
-        *[(name, _P) for name in ["sample", "ee", "weight", "memory"]],
+        *[(name, _P) for name in ["base", "sample", "work", "moves", "inner_moves", "ee", "weight", "memory"]],
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
         *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],
         ("stepper", Stepper),

@@ -108,6 +108,22 @@ def test_energy_and_constraints_over_many_periods(made, rtol):
     assert rows[:, 7].max() < 1e-14
 
 
+def test_a_weight_that_supplies_energy_is_conservative_too():
+    # displacements that are moved onto the constraint work against it
+    made = models.small(
+        "x y",
+        "(f_x**2 + f_y**2)/2",
+        work={"y": "-9.81"},
+        phi={"rod": "(q_x**2 + q_y**2 - 1)/2"},
+        initial={"q_x": (np.sin(ANGLE), True), "q_y": (-np.cos(ANGLE), False), "f_x": (0, True)},
+        observe={"H": "(f_x**2 + f_y**2)/2 + 9.81*q_y"},
+    )
+    t_end = 100.0 * SWING
+    rows, columns, _ = energy(made, t_end, np.linspace(0.0, t_end, 100), rtol=1e-3)
+    assert np.abs(rows[:, 6]).max() < 1e-13
+    assert np.abs(columns["H"] + G * np.cos(ANGLE)).max() < 1e-13
+
+
 def test_no_drift_of_constraints_at_the_steps_themselves():
     assert drift(models.pendulum("hamiltonian"), 400.0, "0", "energy", 1e-4) < 1e-14
     assert drift(models.slider_crank(), 20.0, "0", "energy", 1e-4) < 1e-13
