@@ -110,7 +110,8 @@ class Stepper(c.Structure):
         ("n", _I),
         *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
         ("nodes", _I),
-        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length", "moves", "part_moves"]],
+        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
+        *[(name, _P) for name in ["moves", "part_moves"]],
         ("collocated", _I),
     ]
 
