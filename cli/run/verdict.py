@@ -27,7 +27,7 @@ _CAUSES = {
     "singular": ("E931", "the iteration matrix is singular"),
     "inertia": ("E931", "an inertia became negative: a law was carried past its pole"),
     "nonfinite": ("E933", "an equation is not a number"),
-    "stiff": ("E930", "the equations are stiff, an explicit method is held to tiny steps: take radau or bdf"),
+    "stiff": ("E930", "the equations are stiff and hold the method to tiny steps: take radau or bdf"),
     "step_too_small": ("E930", "the step size fell below the resolution of time"),
     "max_steps": ("E934", "the limit of steps is reached"),
     "max_wall": ("E934", "the limit of wall time is reached"),

@@ -105,7 +105,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *comple
     radau->n = system->unknowns;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
                                   &radau->taken, step, dense, refine, start, 0, c, quadrature, radau->stage,
-                                  radau->stage_d, 1};
+                                  radau->stage_d, NULL, NULL, NULL, NULL, NULL, 1};
     return radau;
 }
 

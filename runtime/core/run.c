@@ -93,7 +93,7 @@ static double share(const sd_stepper *stepper, int32_t k, double to)
 static void integrate_nodes(sd_run *run, double part)
 {
     const sd_stepper *stepper = run->stepper;
-    double from = run->t_from, h = *stepper->t - from;
+    double from = run->t_from, h = stepper->length ? *stepper->length : *stepper->t - from;
     if (part < 1.0) { /* the whole step takes nothing of its start */
         memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
         weigh(run, h * share(stepper, -1, part));
@@ -105,6 +105,8 @@ static void integrate_nodes(sd_run *run, double part)
         audit(run, from + stepper->node[k] * h, stepper->node_y[k], stepper->node_yd[k], run->sample);
         weigh(run, h * weight);
     }
+    for (int32_t k = 2; stepper->moves && k < run->audited; k++)
+        run->integral[k] += stepper->moves[k];
 }
 
 /* run->integral [audited]: of the powers from the start of the last step to `to`, within that step */
@@ -118,6 +120,16 @@ static void integrate(sd_run *run, double to)
         return;
     if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {
         integrate_nodes(run, to == *stepper->t ? 1.0 : (to - from) / (*stepper->t - from));
+        return;
+    }
+    if (stepper->part_y) {
+        sample(run, to);
+        for (int32_t k = 0; k < stepper->nodes; k++) {
+            audit(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k], run->sample);
+            weigh(run, (to - from) * stepper->node_weight[k]);
+        }
+        for (int32_t k = 2; stepper->part_moves && k < run->audited; k++)
+            run->integral[k] += stepper->part_moves[k];
         return;
     }
     memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));

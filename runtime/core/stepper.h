@@ -1,6 +1,6 @@
 /* What the driver of an integration asks of a method: steps, values within the last step, a start.
  *
- * Every method (bdf.h, radau.h, dopri.h) holds one of these about itself; run.c knows methods by nothing else.
+ * Every method (bdf.h, radau.h, dopri.h, energy.h) holds one of these about itself; run.c knows methods by nothing else.
  */
 #ifndef SYSDYN_STEPPER_H
 #define SYSDYN_STEPPER_H
@@ -40,6 +40,11 @@ typedef struct sd_stepper {
     int32_t nodes;
     const double *node, *node_weight;
     double *const *node_y, *const *node_yd;
+    double *const *part_y, *const *part_yd; /* y, yd [n] at the nodes of the part of the step up to where `dense` was asked
+                                             * last, which is a step of its own; NULL: it is not */
+    const double *length;      /* of the last step, which t does not resolve after many; NULL: the difference of its ends */
+    const double *moves, *part_moves; /* [rows of block audit] what moves of displacements that took no time add to the
+                                       * integrals over the last step, and over the part of it; NULL: nothing */
     int32_t collocated;        /* 1: at most three nodes; a polynomial through them and the start serves within the step */
 } sd_stepper;
 

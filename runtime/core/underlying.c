@@ -139,8 +139,9 @@ static int onto(sd_underlying *u, sd_system *rows, int displacements, double t, 
             return SD_STOPPED;
         for (int32_t i = 0; i < system->held; i++) /* of a redundant constraint: it holds with the others */
             u->r[system->held_row[i]] = 0.0;
+        const double *goal = displacements ? u->goal_position : u->goal_velocity;
         for (int32_t j = 0; j < u->solved; j++)
-            u->step[j] = -u->r[u->first + j];
+            u->step[j] = (goal ? goal[u->first + j] : 0.0) - u->r[u->first + j];
         sd_linear_solve(u->linear, u->step);
         if (sd_first_bad(u->solved, u->step) >= 0)
             return SD_NONFINITE;
@@ -163,6 +164,18 @@ static int onto(sd_underlying *u, sd_system *rows, int displacements, double t, 
         before = size;
     }
     return before <= CLOSE ? SD_FINE : SD_NEWTON;
+}
+
+void sd_underlying_constraints(sd_underlying *u, double t, const double *y, double *position, double *velocity)
+{
+    memset(position, 0, (size_t)u->system->rows * sizeof *position);
+    memset(velocity, 0, (size_t)u->system->rows * sizeof *velocity);
+    if (u->position)
+        sd_residual(u->position, t, y, u->rest, position);
+    if (u->velocity)
+        sd_residual(u->velocity, t, y, u->rest, velocity);
+    for (int32_t i = 0; i < u->system->held; i++)
+        position[u->system->held_row[i]] = velocity[u->system->held_row[i]] = 0.0;
 }
 
 int sd_underlying_project(sd_underlying *u, double t, double *y, const double *yd)

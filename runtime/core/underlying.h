@@ -31,6 +31,8 @@ typedef struct sd_underlying {
     const int32_t *source;       /* [entries of linear] place in dF/dy, dF/dyd */
     const int32_t *from_rate;    /* [entries of linear] 1: in dF/dyd */
     const double *magnitude;     /* [n] */
+    const int32_t *displaced;    /* [rows] 1: a row of phi in `position` */
+    const double *goal_position, *goal_velocity; /* [rows] what the constraints are moved onto; NULL: zero */
     double tolerance;            /* of Newton's iteration, in magnitudes */
     double *jy, *jyd, *values, *r, *step, *rest, *memory;
     int32_t ready, bad_row, bad_column;
@@ -41,6 +43,8 @@ void sd_underlying_free(sd_underlying *underlying);
 /* z at (t, x): y [n] holds x and a guess of (kappa, mu, e), yd [n] one of the slopes; both are completed.  0 or a
  * cause (enum sd_cause) */
 int sd_underlying_slopes(sd_underlying *underlying, double t, double *y, double *yd);
+/* residuals of the constraints at (t, y), in the rows of their derivatives: position, velocity [rows], 0 where none is */
+void sd_underlying_constraints(sd_underlying *underlying, double t, const double *y, double *position, double *velocity);
 /* x in y [n] moved onto the constraints at t, by the factors of the last slopes or fresh ones; 0 or a cause */
 int sd_underlying_project(sd_underlying *underlying, double t, double *y, const double *yd);
 

@@ -20,7 +20,7 @@ from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.metric import kinematic_scale, light
 from sysdyn.runtime.integrate.pieces import Pieces
 from sysdyn.runtime.integrate.relaxation import displacement, order
-from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.integrate.request import LONGEST, ON_UNDERLYING, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.integrate.unknown_roles import Roles, roles
@@ -97,7 +97,7 @@ class Integration:
 
     def _linear(self, jy: Floats, jyd: Floats) -> None:
         self.underlying: Underlying | None = None
-        if self.request.method == "dopri":
+        if self.request.method in ON_UNDERLYING:
             self.underlying = Underlying(self.system, self.magnitude, jy, jyd)
             self.linear, self._order = self.underlying.linear, None
             return
@@ -140,7 +140,10 @@ class Integration:
             method.max_order = request.max_order
         else:
             method.patience = request.stiff_steps
-        if request.method != "dopri" and self.system.form.name in PROJECTED:
+        if request.method == "energy":
+            self._audit = self.system.observer("audit")
+            method.audit = None if self._audit is None else c.addressof(self._audit)
+        if self.underlying is None and self.system.form.name in PROJECTED:
             self._project = self._settler("constraints", np.ones(self.system.form.written, dtype=bool))
             method.project = self._project.address
         self.method.start(self.start.t, self.y, self.yd)

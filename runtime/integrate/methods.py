@@ -16,9 +16,9 @@ from sysdyn.runtime.model.system import System
 
 
 class Method:
-    """One of "bdf", "radau", "dopri" on one system.
+    """One of "bdf", "radau", "dopri", "energy" on one system.
 
-    linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri.
+    linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri and energy.
     """
 
     def __init__(
@@ -30,6 +30,12 @@ class Method:
         if name == "radau":
             self._complex = _complex_linear(system.pattern, order)
             self._core = lib.core.sd_radau_new(c.byref(system.core), linear, self._complex)
+        elif name == "energy":
+            assert underlying is not None
+            audited = system.observed_rows("audit")[1]
+            self._core = lib.core.sd_energy_new(
+                c.byref(system.core), underlying.core, system.form.extended, audited
+            )
         elif underlying is not None:
             self._core = lib.core.sd_dopri_new(c.byref(system.core), underlying.core)
         else:

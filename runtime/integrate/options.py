@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Plan
-from sysdyn.runtime.integrate.request import STEP, TRACE
+from sysdyn.runtime.integrate.request import ON_UNDERLYING, STEP, TRACE
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
 from sysdyn.runtime.structure.structure import Structure
@@ -70,10 +70,12 @@ class Options:
 def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[str, int, tuple[str, ...]]:
     """Form of the runtime, its index, warnings.  Raises NoSuchForm for a method that cannot integrate the form."""
     written = facts.index
-    if wanted == "auto" and method == "dopri":
+    if wanted == "auto" and method in ON_UNDERLYING:
         wanted = "0"
-    if method == "dopri" and wanted != "0":
-        raise NoSuchForm(f"method dopri integrates the underlying equation, index 0, and index {wanted} was asked for")
+    if method in ON_UNDERLYING and wanted != "0":
+        raise NoSuchForm(
+            f"method {method} integrates the underlying equation, index 0, and index {wanted} was asked for"
+        )
     if wanted == "0":
         return "0", 1, ()
     if written is None:
@@ -107,9 +109,9 @@ def choose_method(options: Options) -> str:
     if options.method == "auto":
         own = options.rtol is not None or options.atol is not None
         return "bdf" if own else "radau"
-    if options.method in ("bdf", "radau", "dopri", "euler"):
+    if options.method in ("bdf", "radau", "dopri", "energy", "euler"):
         return options.method
-    raise WrongOption(f"method {options.method}: auto, bdf, radau, dopri or euler")
+    raise WrongOption(f"method {options.method}: auto, bdf, radau, dopri, energy or euler")
 
 
 def instants(options: Options) -> tuple[Floats, Ints]:

@@ -14,6 +14,9 @@ from sysdyn.runtime.model.description import Floats, Ints
 LONGEST = 0.05
 """Longest step as part of the span: short events of sources are met, and the dense output stays honest."""
 
+ON_UNDERLYING = ("dopri", "energy")
+"""Methods that integrate the underlying equation (form 0)."""
+
 TRACE, STEP, COMPARED = 1, 2, 4
 """Kinds of rows (their second column, a sum)."""
 
@@ -24,10 +27,11 @@ class Request:
 
     t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
     (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
-    absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; method: bdf, radau or dopri
-    (form 0); fixed_step [s]: no error test (bdf with max_order 1: the implicit Euler method); h_max [s]: longest step,
-    None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the integration restarts
-    (segments.py); least_norm: rows hold the least multipliers of redundant constraints; stiff_steps: dopri gives up
+    absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; method: bdf, radau,
+    dopri or energy (form 0); fixed_step [s]: no error test (bdf with max_order 1: the implicit Euler method); h_max
+    [s]: longest step, None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the
+    integration restarts (segments.py); least_norm: rows hold the least multipliers of redundant constraints;
+    stiff_steps: dopri and energy give up
     where stability holds it to more steps than these; settled_to: scaled residual of rows that will do, 0: round-off.
     """
 

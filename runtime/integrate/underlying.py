@@ -79,6 +79,7 @@ class Underlying:
         core.unknown, core.rate, core.column = map(lib.pointer, (self._unknown, self._rate, self._column))
         core.source, core.from_rate = lib.pointer(self._source), lib.pointer(self._from_rate)
         core.magnitude, core.tolerance = lib.pointer(magnitude), 1e-14
+        core.displaced = lib.pointer(self._displaced)
 
     def _select(self) -> None:
         """The matrix's pattern, and where its entries stand in dF/dy, dF/dy'."""
@@ -117,6 +118,10 @@ class Underlying:
         self._keep: list[Any] = []
         self.position = self._rows("phi")
         self.velocity = self._rows("phi_rate", "psi", "momentum")
+        self._displaced = np.zeros(system.rows, dtype=np.int32)
+        for planned in system.form.calls:
+            for k in system.description.rows_of("phi") if planned.block == "phi_acceleration" else ():
+                self._displaced[planned.to[k] : planned.to[k] + system.description.rows[k].size] = 1
 
     def _rows(self, *blocks: str) -> lib.System | None:
         """Rows of constraints in the places of their derivatives; None where the model has none."""

@@ -11,6 +11,7 @@ MAX_ORDER = 5
 STAGES = 3
 DOPRI_STAGES = 16
 DOPRI_DENSE = 7
+ENERGY_STAGES = 6
 ROW_HEAD = 8
 CAUSES = ("", "newton", "error_test", "singular", "nonfinite", "step_too_small", "stopped", "memory", "stiff")
 
@@ -109,7 +110,8 @@ class Stepper(c.Structure):
         ("n", _I),
         *[(name, _P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
         ("nodes", _I),
-        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd"]],
+        *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
+        *[(name, _P) for name in ["moves", "part_moves"]],
         ("collocated", _I),
     ]
 
@@ -222,7 +224,8 @@ class Underlying(c.Structure):
     _fields_ = [
         *[(name, _P) for name in ["system", "matrix", "applied", "position", "velocity", "linear"]],
         *[(name, _I) for name in ["n", "first", "solved", "direct"]],
-        *[(name, _P) for name in ["unknown", "rate", "column", "source", "from_rate", "magnitude"]],
+        *[(name, _P) for name in ["unknown", "rate", "column", "source", "from_rate", "magnitude", "displaced"]],
+        *[(name, _P) for name in ["goal_position", "goal_velocity"]],
         ("tolerance", _D),
         *[(name, _P) for name in ["jy", "jyd", "values", "r", "step", "rest", "memory"]],
         *[(name, _I) for name in ["ready", "bad_row", "bad_column"]],
@@ -245,6 +248,47 @@ class Dopri(c.Structure):
         *[(name, _P * DOPRI_STAGES) for name in ["y", "rate"]],
         ("f", _P * DOPRI_DENSE),
         *[(name, _P) for name in ["ee", "weight", "memory"]],
+        *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
+        *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],
+        ("stepper", Stepper),
+    ]
+
+
+class Collocation(c.Structure):
+    """sd_collocation."""
+
+    _fields_ = [(name, _P * ENERGY_STAGES) for name in ["y", "rate"]]
+
+
+class Energy(c.Structure):
+    """sd_energy."""
+
+    _fields_ = [
+        ("system", _P),
+        ("underlying", _P),
+        ("n", _I),
+        ("tested", _I),
+        *[(name, _D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, _P) for name in ["atol", "magnitude", "met", "test", "power"]],
+        ("patience", _D),
+        ("audit", _P),
+        ("audited", _I),
+        *[(name, _D) for name in ["t", "h", "h_used", "wanted", "anchor", "anchor_end"]],
+        *[(name, _L) for name in ["count", "done"]],
+        *[(name, _D) for name in ["rough", "before", "rough_before"]],
+        *[(name, _L) for name in ["window", "since", "held"]],
+        *[(name, _I) for name in ["limited", "grown"]],
+        *[(name, _D) for name in ["frequency", "energy", "lost", "content"]],
+        *[(name, _I) for name in ["finding", "guessed"]],
+        ("dense_t", _D),
+        ("inner_ready", _I),
+        *[(name, _P) for name in ["phi", "yd", "rest", "from", "from_d", "from_rest"]],
+        ("from_t", _D),
+        ("from_energy", _D),
+        *[(name, Collocation) for name in ["stage", "side"]],
+        *[(name, _P) for name in ["raw", "half", "half_rest", "inner", "inner_d", "trial", "old_y", "old_rate"]],
+        *[(name, _P) for name in ["begin", "position", "velocity"]],
+        *[(name, _P) for name in ["base", "sample", "work", "moves", "inner_moves", "ee", "weight", "memory"]],
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
         *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],
         ("stepper", Stepper),

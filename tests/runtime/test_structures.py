@@ -16,7 +16,8 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("LeastNorm", "sd_least_norm"), ("Run", "sd_run"), ("Ledgers", "sd_ledgers"), ("Record", "sd_record")]
     pairs += [("Many", "sd_many"), ("Pass", "sd_pass"), ("Region", "sd_region"), ("RunClaim", "sd_claim")]
     pairs += [("RunSamples", "sd_samples")]
-    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau", "many")]
+    pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
+    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau", "dopri", "energy", "many")]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
         lines.append(f'printf("%zu\\n", sizeof({tag}));')
