@@ -14,6 +14,8 @@
 #define SHORT 60
 #define SHORT_CREDIT 0.75
 #define FIRST_DROP 1e-2
+#define PARTED 10.0
+#define MUCH 0.3
 #define ROUND_OFF (64.0 * DBL_EPSILON)
 #define NOTHING 1e-12    /* of the largest of the same unit: what is left of a zero (model/scales.py) */
 #define GROUP 1e-3       /* of the largest of its like: the least magnitude of a zero */
@@ -334,7 +336,7 @@ static double difference(const sd_many *many, const sd_pass *pass, const sd_samp
         for (int32_t k = 0; k < fine->number; k++) {
             size_t at = (size_t)k * many->columns + q;
             double a = coarse->value[at], b = fine->value[at];
-            double d = fmax(fabs(b - a) - fmax(coarse->late[at], fine->late[at]), 0.0);
+            double d = fmax(fabs(b - a) - fine->late[at], 0.0);
             d = isfinite(a) && isfinite(b) ? d : INFINITY;
             largest = fmax(largest, fmax(fabs(a), fabs(b)));
             apart = fmax(apart, d);
@@ -346,6 +348,26 @@ static double difference(const sd_many *many, const sd_pass *pass, const sd_samp
         *over = fmax(*over, apart / many->target[q]);
     }
     return worst;
+}
+
+/* 1: two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it is */
+static int parted(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine)
+{
+    double *size = many->work, *noise = size + many->columns;
+    measures(many, pass, size, noise, noise + many->columns);
+    for (int32_t q = 0; q < many->columns && fine->number; q++) {
+        double most = fabs(fine->value[q]);
+        if (!(most > noise[q]))
+            continue;
+        for (int32_t k = 1; k < fine->number; k++) {
+            size_t at = (size_t)k * many->columns + q;
+            double a = coarse->value[at], b = fine->value[at];
+            if (fabs(b - a) - fine->late[at] > fmax(PARTED * most, MUCH * fmax(fabs(a), fabs(b))))
+                return 1;
+            most = fmax(most, fabs(b));
+        }
+    }
+    return 0;
 }
 
 static double shrink(double power, double step)
@@ -405,7 +427,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             part = shrink(power < 0.0 ? credit : fmin(power, credit), step);
         }
         *estimate = apart * part;
-        if (over * part <= 1.0) {
+        if (over * part <= 1.0 && !parted(many, &many->passes[1], last, there)) {
             if (!balanced(many, many->passes[1].run->ledgers))
                 return SD_MANY_ENERGY;
             int32_t at = 0;
