@@ -150,16 +150,21 @@ def test_an_invariant_that_nothing_projects_does_not_drift():
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
 def test_the_balance_is_closed_where_energy_is_lost_and_supplied(form):
     rows = energy(models.dc_motor(form), 0.6, np.linspace(0, 0.6, 61), rtol=1e-6)[0]
-    assert np.abs(rows[:, 6]).max() < 1e-13 * rows[:, 5].max()
+    # from rest there is no energy that a move could change: the row within the first step has its quadrature's error
+    assert np.abs(rows[2:, 6]).max() < 1e-13 * rows[:, 5].max()
+    assert np.abs(rows[:2, 6]).max() < 1e-11 * rows[:, 5].max()
 
 
 def test_the_estimate_includes_the_phase(tmp_path):
     t_end = 200.0 * SWING
     outcome = simulated(tmp_path, minimal(), t_end, method="energy", accuracy=1e-6)
     trace = Trace.open(tmp_path / "t.h5")
-    error = np.abs(np.asarray(trace["a"]) - angle(np.asarray(trace.time))).max()
+    t, late = np.asarray(trace.time), 1e-9 * t_end  # the time tolerance
+    values = np.asarray(trace["a"])
+    near = np.array([angle(np.clip(t + side * late, 0.0, None)) for side in (-1.0, 0.0, 1.0)])
+    error = np.maximum(values - near.max(axis=0), near.min(axis=0) - values).max()
     assert (outcome.method, outcome.index, outcome.met) == ("energy", "0", True)
-    assert error < 3e-6
+    assert error < 1e-6
     assert outcome.error_estimate > error / 3.0
 
 
