@@ -106,6 +106,78 @@ def joined(target: Target, text: str, candidate: Candidate) -> str:
     return changed(text, cuts)
 
 
+def merged(target: Target, text: str, candidate: Candidate) -> str | None:
+    """The text with the ends of an element as one node, named by the first; None where that cannot be said.
+
+    What lies between the two goes: elements with both ends there.  A node of which anything but the ends of elements
+    speaks is not renamed.
+    """
+    statement = next((s for s in target.model.body if (s.span.start, s.span.end) == candidate.span), None)
+    if not isinstance(statement, syntax.Instance) or not candidate.joined:
+        return None
+    ends = _ends(text, statement.connections[0])
+    if len(ends) != 2 or not all(re.fullmatch(r"\w+", end) for end in ends):
+        return None
+    for stays, goes in (ends, ends[::-1]):
+        node = _declared(target, goes)
+        if node is not None and stays != goes and _spoken(target, text, goes) == 0:
+            return changed(text, [*_renamed(target, text, goes, stays), *_undeclared(text, node, goes)])
+    return None
+
+
+def _ends(text: str, connection: syntax.Connection) -> list[str]:
+    """What an element stands between."""
+    if isinstance(connection, syntax.Across | syntax.BindAcross):
+        return [text[end.span.start : end.span.end] for end in (connection.plus, connection.minus)]
+    return [text[connection.node.span.start : connection.node.span.end], "ground"] if isinstance(
+        connection, syntax.Single
+    ) else []
+
+
+def _declared(target: Target, name: str) -> syntax.Node | None:
+    """The scalar node of that name that the model declares."""
+    nodes = (s for s in target.model.body if isinstance(s, syntax.Node))
+    return next((s for s in nodes if any(d.name == name and not d.indices for d in s.decls)), None)
+
+
+def _connections(target: Target) -> Iterator[tuple[syntax.Instance, syntax.Connection]]:
+    for s in target.model.body:
+        if isinstance(s, syntax.Instance):
+            yield from ((s, connection) for connection in s.connections)
+
+
+def _spoken(target: Target, text: str, name: str) -> int:
+    """How often the model and its scenes speak of a node, declarations and ends of elements apart."""
+    scenes = [item.span for item in target.document.file.items if isinstance(item, syntax.Scene)]
+    whole = sum(_read(text[span.start : span.end], name, of=True) for span in (target.model.span, *scenes))
+    ends = sum(_read(text[c.span.start : c.span.end], name, of=True) for _, c in _connections(target))
+    return whole - ends - 1
+
+
+def _renamed(target: Target, text: str, goes: str, stays: str) -> Iterator[Cut]:
+    """Cuts that put one node for another at the ends of elements, and take away what then has both ends there."""
+    word = re.compile(rf"(?<![\w.]){re.escape(goes)}(?!\w)")
+    for statement in dict.fromkeys(s for s, _ in _connections(target)):
+        within = [(c, word.sub(stays, text[c.span.start : c.span.end])) for c in statement.connections]
+        sides = [[word.sub(stays, end) for end in _ends(text, c)] for c, _ in within]
+        if len(sides) == 1 and len(sides[0]) == 2 and sides[0][0] == sides[0][1]:
+            yield statement.span.start, statement.span.end, ""
+            yield from ((*span, "") for span in _initials(target, statement.decl.name))
+            continue
+        for connection, new in within:
+            if new != text[connection.span.start : connection.span.end]:
+                yield connection.span.start, connection.span.end, new
+
+
+def _undeclared(text: str, node: syntax.Node, name: str) -> Iterator[Cut]:
+    """Cuts that take a name out of a declaration."""
+    if len(node.decls) == 1:
+        yield node.span.start, node.span.end, ""
+        return
+    names = [text[d.span.start : d.span.end] for d in node.decls if d.name != name]
+    yield node.decls[0].span.start, node.decls[-1].span.end, ", ".join(names)
+
+
 def _initials(target: Target, name: str) -> Iterator[tuple[int, int]]:
     """Spans of `init` statements of the model and the scene whose target begins with a name."""
     source = target.document.file.source
@@ -143,7 +215,7 @@ def unread(target: Target, text: str, before: str) -> str:
     return changed(text, cuts)
 
 
-def _read(text: str, name: str) -> int:
-    """How often a name stands in a text, comments apart."""
+def _read(text: str, name: str, *, of: bool = False) -> int:
+    """How often a name stands in a text, comments apart; of: as what is said of something too (`x.name`)."""
     plain = re.sub(r"#[^\n]*", "", text)
-    return len(re.findall(rf"(?<![\w.]){re.escape(name)}(?!\w)", plain))
+    return len(re.findall(rf"(?<![\w{'' if of else '.'}]){re.escape(name)}(?!\w)", plain))

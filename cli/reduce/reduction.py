@@ -1,7 +1,7 @@
 """The model without what its scene does not need: elements tried in order of activity, each change measured.
 
-The full model's run at a tenth of the accuracy is the reference.  The least active element is left out, or its ends are
-joined; what the traced quantities differ by is measured, and the change is kept where it stays within the accuracy (all
+The full model's run at a tenth of the accuracy is the reference.  The least active element is left out, or its ends
+become one; what the traced quantities differ by is measured, and the change is kept where it stays within the accuracy (all
 changes together).  After MISSES elements in a row that are needed the rest, which takes part more, is left alone.
 Received: a request; handed back: `Reduced`.
 """
@@ -42,8 +42,8 @@ LARGEST = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One change.  how: left out, joined; error: of all changes so far and this one, None where it cannot run; kept;
-    reason: why not.
+    """One change.  how: left out, ends one (a node), joined (by a source of zero); error: of all changes so far and this
+    one, None where it cannot run; kept; reason: why not.
     """
 
     label: str
@@ -186,6 +186,9 @@ class _Reduction:
 
     def _variants(self, target: Target, text: str, candidate: edits.Candidate) -> list[tuple[str, str]]:
         made = [("left out", edits.without(target, text, candidate))]
+        one = edits.merged(target, text, candidate)
+        if one is not None:
+            made.append(("ends one", one))
         if candidate.joined:
             made.append(("joined", edits.joined(target, text, candidate)))
         clean = []

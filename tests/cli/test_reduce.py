@@ -1,5 +1,7 @@
 """`sysdyn reduce`: activities in closed form, and a reduced model whose error is measured by a run of its own."""
 
+import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -207,3 +209,64 @@ def test_a_model_without_powers_is_told_so(tmp_path, capsys):
     text = "model m {\n  state y: 1 = 1\n  dynamic y' = -1 Hz*y\n}\nscene s of m { time 0 s to 1 s; trace y }\n"
     assert run(["reduce", write(tmp_path, text)]) == 1
     assert "powers of the elements" in capsys.readouterr().err
+
+
+LINKED = """\
+## Two discs on a stiff shaft with its damper, a rubber foot under the second bearing.
+from std.mechanical import inertia, torsion, rotary_damper
+
+model linked {
+  node left, right: rotation = 0 rad
+  node foot: rotation = 0 rad
+  drive: effort(e = 2 N.m) ground -> left
+  one: inertia(J = 0.3 kg.m^2) left
+  shaft: torsion(k = 1e7 N.m/rad) left -> right
+  loss: rotary_damper(b = 3 N.m.s/rad) left -> right
+  other: inertia(J = 0.2 kg.m^2) right
+  bearing: rotary_damper(b = 0.1 N.m.s/rad) right -> foot
+  rubber: torsion(k = 1e6 N.m/rad) foot -> ground
+  init one.f = 0 rad/s
+  init right.f = 0 rad/s
+}
+
+scene go of linked {
+  time 0 s to 4 s
+  trace one.f as om
+  accuracy 1e-4
+}
+"""
+
+
+def test_what_a_stiff_shaft_joins_becomes_one_node(tmp_path, capsys):
+    file = write(tmp_path, LINKED.replace("  init right.f = 0 rad/s\n", ""))
+    code, found = run_json(capsys, "reduce", file, "-o", str(tmp_path / "small.sd"))
+    assert code == 0
+    kept = {(t["element"], t["change"]) for t in found["result"]["trials"] if t["kept"]}
+    assert {("loss", "left out"), ("shaft", "ends one"), ("rubber", "ends one")} <= kept
+    text = (tmp_path / "small.sd").read_text()
+    assert "node left: rotation" in text
+    assert "right" not in text
+    assert "foot:" not in text
+    assert "other: inertia(J = 0.2 kg.m^2) left" in text
+    assert "bearing: rotary_damper(b = 0.1 N.m.s/rad) left -> ground" in text
+    trace = api.simulate(tmp_path / "small.sd", output=tmp_path / "small.h5")
+    exact = 20.0 * -np.expm1(-0.2 * np.asarray(trace.time))  # J om' = M - b om
+    assert np.abs(np.asarray(trace["om"]) - exact).max() < 2e-4 * exact.max()
+
+
+def test_a_node_that_something_speaks_of_keeps_its_name(tmp_path, capsys):
+    code, _found = run_json(capsys, "reduce", write(tmp_path, LINKED), "-o", str(tmp_path / "small.sd"))
+    assert code == 0
+    text = (tmp_path / "small.sd").read_text()
+    assert "right" in text  # `init right.f` does
+
+
+@pytest.mark.skipif(os.environ.get("SYSDYN_LONG") != "1", reason="SYSDYN_LONG=1 reduces the drivetrain")
+def test_a_drivetrain_of_forty_elements(tmp_path, capsys):
+    file = str(ROOT / "models/gallery/drivetrain.sd")
+    code, found = run_json(capsys, "reduce", file, "--scene", "start", "-o", str(tmp_path / "small.sd"))
+    assert code == 0
+    assert found["result"]["error"] <= 1e-2
+    text = (tmp_path / "small.sd").read_text()
+    assert "flow(f = 0" not in text
+    assert len(re.findall(r"^  \w+: \w+\(", text, re.MULTILINE)) < 25
