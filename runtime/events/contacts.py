@@ -110,6 +110,14 @@ class Contacts:
         senses = (float(self.p[c.sense]) if c.sense >= 0 else 0.0 for c in self.contacts)
         return (*map(float, self.active), *senses)
 
+    def become(self, state: tuple[float, ...]) -> None:
+        """The active set and the senses as `state` gave them."""
+        self.active[:] = np.array(state[: len(self.contacts)]) != 0.0
+        for contact, sense in zip(self.contacts, state[len(self.contacts) :], strict=True):
+            if contact.sense >= 0:
+                self.p[contact.sense] = sense
+        self.apply()
+
     def word(self, k: int) -> str:
         """How a contact stands."""
         contact = self.contacts[k]

@@ -339,8 +339,12 @@ class Integration:
                 assert self.pieces is not None
                 self.cpu += self.pieces.event(sink)
                 continue
-            if state == 1 and self.pieces is not None and self.pieces.sample(segment_end, sink):
-                continue
+            if state == 1 and self.pieces is not None:
+                before = time.process_time()
+                more = self.pieces.sample(segment_end, sink)
+                self.cpu += time.process_time() - before
+                if more:
+                    continue
             if state == 1:
                 break
             if method.steps - marked >= CRAWL:

@@ -113,6 +113,7 @@ def _load() -> Any:
         "sd_run_advance": (c.c_int, [_P, _L, _D]),
         "sd_run_accept": (c.c_int, [_P, _D, _I]),
         "sd_run_drain": (c.c_int, [_P]),
+        "sd_run_observe": (None, [_P, _D, _P]),
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(core, name)

@@ -15,6 +15,9 @@ from sysdyn.runtime.start.impulses import Impulses, group_rows
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 
+STILL = 1e-10
+"""Of its magnitude: what a state may move by and has not jumped."""
+SAME = 4
 EXACT = 1e-9
 """Scaled residual with which the slower search is content."""
 
@@ -27,6 +30,7 @@ class Restart:
         self.impulses = Impulses(settler.system)
         self._starter: Starter | None = None
         self.thorough = False
+        self._same: dict[bytes, int] = {}
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
@@ -37,20 +41,36 @@ class Restart:
         """The same with the impulses [unknowns as written] that took the flows there."""
         magnitude = self.magnitude(y.size)
         impulse = np.zeros(y.size)
+        self.settler.core.contents.ready = 0
+        found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
+        still = done and bool((np.abs(found - y)[self.state] <= STILL * magnitude[self.state]).all())
+        if still:  # no state need jump: there is no impulse
+            return *self._thoroughly(t, found, rate, magnitude), impulse
         if self.impulses.broken(t, y, yd, magnitude):
             y, impulse = self.impulses.after(t, y, yd, magnitude)
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
         for hold in (HELD, 1.0):
             self.settler.core.contents.ready = 0
             found, rate, done = self.settler.settle(t, y, yd, hold=hold)
-            if done and self.thorough:
-                # flows without inertia in loops of stores follow from the rate of their balance alone
-                further = self._search(t, found, rate, magnitude, most=1)
-                found, rate = further or (found, rate)
             if done:
-                return found, rate, impulse
+                return *self._thoroughly(t, found, rate, magnitude), impulse
         searched = self._search(t, y, yd, magnitude)
         return None if searched is None else (*searched, impulse)
+
+    def _thoroughly(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
+        """Flows without inertia in loops of stores follow from the rate of their balance alone: they are sought, with
+        each set of constraints that hold, until SAME searches have changed nothing.
+        """
+        key = self.settler.system.description.switches.active.tobytes()
+        if not self.thorough or self._same.get(key, 0) >= SAME:
+            return y, yd
+        found = self._search(t, y, yd, magnitude, most=1)
+        if found is None:
+            return y, yd
+        rates = self._rates(magnitude)
+        same = (np.abs(found[0] - y) <= STILL * magnitude).all() and (np.abs(found[1] - yd) <= STILL * rates).all()
+        self._same[key] = self._same.get(key, 0) + 1 if same else 0
+        return found
 
     def _rates(self, magnitude: Floats) -> Floats:
         """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""
