@@ -164,6 +164,11 @@ class Contacts:
             elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
                 yield k
 
+    def doubtful(self, values: Floats) -> bool:
+        """Whether a contact that does not hold is on its boundary."""
+        off = (c for k, c in enumerate(self.contacts) if not self.active[k] and c.kind in _TESTED)
+        return any(abs(values[c.value]) <= self.observer.zero(c.value) for c in off)
+
     def bar(self, k: int, values: Floats) -> bool:
         """Whether the guard of an inequality says that it is not there."""
         guard = self.contacts[k].guard
@@ -369,4 +374,5 @@ class Contacts:
         return self._form
 
 
+_TESTED = ("phi", "psi", "friction", "planar")
 _TESTS = {"friction": Contacts._friction, "planar": Contacts._planar}
