@@ -169,7 +169,8 @@ def main() -> int:
         step = smooth(2e-3, method=method, rtol=rtol)
         work = (cpu - steps * step) / (2 * periods)
         print(f"{line}; {cpu:.2f} s CPU ({whole:.2f} s the call), {steps} steps, {1e6 * each:.0f} us a switch;")
-        print(f"  a smooth step {1e6 * step:.1f} us, an event {1e6 * work:.0f} us = {work / step:.0f} steps", flush=True)
+        said = f"  a smooth step {1e6 * step:.1f} us, an event {1e6 * work:.0f} us = {work / step:.0f} steps"
+        print(said, flush=True)
         ok = ok and (off < 1e-9 or rtol > 1e-9)
     for reltol, share in ((1e-3, 0.02), (1e-5, 0.002)):
         peer = ngspice(periods, reltol, share)
