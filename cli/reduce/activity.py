@@ -67,7 +67,7 @@ def activities(
         if options.accuracy is not None and own:  # of the scene's quantities alone
             options = replace(options, accuracy=None, accuracy_on=tuple((name, options.accuracy) for name in own))
         inner = Report()
-        rich = prepare(network, inner, formulation=prepared.formulation, backend=prepared.backend)
+        rich = prepare(network, inner, formulation=prepared.formulation, backend=prepared.backend, traced=True)
         ran = None if rich is None else integrate(target, rich, options, inner)
     if ran is None or not ran.outcome.final:
         report.extend(inner)

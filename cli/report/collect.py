@@ -135,7 +135,7 @@ def _energies(
     with _timed("energies of the elements (a run of their own)", stages):
         try:
             report = Report()
-            rich = prepare(network, report, formulation=prepared.formulation, backend=prepared.backend)
+            rich = prepare(network, report, formulation=prepared.formulation, backend=prepared.backend, traced=True)
             again = None if rich is None else integrate(target, rich, fixed, report)
             return None if again is None or again.failure else shares(again.outcome.traced, parts)
         except (UsageError, TraceError):

@@ -43,6 +43,7 @@ def twins(prepared: Prepared, started: Started, until: float) -> Twins | None:
         Report(),
         formulation=prepared.formulation,
         backend="c" if prepared.backend == "numpy" else "numpy",
+        traced=True,
     )
     if other is None or other.backend == prepared.backend:
         return None

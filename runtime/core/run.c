@@ -321,6 +321,15 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
     rows_of_start(run, label);
 }
 
+void sd_run_observe(sd_run *run, double t, double *values)
+{
+    run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+    if (run->settle)
+        sd_settle_point(run->settle, t, run->aux, run->aux_d);
+    memset(values, 0, (size_t)run->observed * sizeof *values);
+    run->observe->rows(&run->observe->frame, t, run->aux, run->aux_d, values);
+}
+
 /* whether something watched changes within the last step */
 static int changes(sd_run *run, double from)
 {

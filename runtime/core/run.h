@@ -76,6 +76,8 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
  * rows are full, `sd_run_drain` goes on */
 int sd_run_accept(sd_run *run, double to, int32_t kind);
 int sd_run_drain(sd_run *run);
+/* values [observed] of block observe at t within the last step, settled */
+void sd_run_observe(sd_run *run, double t, double *values);
 /* steps until `steps` more are taken, `seconds` are over, the rows are full, the end, a failure, or a step within which
  * something watched changes (SD_EVENT: the step is not counted yet, see sd_run_accept) */
 int sd_run_advance(sd_run *run, int64_t steps, double seconds);

@@ -110,6 +110,14 @@ class Contacts:
         senses = (float(self.p[c.sense]) if c.sense >= 0 else 0.0 for c in self.contacts)
         return (*map(float, self.active), *senses)
 
+    def become(self, state: tuple[float, ...]) -> None:
+        """The active set and the senses as `state` gave them."""
+        self.active[:] = np.array(state[: len(self.contacts)]) != 0.0
+        for contact, sense in zip(self.contacts, state[len(self.contacts) :], strict=True):
+            if contact.sense >= 0:
+                self.p[contact.sense] = sense
+        self.apply()
+
     def word(self, k: int) -> str:
         """How a contact stands."""
         contact = self.contacts[k]
@@ -155,6 +163,11 @@ class Contacts:
                     yield k
             elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
                 yield k
+
+    def doubtful(self, values: Floats) -> bool:
+        """Whether a contact that does not hold is on its boundary."""
+        off = (c for k, c in enumerate(self.contacts) if not self.active[k] and c.kind in _TESTED)
+        return any(abs(values[c.value]) <= self.observer.zero(c.value) for c in off)
 
     def bar(self, k: int, values: Floats) -> bool:
         """Whether the guard of an inequality says that it is not there."""
@@ -361,4 +374,5 @@ class Contacts:
         return self._form
 
 
+_TESTED = ("phi", "psi", "friction", "planar")
 _TESTS = {"friction": Contacts._friction, "planar": Contacts._planar}

@@ -81,7 +81,8 @@ class Handler:
         self.truth = [False] * len(plan.whens)
         self.bounces: dict[int, Bounce] = {}
         self.happened: list[Happened] = []
-        self.samples = 0
+        self._follows: dict[tuple[tuple[float, ...], tuple[int, ...]], tuple[float, ...]] = {}
+        self._impacts = any(c.kind in ("phi", "planar") for c in plan.contacts)
         self._next = [0] * len(plan.sampled)
         self._stalled, self._last = 0, -np.inf
         self.back(begin)
@@ -292,6 +293,11 @@ class Handler:
         try:
             self._guards(t, y, yd)
             stood = self.contacts.state()
+            known = self._remembered(t, (y, yd), (stood, tuple(touched)))
+            if known is not None:
+                self._renew(t, *known)
+                self._note(t, said, touched)
+                return known
             y = self.contacts.strike(t, y, yd, self._strike, self.plan.rest)
             values = self.observer(t, y, yd)
             for k in touched:
@@ -302,12 +308,35 @@ class Handler:
             tied = any(self.contacts.contacts[k].kind != "phi" for k in touched)  # a gap may have bounced
             if tied and self.contacts.state() == stood:
                 found = self._ahead(t, found, stood) or found
+            if not self._impacts:
+                self._follows[stood, tuple(touched)] = self.contacts.state()
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
         self._renew(t, *found)
         self._bounce(t, *found)
         self._note(t, said, touched)
         return found
+
+    def _remembered(self, t: float, point: Point, key: tuple[tuple[float, ...], tuple[int, ...]]) -> Point | None:
+        """The point with the active set that followed when this happened before, where it fits; None where not."""
+        after = self._follows.get(key)
+        if after is None or self._stalled:
+            return None
+        assert self.restart is not None
+        before = self.contacts.active.copy(), self.p.copy()
+        self.contacts.become(after)
+        found = self.restart.struck(t, *point, rates=False)
+        values = None if found is None else self.observer(t, *found[:2])
+        if values is not None and self.contacts.doubtful(values):  # their rates decide
+            found = self.restart.struck(t, *point)
+            values = None if found is None else self.observer(t, *found[:2])
+        if found is not None and values is not None:
+            fits = self.contacts.wrong(values, found[2]) < 0
+            if fits and self.determined.leaves(t, *found[:2]) == 0:
+                return found[0], found[1]
+        self.contacts.active[:], self.p[:] = before
+        self.contacts.apply()
+        return None
 
     def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
         """The gaps that an impact opened."""

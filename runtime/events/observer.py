@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ class Observer:
         self._calls = [system.observer(name) for name in ("observe", "observe_scale")]
         self._y, self._yd = np.zeros(system.form.extended), np.zeros(system.form.extended)
         self._out = np.zeros(max(self._number, 1))
+        self._pointers = [lib.pointer(item) for item in (self._y, self._yd, self._out)]
+        self._functions: dict[int, Any] = {}
         self.largest = np.zeros(self._number)
         families = [system.description.rows[k] for k in system.description.rows_of("observe")]
         self._units = [family.unit for family in families for _ in range(family.size)]
@@ -34,8 +37,9 @@ class Observer:
     def _rows(self, call: lib.Call | None, t: float) -> Floats:
         self._out[:] = 0.0
         if call is not None:
-            function = lib.ROWS(call.rows)
-            function(c.addressof(call.frame), t, *map(lib.pointer, (self._y, self._yd, self._out)))
+            if call.rows not in self._functions:
+                self._functions[call.rows] = lib.ROWS(call.rows)
+            self._functions[call.rows](c.addressof(call.frame), t, *self._pointers)
         return self._out[: self._number].copy()
 
     def __call__(self, t: float, y: Floats, yd: Floats) -> Floats:

@@ -63,7 +63,7 @@ class Integration:
         # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, start.t, jyd, request.index)
-        self._carries = self.roles.state
+        self._carries, self._resolved = self.roles.state, np.zeros(system.unknowns)
         state = np.isin(system.kinds, ("q", "f"))
         # a tolerance below what round-off leaves open is one that no step meets
         self._least = np.where(state, UNRESOLVED * unresolved(system, self.y, jy), 0.0) / max(request.rtol, 1e-15)
@@ -305,6 +305,9 @@ class Integration:
 
     def _resolve(self, t: float) -> None:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero."""
+        if (np.abs(self.y) <= 2.0 * self._resolved).all():
+            return
+        self._resolved = np.maximum(self._resolved, np.abs(self.y))
         jy, _ = self.system.jacobian(t, self.y, self.yd)
         open_ = np.where(self._carries, 0.0, noise(self.system, self.y, jy, self._time))
         np.maximum(self.magnitude, UNRESOLVED * open_ / max(self.request.rtol, 1e-15), out=self.magnitude)
@@ -344,8 +347,12 @@ class Integration:
                 assert self.pieces is not None
                 self.cpu += self.pieces.event(sink)
                 continue
-            if state == 1 and self.pieces is not None and self.pieces.sample(segment_end, sink):
-                continue
+            if state == 1 and self.pieces is not None:
+                before = time.process_time()
+                more = self.pieces.sample(segment_end, sink)
+                self.cpu += time.process_time() - before
+                if more:
+                    continue
             if state == 1:
                 break
             if method.steps - marked >= CRAWL:

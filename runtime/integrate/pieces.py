@@ -90,7 +90,10 @@ class Pieces:
         return y, yd
 
     def _values(self, t: float) -> Floats:
-        return self.handler.observer(t, *self._point(t))
+        """Values [observed] at t within the last step, settled: what an event is located by."""
+        values = np.zeros(max(self.run.observed, 1))
+        lib.core.sd_run_observe(self.run.run_, t, lib.pointer(values))
+        return values[: self.run.observed]
 
     def event(self, sink: Sink) -> float:
         """What changes within the last step, which is counted up to there; CPU seconds spent."""

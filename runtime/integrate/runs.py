@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime.events.kinks import LIVE
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import Sampled
 from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, drafted, joined, known
@@ -85,6 +86,8 @@ class Runs:
         self.start, self.options = start, options
         self.take(way)
         self.columns: tuple[Column, ...] = columns_of(self.system.description)
+        if options.events:  # laws are as the text says, whatever a run before from this start left
+            self.system.description.p[[kink.branch for kink in options.events.kinks]] = LIVE
         # events write there: every run begins with these
         self.begin = self.system.description.p.copy(), self.system.description.switches.active.copy()
         self.names = _observed_names(self.system.description)

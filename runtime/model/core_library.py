@@ -132,6 +132,7 @@ def _load() -> Any:
         "sd_linear_pivoted": (_P, [_P]),
         "sd_linear_z_pivoted": (_P, [_P]),
         "sd_many_runs": (None, [_P, _I, *[_P] * 10]),
+        "sd_run_observe": (None, [_P, _D, _P]),
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(core, name)

@@ -15,6 +15,10 @@ from sysdyn.runtime.start.impulses import Impulses, group_rows
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 
+STILL = 1e-10
+"""Of its magnitude: what a state may move by and has not jumped."""
+SAME = 4
+"""Searches in a row."""
 EXACT = 1e-9
 """Scaled residual with which the slower search is content."""
 
@@ -27,30 +31,53 @@ class Restart:
         self.impulses = Impulses(settler.system)
         self._starter: Starter | None = None
         self.thorough = False
+        self._same: dict[bytes, int] = {}
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
         found = self.struck(t, y, yd)
         return None if found is None else found[:2]
 
-    def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
-        """The same with the impulses [unknowns as written] that took the flows there."""
+    def struck(
+        self, t: float, y: Floats, yd: Floats, *, rates: bool = True
+    ) -> tuple[Floats, Floats, Floats] | None:
+        """The same with the impulses [unknowns as written] that took the flows there; rates: those of flows without
+        inertia are asked for.
+        """
         magnitude = self.magnitude(y.size)
         impulse = np.zeros(y.size)
+        self.settler.core.contents.ready = 0
+        found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
+        still = done and bool((np.abs(found - y)[self.state] <= STILL * magnitude[self.state]).all())
+        if still:  # no state need jump: there is no impulse
+            return *self._thoroughly(t, found, rate, magnitude, rates=rates), impulse
         if self.impulses.broken(t, y, yd, magnitude):
             y, impulse = self.impulses.after(t, y, yd, magnitude)
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
         for hold in (HELD, 1.0):
             self.settler.core.contents.ready = 0
             found, rate, done = self.settler.settle(t, y, yd, hold=hold)
-            if done and self.thorough:
-                # flows without inertia in loops of stores follow from the rate of their balance alone
-                further = self._search(t, found, rate, magnitude, most=1)
-                found, rate = further or (found, rate)
             if done:
-                return found, rate, impulse
+                return *self._thoroughly(t, found, rate, magnitude, rates=rates), impulse
         searched = self._search(t, y, yd, magnitude)
         return None if searched is None else (*searched, impulse)
+
+    def _thoroughly(
+        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, rates: bool
+    ) -> tuple[Floats, Floats]:
+        """Flows without inertia in loops of stores follow from the rate of their balance alone, and so do the rates of
+        all flows without inertia.  Where nobody asks for these, the flows are sought until SAME searches with this set
+        of constraints have changed none: it has no such loop.
+        """
+        key = self.settler.system.description.switches.active.tobytes()
+        if not self.thorough or (not rates and self._same.get(key, 0) >= SAME):
+            return y, yd
+        found = self._search(t, y, yd, magnitude, most=1)
+        if found is None:
+            return y, yd
+        same = bool((np.abs(found[0] - y) <= STILL * magnitude).all())
+        self._same[key] = self._same.get(key, 0) + 1 if same else 0
+        return found
 
     def _rates(self, magnitude: Floats) -> Floats:
         """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""
