@@ -65,7 +65,7 @@ class Reader:
             try:
                 self._card(source, card)
             except Unreadable as error:
-                self.report.error("E941", str(error), source.place(card.start, card.end))
+                self.report.error("E941", str(error), card.place)
 
     def _card(self, source: SourceText, card: Card) -> None:
         head, words, netlist = card.head, card.words, self.netlist
@@ -100,7 +100,7 @@ class Reader:
             self._include(source, card)
         elif head in SILENT:
             text = f"'{head}' is left out: .tran alone becomes a scene"
-            self.report.note("N941", text, source.place(card.start, card.end))
+            self.report.note("N941", text, card.place)
         elif head not in IGNORED:
             raise Unreadable(f"'{head}' is not known")
 
@@ -137,8 +137,7 @@ class Reader:
             return
         self._included.add(path)
         inner = SourceText.read(path)
-        text = SourceText(inner.name, "\n" + inner.text)  # an included text has no title
-        self._take(text, cards(text)[1])
+        self._take(inner, cards(inner, titled=False)[1])
 
 
 def pairs(words: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:

@@ -94,7 +94,7 @@ class Writer:
         return [*lines, *initial], nodes
 
     def _element(self, card: Card, scope: Scope, coils: dict[str, Card], circuit: Circuit) -> Element:
-        place = self.source.place(card.start, card.end)
+        place = card.place
         letter = card.head[0]
         try:
             if letter == "x":

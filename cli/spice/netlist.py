@@ -8,9 +8,9 @@ import operator
 import re
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from sysdyn.dsl.text.source import SourceText
+from sysdyn.dsl.text.source import Place, SourceText
 
 SCALES = {
     "t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12, "f": 1e-15,
@@ -28,12 +28,18 @@ class Unreadable(Exception):  # noqa: N818 (a finding)
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """One statement: words (names in small letters, expressions in their brackets), and its first line's span."""
+    """One statement: words (names in small letters, expressions in their brackets), its first line's span in source."""
 
     words: tuple[str, ...]
     start: int
     end: int
     text: str
+    source: SourceText = field(compare=False, repr=False)
+
+    @property
+    def place(self) -> Place:
+        """Where it stands."""
+        return self.source.place(self.start, self.end)
 
     @property
     def head(self) -> str:
@@ -41,10 +47,10 @@ class Card:
         return self.words[0]
 
 
-def cards(source: SourceText) -> tuple[str, list[Card]]:
-    """The title and the statements of a text; lines that begin with '+' go on."""
+def cards(source: SourceText, *, titled: bool = True) -> tuple[str, list[Card]]:
+    """The title (an included text has none) and the statements of a text; lines that begin with '+' go on."""
     joined: list[tuple[int, int, str]] = []
-    for number in range(2, len(source.line_starts) + 1):
+    for number in range(1 + titled, len(source.line_starts) + 1):
         line, start = source.line(number), source.line_starts[number - 1]
         plain = re.split(r";|\$\s|//", line, maxsplit=1)[0].rstrip()
         if not plain.strip() or plain.lstrip().startswith("*"):
@@ -54,7 +60,7 @@ def cards(source: SourceText) -> tuple[str, list[Card]]:
             joined[-1] = first, end, f"{text} {plain.lstrip()[1:]}"
         else:
             joined.append((start + len(plain) - len(plain.lstrip()), start + len(plain), plain.strip()))
-    found = [Card(tuple(w.lower() for w in _WORD.findall(text)), a, b, text) for a, b, text in joined]
+    found = [Card(tuple(w.lower() for w in _WORD.findall(text)), a, b, text, source) for a, b, text in joined]
     return source.line(1).strip(), [card for card in found if card.words]
 
 

@@ -8,6 +8,7 @@ worker.
 
 from __future__ import annotations
 
+import importlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -150,10 +151,8 @@ class _Crew:
         elif item.future.status == "cancelled":
             yield from self._died(item.chunk)
         else:
-            from distributed.scheduler import KilledWorker
-
             error = item.future.exception()
-            if not isinstance(error, KilledWorker):
+            if type(error).__name__ != "KilledWorker":  # the scheduler's own count of deaths
                 raise error
             yield from self._died(item.chunk)
         item.future.release()
@@ -167,12 +166,12 @@ def results(
     work: what a worker does with a chunk.
     """
     try:
-        from distributed import Client
+        distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise UsageError("--dask needs Dask: pip install 'sysdyn[dask]'") from None
     whole = replace(request, file=str(Path(request.file).resolve()))
     try:
-        client: Any = Client(address, timeout=10)  # type: ignore[no-untyped-call]
+        client = distributed.Client(address, timeout=10)
     except (OSError, ValueError) as error:
         raise UsageError(f"--dask {address}: {error}") from None
     with client:

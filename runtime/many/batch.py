@@ -20,7 +20,7 @@ from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
 from sysdyn.runtime.integrate.runs import ROUGH, Runs, Way
 from sysdyn.runtime.judgement import allowed
-from sysdyn.runtime.many.anchors import anchors
+from sysdyn.runtime.many.anchors import anchors, guesses
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
@@ -38,6 +38,8 @@ END, EXTREMA, TRACES = 0, 1, 2
 """What is kept of a run: end values alone, least and largest too, rows of its trace too."""
 COUNTS = 1e-9
 """Of the largest entry of a row: what is less is round-off, or may as well vanish."""
+MARGIN, LOOSER = 0.1, 3.0
+"""Of the accuracy asked: what the nominal run's estimate may be; how much its tolerances are loosened at most."""
 FREELY = 0.25
 """Longest step as part of the span where nothing in the rows depends on time: no event of a source can be missed."""
 
@@ -156,6 +158,22 @@ class Batch:
         self._measure(longest, law, draft, fine)
         self._claims(claims)
         self.core.keep = keep
+        self._loosen(law.power)
+
+    def _loosen(self, power: float) -> None:
+        """Tolerances as loose as the nominal run lets them be, with a margin for the others.
+
+        What a run's estimate then misses costs it a finer run, never its promise.
+        """
+        guess = guesses(self.system.form.at, self.system.form.written, self.system.description.initial)[0]
+        found = self.run(self.system.description.p[None, :], guess[None, :])
+        if found.state[0] != DONE:
+            return
+        over = float(found.estimate[0]) / float(np.min(self._targets, initial=1.0))
+        factor = float(np.clip((MARGIN / max(over, 1e-300)) ** (1.0 / power), 1.0, LOOSER))
+        tolerance = self.core.tolerance
+        factor = max(min(factor, LOOSEST / tolerance[0]), 1.0)
+        tolerance[0], tolerance[1] = factor * tolerance[0], factor * tolerance[1]
 
     def _kept(self, array: Any) -> int | None:
         """Address of an array that lives as long as this."""

@@ -179,6 +179,30 @@ def test_what_cannot_be_said_is_named_with_its_line(line, said, tmp_path, capsys
     assert error["line"] == (1 if said == "no .ends" else 3)
 
 
+def test_a_finding_of_an_included_file_stands_there(tmp_path, capsys):
+    (tmp_path / "inner.cir").write_text("* parts\nR2 a 0 1k\nR1 a 0 zz\n")
+    path = tmp_path / "n.cir"
+    path.write_text("t\nV1 a 0 1\n.include inner.cir\nD1 a 0 none\n.tran 1 2\n")
+    code, found, _ = imported(path, tmp_path, capsys)
+    assert code == 1
+    errors = [d for d in found["diagnostics"] if d["severity"] == "error"]
+    assert {(Path(d["file"]).name, d["line"]) for d in errors} == {("inner.cir", 3), ("n.cir", 4)}
+
+
+@pytest.mark.parametrize("kind", ["NPN", "PNP"])
+def test_a_transistor_joined_to_a_diode(kind, tmp_path, capsys):
+    """Collector and base are one node: (5 V - v)/1 kohm = IS/aF (exp(v/VT) - 1)."""
+    path = tmp_path / "n.cir"
+    supply = 5 if kind == "NPN" else -5
+    cards = f".model q {kind}(is=1e-14 bf=100)\nV1 s 0 {supply}\nR1 s a 1k\nQ1 a a 0 q\nC1 a 0 1n\n"
+    path.write_text(f"t\n{cards}.tran 1u 10u\n.print tran v(a)\n")
+    code, found, out = imported(path, tmp_path, capsys)
+    assert code == 0, found["diagnostics"]
+    trace = simulate(out, scene="tran", accuracy=1e-7, output=tmp_path / "t.h5")
+    v = abs(np.asarray(trace["v_a"])[-1])
+    assert (5.0 - v) / 1e3 == pytest.approx(1e-14 * 1.01 * math.expm1(v / 0.025864186), rel=1e-4)
+
+
 def test_what_is_left_out_is_said(tmp_path, capsys):
     path = tmp_path / "n.cir"
     text = "t\n.model d d(is=1e-14 cjo=4p)\nV1 a 0 1\nR1 a b 1k\nD1 b 0 d\n.ac dec 10 1 1k\n.tran 1u 1m\n.end\n"
