@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.running import Request, options_of, ready
-from sysdyn.cli.run.running import _stops as stops_of
+from sysdyn.cli.run.running import stops as stops_of
 from sysdyn.cli.run.sizes import sizes
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl.model import expression as ex
