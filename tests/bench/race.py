@@ -36,6 +36,8 @@ LIBRARIES = (
 ASKED = tuple(10.0 ** (-0.5 * k) for k in range(2, 25))
 SPARSE, LARGE = 20, 200
 """Unknowns from which KLU is tried, and above which dense factors are not."""
+FORMS = ("auto", "1", "0")
+"""Index forms of the peers; the last is an ordinary differential equation, for CVODE too."""
 ENOUGH = 1e-11
 """Errors below are those of the reference."""
 REPEATED, SHORT = 3, 0.1
@@ -94,7 +96,7 @@ class Peers:
 
     def runs(self, family: str, end: float, seconds: float) -> Iterator[tuple[str, float, np.ndarray]]:
         """(settings, CPU s, outputs at the end) of every run that got there."""
-        for index in ("auto", "1", "0"):
+        for index in FORMS:
             built = self.build(family, index)
             if built is None:
                 continue
