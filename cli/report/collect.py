@@ -127,7 +127,7 @@ def _energies(
     if not parts or ran.failure or ran.outcome.timings.get("wall_integrate_s", 0.0) > LONG:
         return None
     # what is observed may have no underlying equation
-    method = options.method if ran.outcome.method == "dopri" else ran.outcome.method
+    method = {"dopri": options.method, "energy": "auto"}.get(ran.outcome.method, ran.outcome.method)
     fixed = replace(options, output=str(folder / "energies.h5"), method=method, progress=None)
     own = tuple(o.name for o in prepared.network.observations)
     if options.accuracy is not None and own:  # of the scene's quantities alone
