@@ -1,8 +1,8 @@
 """The model without what its scene does not need: elements tried in order of activity, each change measured.
 
 The full model's run at a tenth of the accuracy is the reference.  The least active element is left out, or its ends
-become one; what the traced quantities differ by is measured, and the change is kept where it stays within the accuracy (all
-changes together).  After MISSES elements in a row that are needed the rest, which takes part more, is left alone.
+become one; what the traced quantities differ by is measured, and the change is kept where it stays within the accuracy
+(all changes together).  After MISSES elements in a row that are needed the rest, which takes part more, is left alone.
 Received: a request; handed back: `Reduced`.
 """
 
@@ -42,8 +42,8 @@ LARGEST = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One change.  how: left out, ends one (a node), joined (by a source of zero); error: of all changes so far and this
-    one, None where it cannot run; kept; reason: why not.
+    """One change.  how: left out, ends one (a node), joined (by a source of zero); error: of all changes so far and
+    this one, None where it cannot run; kept; reason: why not.
     """
 
     label: str
