@@ -1,0 +1,65 @@
+"""Bridges of 4 to 64 ideal diodes, floating behind a source, at tight tolerances and against each other."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sysdyn.api import simulate
+
+HEAD = """from std.electrical import resistor, capacitor, voltage
+component ideal_diode {
+  branch: electrical
+  psi one_way: f >= 0 A
+}
+"""
+
+
+def bridge(series, parallel):
+    """A source of 10 V behind 0.1 ohm, four arms of diodes, 10 ohm and 1 mF; the whole floats but for 1 Mohm."""
+    lines = ["  node pos, neg, s, a, b: electrical", "  Vs: voltage(v = 10 V*sin(2*pi*(50 Hz)*t)) s -> b"]
+    lines += ["  Ri: resistor(R = 0.1 ohm) s -> a", "  Rg: resistor(R = 1 Mohm) neg -> ground"]
+    for name, plus, minus in (("P", "a", "pos"), ("Q", "b", "pos"), ("M", "neg", "a"), ("N", "neg", "b")):
+        for p in range(parallel):
+            nodes = [plus, *(f"{name}{p}n{k}" for k in range(1, series)), minus]
+            lines += [f"  node {', '.join(nodes[1:-1])}: electrical"] if series > 1 else []
+            lines += [f"  {name}{p}d{k}: ideal_diode() {nodes[k]} -> {nodes[k + 1]}" for k in range(series)]
+    lines += ["  R: resistor(R = 10 ohm) pos -> neg", "  C: capacitor(C = 1 mF) pos -> neg"]
+    scene = "scene s of m { time 0 s to 60 ms; trace R.e every 0.5 ms }"
+    return "\n".join([HEAD, "model m {", *lines, "}", scene])
+
+
+def run(text, tmp_path, **options):
+    file = tmp_path / "m.sd"
+    file.write_text(text)
+    return simulate(file, scene="s", output=tmp_path / "m.h5", **options)
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory):
+    """Of four diodes."""
+    return run(bridge(1, 1), tmp_path_factory.mktemp("four"), rtol=1e-12, method="radau")
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-12])
+def test_floating_bridge_at_every_tolerance(method, rtol, four, tmp_path):
+    found = run(bridge(1, 1), tmp_path, rtol=rtol, method=method)
+    assert abs(found["R.e"][-1] - four["R.e"][-1]) < 2e3 * rtol + 2e-8
+
+
+@pytest.mark.parametrize(("series", "parallel"), [(2, 1), (1, 2), (2, 2), (4, 1)])
+def test_strings_and_parallels_are_as_one(series, parallel, four, tmp_path):
+    """An ideal diode in series or in parallel with its like changes no voltage outside."""
+    found = run(bridge(series, parallel), tmp_path, rtol=1e-8, method="radau")
+    assert abs(found["R.e"][-1] - four["R.e"][-1]) < 1e-5
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10])
+def test_bridge_before_a_coil_commutates_at_once(method, rtol, tmp_path):
+    """The current of the coil changes arms where the source passes zero: at half periods, all four diodes at once."""
+    gallery = Path(__file__).resolve().parents[2] / "models" / "gallery" / "diode_bridge.sd"
+    found = simulate(gallery, scene="mains", output=tmp_path / "m.h5", rtol=rtol, method=method)
+    w = 314.159265
+    times = sorted({round(e.time * w / np.pi, 6) for e in found.events if e.time > 0.0})
+    assert times == [1.0, 2.0, 3.0]
