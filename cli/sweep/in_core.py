@@ -102,11 +102,14 @@ class InCore:
         options = options_of(self._loaded.request, self._loaded.target, seen, report, time.monotonic(), None)
         if options is None:
             raise NotApplicableError("the scene's options make no sense")
-        options = replace(options, output=None, stops=stops(seen, options, report))
         plain = {key if isinstance(key, str) else key[0] for key in self._keys}
         moving = plain | set(following(prepared.compiled.network, plain))
         if read.read & moving:
             raise NotApplicableError(f"the scene's instants follow from {sorted(read.read & moving)[0]}")
+        read.read.clear()
+        options = replace(options, output=None, stops=stops(seen, options, report))
+        # where the text may jump at instants that follow from what varies, each run is looked at
+        self._looked = options if read.read & moving else None
         if prepared.network.events or prepared.network.switches:
             raise NotApplicableError("the model has events")
         return options
@@ -142,7 +145,7 @@ class InCore:
         """Numbers p [k, parameters], initial values [k, written], and which [k] make sense."""
         prepared = self._prepared
         found = None
-        if all(isinstance(key, str) for key in self._keys):
+        if self._looked is None and all(isinstance(key, str) for key in self._keys):
             varied = {key: values[:, j] for j, key in enumerate(self._keys)}
             found = prepared.compiled.columns(prepared.binding, varied)
         if found is None:
@@ -179,6 +182,8 @@ class InCore:
         first = prepared.binding
         same = np.array_equal(binding.ix, first.ix) and binding.shapes == first.shapes
         if not same or binding.row_shapes != first.row_shapes or binding.p.size != first.p.size:
+            return None
+        if self._looked is not None and stops(replace(prepared, binding=binding), self._looked, Report()).size:
             return None
         return binding.p, guesses(self._at, self._written, binding.initial)[0]  # type: ignore[arg-type]
 

@@ -295,11 +295,9 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
         if (state != SD_FULL || left <= 0)
             return SD_MANY_FAILED;
     }
-    if (run->beyond > BEYOND)
-        return SD_MANY_ACCURACY;
     if (!many->known && own->number && own->time[own->number - 1] < many->last_time)
         own->number++; /* the last row stands behind the others already */
-    return SD_MANY_DONE;
+    return run->beyond > BEYOND ? SD_MANY_ACCURACY : SD_MANY_DONE; /* a step passed over something */
 }
 
 /* --- the accuracy ---------------------------------------------------------------------------------------------- */
@@ -401,6 +399,8 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
     prepare(many, &many->passes[0], tolerance, many->passes[0].longest, NULL);
     int state = integrate(many, &many->passes[0], last, there, &taken);
     *steps += taken;
+    int lost = state == SD_MANY_ACCURACY; /* its rows say nothing: the next run is compared with nothing */
+    state = lost ? SD_MANY_DONE : state;
     if (many->known)
         last = there, there = &many->sample[0];
     for (int number = 2; state == SD_MANY_DONE && number <= RUNS; number++) {
@@ -412,9 +412,13 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         many->passes[1].run->every_step = many->passes[1].run->every_step && !lean;
         state = integrate(many, &many->passes[1], own, there, &taken);
         *steps += taken;
-        if (state)
+        int lost_now = state == SD_MANY_ACCURACY;
+        if (state && !lost_now)
             return state;
+        state = SD_MANY_DONE;
         double over, apart = difference(many, &many->passes[1], last, there, &over);
+        if (lost || lost_now)
+            apart = over = INFINITY;
         double step = log10(tolerance / next), part;
         if (taken == taken_before && apart < ROUND_OFF)
             return SD_MANY_ACCURACY; /* two runs that took the same steps say nothing */
@@ -443,6 +447,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             taken = taken_before;
             continue;
         }
+        lost = lost_now;
         before = over;
         step_before = step;
         double drop = pow(1.0 / fmax(1.5 * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, 0.5)));

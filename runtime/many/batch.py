@@ -170,7 +170,7 @@ class Batch:
         if found.state[0] != DONE:
             return
         over = float(found.estimate[0]) / float(np.min(self._targets, initial=1.0))
-        factor = float(np.clip((MARGIN / max(over, 1e-300)) ** (1.0 / power), 1.0, LOOSER))
+        factor = float(np.clip((MARGIN / max(over, 1e-9)) ** (1.0 / power), 1.0, LOOSER))
         tolerance = self.core.tolerance
         factor = max(min(factor, LOOSEST / tolerance[0]), 1.0)
         tolerance[0], tolerance[1] = factor * tolerance[0], factor * tolerance[1]

@@ -30,6 +30,8 @@ SEEDS = {
     "two_tank": (),
     "em_suspension": (),
     "thermal_two_node": (),
+    "bead_rod": (),
+    "diode_circuit": (),
 }
 """Models of every method, linear and not, with and without constraints; what varies (else their first parameters)."""
 
