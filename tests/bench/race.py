@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import json
 import math
 import subprocess
 import sys
@@ -73,8 +74,8 @@ class Peers:
     def _libraries() -> list[str]:
         return [*(f"-lsundials_{name}" for name in LIBRARIES), "-lklu", "-lm"]
 
-    def build(self, family: str, index: str) -> tuple[Path, int] | None:
-        """The program of one index form and its number of unknowns; None where the model has no such form."""
+    def build(self, family: str, index: str) -> tuple[Path, int, list[str]] | None:
+        """The program of one index form, its number of unknowns, its outputs; None where the model has no such form."""
         here = self.folder / f"{family}-{index}"
         sysdyn = Path(sys.executable).parent / "sysdyn"
         model = MODELS / "benchmark" / f"{family}.sd"
@@ -91,16 +92,16 @@ class Peers:
              *sources, "-o", str(program), *self._libraries()],
             check=True,
         )  # fmt: skip
-        text = (here / "binding.c").read_text()
-        return program, int(text.split("sd_n_unknowns = ")[1].split(",")[0].split(";")[0])
+        binding = json.loads((here / "binding.json").read_text())
+        return program, len(binding["y0"]), [output["name"] for output in binding["outputs"]]
 
-    def runs(self, family: str, end: float, seconds: float) -> Iterator[tuple[str, float, np.ndarray]]:
-        """(settings, CPU s, outputs at the end) of every run that got there."""
+    def runs(self, family: str, end: float, seconds: float) -> Iterator[tuple[str, float, dict[str, float]]]:
+        """(settings, CPU s, outputs at the end by name) of every run that got there."""
         for index in FORMS:
             built = self.build(family, index)
             if built is None:
                 continue
-            program, n = built
+            program, n, outputs = built
             kinds = [k for k, fits in (("dense", n <= LARGE), ("klu", n >= SPARSE)) if fits]
             settings = [("ida", k, *policy) for k, policy in itertools.product(kinds, POLICIES)]
             if index == "0":
@@ -117,7 +118,7 @@ class Peers:
                 for line in found.splitlines():
                     numbers = line.split()
                     if len(numbers) > 4 and int(numbers[1]) >= 0:
-                        yield name, float(numbers[3]), np.array([float(x) for x in numbers[4:]])
+                        yield name, float(numbers[3]), dict(zip(outputs, map(float, numbers[4:]), strict=False))
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,11 +164,13 @@ def race(family: str, peers: Peers, seconds: float) -> Family | None:
         size = np.array([exact.nominal[name] for name in names])
         wanted = np.array([exact.values[name][-1] for name in names])
 
-        def error(values: np.ndarray) -> float:
-            worst = float(np.max(np.abs(values - wanted) / size))
+        def error(values: dict[str, float]) -> float:
+            worst = float(np.max(np.abs(np.array([values[name] for name in names]) - wanted) / size))
             return worst if math.isfinite(worst) else math.inf
 
-        ends = lambda run: error(np.array([run.values[name][-1] for name in names]))  # noqa: E731
+        def ends(run: Measured) -> float:
+            return error({name: float(run.values[name][-1]) for name in names})
+
         ours, single = [], []
         for asked in ASKED:
             run = repeated(bench, accuracy=asked)
