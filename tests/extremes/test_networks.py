@@ -4,7 +4,7 @@ import os
 from collections import Counter
 
 import pytest
-from networks import drawn, judged
+from stiff_networks import drawn, judged
 
 SEEDS = range(400) if os.environ.get("SYSDYN_LONG") == "1" else range(1000, 1024)
 FAINT = {36}
@@ -20,7 +20,7 @@ def test_none_is_wrong_without_saying_so(tmp_path):
 
 @pytest.mark.parametrize("stages", [(("C", 2.0, 3.0),), (("L", 2.0, 3.0),)])
 def test_modes_of_one_stage(stages):
-    from networks import Modes
+    from stiff_networks import Modes
 
     modes = Modes(stages)
     size = 6.0 if stages[0][0] == "C" else 1.5
