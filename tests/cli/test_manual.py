@@ -30,7 +30,8 @@ def test_every_listed_name_can_be_traced(path, tmp_path, capsys):
             name, unit = _first(r["name"]), r["unit"]
             items.append(f"{name}{'' if unit == '1' else f' in {unit}'} as n{len(items)}")
         assert len(items) > 5
-        scene = f"\nscene all_names of {account['model']} {{\n  time 0 s to 1 s\n  trace {', '.join(items)}\n}}\n"
+        traced = ",\n    ".join(items)
+        scene = f"\nscene all_names of {account['model']} {{\n  time 0 s to 1 s\n  trace {traced}\n}}\n"
         model = tmp_path / path.name
         model.write_text(text + scene)
         assert run(["list", "--scene", "all_names", str(model)]) == 0
