@@ -54,7 +54,7 @@ def test_the_way_of_a_parameter_is_the_one_that_is_taken(tmp_path, monkeypatch):
     def note(frame, event, argument):
         if event == "call" and frame.f_code.co_flags & inspect.CO_OPTIMIZED:  # no bodies of modules and classes
             found = package.search(frame.f_code.co_filename)
-            if found:
+            if found and frame.f_code.co_name != "__del__":  # what an earlier test left behind
                 called.setdefault((found[0], frame.f_code.co_qualname), len(called))
 
     model = tmp_path / "spring.sd"

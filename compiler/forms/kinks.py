@@ -12,6 +12,7 @@ Loops keep what they have (a family is one row here): what stands in one is inte
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -146,7 +147,7 @@ def smoothness(root: Node, u: Node) -> int:
     above, below = side(root, u, above=True), side(root, u, above=False)
     if above is below:
         return SMOOTH
-    moved = next((v for v in sorted(variables(u), key=lambda n: n.number) if v.op == "var"), None)
+    moved = next((n for n in topological([u]) if n.op == "var"), None)
     if moved is None:
         return SMOOTH
     slopes = [derivative(node, moved) for node in (u, above, below)]
@@ -188,7 +189,7 @@ def _continuous(root: Node, u: Node) -> bool:
 def _on_surface(u: Node, slope: Node, moved: Node, number: int) -> Mapping[Node, float] | None:
     """Values of the leaves with u = 0, by Newton on one unknown; None where it finds none."""
     leaves = [n for n in topological([u]) if n.op in ("var", "param", "time")]
-    values = {n: _sample(k, number) for k, n in enumerate(leaves)}
+    values = {n: _sample(n, number) for n in leaves}
     for _ in range(50):
         try:
             at, by = evaluate((u, slope), lambda n: _look(n, values))
@@ -203,12 +204,15 @@ def _on_surface(u: Node, slope: Node, moved: Node, number: int) -> Mapping[Node,
     return values if abs(change) <= 1e-12 * (abs(values[moved]) + 1.0) else None
 
 
-def _sample(k: int, number: int) -> float:
-    return 0.3 + ((k + 1) * 0.6180339887 + number * 0.7548776662) % 1.0
+def _sample(leaf: Node, number: int) -> float:
+    """A value of a leaf, the same wherever the text is compiled."""
+    said = leaf.data[:2] if leaf.op == "var" else leaf.data
+    known = zlib.crc32(repr((leaf.op, said)).encode()) % 10007
+    return 0.3 + (known * 0.6180339887 + number * 0.7548776662) % 1.0
 
 
 def _look(node: Node, values: Mapping[Node, float]) -> float:
     """A leaf's value: sampled; of a table, a smooth function's."""
     if node.op == "table":
         return 0.7
-    return values[node] if node in values else _sample(node.number, 0)
+    return values[node] if node in values else _sample(node, 0)

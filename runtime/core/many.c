@@ -16,6 +16,8 @@
 #define FIRST_DROP 1e-2
 #define PARTED 10.0
 #define MUCH 0.3
+#define BEND 4.0
+#define LOOSE 1e-5
 #define ROUND_OFF (64.0 * DBL_EPSILON)
 #define NOTHING 1e-12    /* of the largest of the same unit: what is left of a zero (model/scales.py) */
 #define GROUP 1e-3       /* of the largest of its like: the least magnitude of a zero */
@@ -318,6 +320,21 @@ static void measures(const sd_many *many, const sd_pass *pass, double *size, dou
     }
 }
 
+/* what a value at a step moves by within the time tolerance: as its rate says, but no faster than BEND times what the
+ * steps beside it show (integrate/accuracy.py) */
+static double lateness(const sd_many *many, const sd_samples *own, int32_t k, int32_t q)
+{
+    double least = INFINITY;
+    size_t columns = (size_t)many->columns;
+    for (int32_t side = k - 1; !many->known && side <= k; side++) {
+        if (side < 0 || side + 1 >= own->number)
+            continue;
+        double rise = own->value[(size_t)(side + 1) * columns + q] - own->value[(size_t)side * columns + q];
+        least = fmin(least, fabs(rise / (own->time[side + 1] - own->time[side])));
+    }
+    return fmin(own->late[(size_t)k * columns + q], BEND * many->late * least);
+}
+
 /* largest relative difference of two runs, and the same over the accuracy wanted */
 static double difference(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine,
                          double *over)
@@ -334,7 +351,7 @@ static double difference(const sd_many *many, const sd_pass *pass, const sd_samp
         for (int32_t k = 0; k < fine->number; k++) {
             size_t at = (size_t)k * many->columns + q;
             double a = coarse->value[at], b = fine->value[at];
-            double d = fmax(fabs(b - a) - fine->late[at], 0.0);
+            double d = fmax(fabs(b - a) - fmax(lateness(many, coarse, k, q), fine->late[at]), 0.0);
             d = isfinite(a) && isfinite(b) ? d : INFINITY;
             largest = fmax(largest, fmax(fabs(a), fabs(b)));
             apart = fmax(apart, d);
@@ -431,7 +448,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             part = shrink(power < 0.0 ? credit : fmin(power, credit), step);
         }
         *estimate = apart * part;
-        if (over * part <= 1.0 && !parted(many, &many->passes[1], last, there)) {
+        if (over * part <= 1.0 && !(next > LOOSE && parted(many, &many->passes[1], last, there))) {
             if (!balanced(many, many->passes[1].run->ledgers))
                 return SD_MANY_ENERGY;
             int32_t at = 0;

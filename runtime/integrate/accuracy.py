@@ -41,6 +41,8 @@ differ, and the error of a method of order 5 or more by as much as ten times the
 TIMING, SHARE = 1e-9, 1e-3
 """Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
 PARTED, MUCH = 10.0, 0.3
+BEND = 4.0
+LOOSE = 1e-5
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 
@@ -80,7 +82,8 @@ class Sampled:
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
     is zero to round-off; between [instants]: between an event of this run and the same one of the run before it; late
     [instants, quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep
-    front no more is asked; there: values at instants of its own, for the run behind it (None: those are the same).
+    front no more is asked; there: values and late at instants of its own, for the run behind it (None: those are the
+    same).
     """
 
     tolerance: float
@@ -90,12 +93,12 @@ class Sampled:
     noise: Floats | float = 0.0
     between: NDArray[np.bool_] | None = None
     late: Floats | float = 0.0
-    there: Floats | None = None
+    there: tuple[Floats, Floats | float] | None = None
 
     @property
-    def own(self) -> Floats:
-        """Values at its own instants [instants, quantities]."""
-        return self.values if self.there is None else self.there
+    def own(self) -> tuple[Floats, Floats | float]:
+        """Values and late at its own instants."""
+        return (self.values, self.late) if self.there is None else self.there
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +120,22 @@ Run = Callable[[float, float], Sampled]
 
 def apart(coarse: Sampled, fine: Sampled) -> Floats:
     """How far two runs' values are from each other [instants, quantities], within the time tolerance."""
-    values = coarse.own
-    return np.asarray(np.fmax(np.abs(fine.values - values) - np.nan_to_num(fine.late), 0.0 * fine.values * values))
+    values, late = coarse.own
+    late = np.maximum(np.nan_to_num(late), np.nan_to_num(fine.late))
+    return np.asarray(np.fmax(np.abs(fine.values - values) - late, 0.0 * fine.values * values))
+
+
+def lateness(time: Floats, values: Floats, rates: Floats, tolerance: float) -> Floats:
+    """What values at steps [rows, quantities] move by within a time tolerance (s): as their rates say, but no faster
+    than BEND times what the steps beside them show; a motion that relaxes at once makes of any error a rate without
+    bound.
+    """
+    if len(time) < 2:
+        return tolerance * np.abs(rates)
+    with np.errstate(all="ignore"):
+        slopes = np.abs(np.diff(values, axis=0) / np.diff(time)[:, None])
+    slopes = np.vstack([slopes[:1], np.fmin(slopes[:-1], slopes[1:]), slopes[-1:]])
+    return tolerance * np.fmin(np.abs(rates), BEND * slopes)
 
 
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
@@ -127,7 +144,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
     if not use.any() or not fine.values.size:
         return 0.0, 0.0
-    before = coarse.own
+    before = coarse.own[0]
     if before.shape != fine.values.shape:
         return np.inf, np.inf
     # zero by symmetry, in both runs: what is left of it is nobody's error
@@ -143,10 +160,11 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
 
 def parted(coarse: Sampled, fine: Sampled) -> bool:
     """Whether two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it
-    is: then they ran away, and that both end alike, beside what has become of them, says little.
+    is: then they ran away, and that both end alike, beside what has become of them, says little.  At fine tolerances a
+    front that begins at next to nothing looks alike, and nothing runs away.
     """
-    before, values = coarse.own, fine.values
-    if before.shape != values.shape or len(values) < 2:
+    before, values = coarse.own[0], fine.values
+    if fine.tolerance <= LOOSE or before.shape != values.shape or len(values) < 2:
         return False
     with np.errstate(all="ignore"):
         most = np.maximum.accumulate(np.abs(values), axis=0)[:-1]

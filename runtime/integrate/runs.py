@@ -302,9 +302,10 @@ class Runs:
         instants, there = self.common, None
         if self.options.every is None:
             self.common = common(self.thinned.time, self.options)
-            there = self._sampled(self.thinned.rows(self.common), finished)
+            own = self.thinned.rows(self.common)
+            there = self._sampled(own, finished), self._late(own, steps=True)
         self.compared_at = instants if instants is not None else self.common
-        values = there if there is not None and instants is None else self._sampled(rows, finished)
+        values = there[0] if there is not None and instants is None else self._sampled(rows, finished)
         sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
         noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(self.meters)))
@@ -326,13 +327,17 @@ class Runs:
         places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
         return rows[:, places]
 
-    def _late(self, rows: Floats) -> Floats:
-        """What the compared quantities move by within the time tolerance at these rows [k, quantities]."""
-        rates = [lib.ROW_HEAD + len(self.names) + column.place for column in self.columns]
+    def _late(self, rows: Floats, *, steps: bool = False) -> Floats:
+        """What the compared quantities move by within the time tolerance at these rows [k, quantities]; steps: rows of
+        the run's own steps, whose rates are those of the equations.
+        """
+        places = np.array([lib.ROW_HEAD + column.place for column in self.columns], dtype=np.int64)
         options = self.options
         asked = min((a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None), default=0.0)
         tau = min(accuracy.TIMING, accuracy.SHARE * asked) * (options.t_end - options.t_start)
-        return np.hstack([tau * np.abs(rows[:, rates]), np.zeros((len(rows), len(self.meters)))])
+        rates = rows[:, places + len(self.names)]
+        late = accuracy.lateness(rows[:, 0], rows[:, places], rates, tau) if steps else tau * np.abs(rates)
+        return np.hstack([late, np.zeros((len(rows), len(self.meters)))])
 
     @property
     def _width(self) -> int:
@@ -361,7 +366,7 @@ class Runs:
         """
         asked = {name: float(wanted) for name, wanted in zip(self.compared, target, strict=True)}
         name = min(asked, key=lambda n: asked[n], default="")
-        if len(self.samplings) < 2 or self.samplings[0].own.shape != self.samplings[1].values.shape:
+        if len(self.samplings) < 2 or self.samplings[0].own[0].shape != self.samplings[1].values.shape:
             return name, asked.get(name, 0.0), None
         one, two = self.samplings
         assert self.compared_at is not None
@@ -369,7 +374,7 @@ class Runs:
         with np.errstate(all="ignore"):
             ratio = accuracy.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
-        ratio = np.where(one.own == two.values, 0.0, ratio)
+        ratio = np.where(one.own[0] == two.values, 0.0, ratio)
         ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)

@@ -124,8 +124,10 @@ def test_stated_errors_are_those_of_the_book(tmp_path, references, name):
     assert known < 1e-8
     compared = [m for m in found.measured if m.usable and 10.0 * known < m.error < 0.5]
     assert len(compared) >= 10
-    for m in compared[:: max(len(compared) // 12, 1)]:
-        assert 1.0 / FACTOR <= m.error / true_error(file, m, entry, tmp_path) <= FACTOR, m
+    some = compared[:: max(len(compared) // 12, 1)]
+    ratios = np.array([m.error / true_error(file, m, entry, tmp_path) for m in some])
+    assert (ratios >= 1.0 / FACTOR).all(), ratios
+    assert (ratios <= 2.0 * FACTOR).all(), ratios  # the largest error may lie between the instants of the book
     best = found.chosen
     assert true_error(file, best, entry, tmp_path) <= found.accuracy
 

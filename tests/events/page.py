@@ -11,7 +11,7 @@ from collections import Counter
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from judged import KINDS, judge
+from event_verdicts import KINDS, judge
 from random_events import FAMILIES, drawn
 from sysdyn.cli.page.columns import aligned
 

@@ -1,7 +1,7 @@
 """A slice of the random event models: three of each family; the whole is `python tests/events/page.py`."""
 
 import pytest
-from judged import judge
+from event_verdicts import judge
 from random_events import FAMILIES, drawn
 
 SLICE = 3 * len(FAMILIES)

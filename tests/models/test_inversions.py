@@ -220,8 +220,9 @@ def _expected(name):
 
 
 def _near(trace, expected, within, said):
+    events = np.isin(trace.time, [event.time for event in trace.events])  # their rows stand beside the grid
     for quantity, values in expected.items():
-        error = np.abs(trace[quantity].values - values).max() / np.abs(values).max()
+        error = np.abs(trace[quantity].values[~events] - values).max() / np.abs(values).max()
         assert error < within, (said, quantity, error)
 
 
