@@ -68,7 +68,7 @@ def test_bad_example_of_a_run_raises_its_code_alone(code, tmp_path, monkeypatch,
     assert {c for c, _ in raised if c[0] == "E"} <= ({"E101"} if code == "N101" else {code})
 
 
-@pytest.mark.parametrize("code", RUN)
+@pytest.mark.parametrize("code", [c for c in RUN if not PAGES[c].by.startswith("sysdyn import")])
 def test_good_example_of_a_run_runs(code, tmp_path, monkeypatch, capsys):
     command = f"sysdyn {PAGES[code].by.partition('sysdyn ')[2].split()[0]} FILE"
     raised = [c for c, _ in said_by(command, PAGES[code].good, tmp_path, monkeypatch, capsys)]
