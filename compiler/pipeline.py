@@ -32,6 +32,7 @@ from sysdyn.compiler.forms.steepness import scaled
 from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
+from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.precedence import outermost
 from sysdyn.compiler.network.primal import Step, primal
@@ -155,7 +156,9 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
     with _timed("descriptor", timings):
-        lowered = replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation)
+        lowered = FORMULATIONS[formulation.removeprefix("co_")](model)
+        titles = tuple(replace(r, label=word(formulation, r.label)) if r.block == "audit" else r for r in lowered.rows)
+        lowered = replace(lowered, formulation=formulation, rows=titles)
         form, branches = frozen(with_book_signs(lowered), network) if traced else (with_book_signs(lowered), ())
         network = replace(network, parameters=(*network.parameters, *branches))
         form = scaled(form)

@@ -10,6 +10,7 @@ Euler's method is not judged.  Received: options, the accuracy control's result,
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -56,10 +57,13 @@ class NotMet:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """judged: what could be judged, in the order accuracy, energy, invariants; not_met: what was missed."""
+    """judged: what could be judged, in the order accuracy, energy, invariants; not_met: what was missed; conserved:
+    the ledgers of what should have kept its value.
+    """
 
     judged: tuple[str, ...]
     not_met: tuple[NotMet, ...]
+    conserved: tuple[Balance, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -68,7 +72,11 @@ class Judgement:
 
     def attributes(self) -> dict[str, str | int]:
         """Root attributes of the trace."""
-        return {"met": int(self.met), "judged": " ".join(self.judged)}
+        return {"met": int(self.met), "judged": " ".join(self.judged), "conserved": json.dumps(self.kept())}
+
+    def kept(self) -> list[dict[str, Any]]:
+        """What should have kept its value, how far it went from it, and of how much, in `unit`."""
+        return [{"what": b.title, "drift": b.value, "of": b.turnover, "unit": b.unit} for b in self.conserved]
 
 
 UNJUDGED: dict[str, str | int] = {"met": 0, "judged": ""}
@@ -128,8 +136,10 @@ def judge(
     options: Options, method: str, balances: Iterable[Balance], accurate: bool, missed: Iterable[Estimate]
 ) -> Judgement:
     """The verdict; accurate: an accuracy was asked for; missed: quantities that did not reach it."""
+    balances = tuple(balances)
+    conserved = tuple(b for b in balances if b.conserved)
     if method == "euler":
-        return Judgement((), ())
+        return Judgement((), (), conserved)
     judged = ["accuracy"] if accurate else []
     found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time) for e in missed] if accurate else []
     part = allowed(options)
@@ -140,4 +150,4 @@ def judge(
             limit = part * b.turnover
             if not b.value <= limit:
                 found.append(NotMet(what, b.value, limit, b.element.label, b.first_beyond(limit), b.unit, b.element))
-    return Judgement(tuple(judged), tuple(found))
+    return Judgement(tuple(judged), tuple(found), conserved)

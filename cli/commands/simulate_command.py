@@ -17,6 +17,9 @@ from sysdyn.cli.progress import ProgressLine
 if TYPE_CHECKING:
     from sysdyn.cli.run.running import Ran, Request
 
+SHOWN = 4
+"""Conserved quantities that the summary lists."""
+
 
 @with_console("simulate")
 @click.argument("file")
@@ -81,9 +84,17 @@ def _summary(ran: Ran) -> str:
         f"{ran.target.name}: {', '.join(how)}",
         f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
         f"  energy balance {_last(o.samples.energy):.2e} J, constraints {_last(o.samples.constraints):.1e}",
+        *(f"  {text}" for text in _conserved(ran)),
         f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
     ]
     return "\n".join(lines)
+
+
+def _conserved(ran: Ran) -> list[str]:
+    """A line on each of the first quantities that should keep their value."""
+    found = ran.outcome.judgement.conserved if ran.outcome.judgement else ()
+    lines = [f"conserved: {b.title}, {b.value:.1e} of {b.turnover:.3g} {b.unit}" for b in found[:SHOWN]]
+    return [*lines, f"conserved: {len(found) - SHOWN} more, see --json"] if len(found) > SHOWN else lines
 
 
 def _last(values: Any) -> float:
@@ -108,6 +119,7 @@ def _result(ran: Ran) -> dict[str, Any]:
         "met": o.met,
         "judged": list(o.judgement.judged) if o.judgement else [],
         "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
+        "conserved": o.judgement.kept() if o.judgement else [],
         "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
         "moved": described(ran.started.state),
         "warnings": list(o.warnings),

@@ -79,6 +79,8 @@ def statistics(study: Study) -> str:
         values = study.trace[f"audit.{name}"].values
         finite = values[np.isfinite(values)]
         rows.append([f"largest audit.{name}", f"{np.abs(finite).max():.2e}{unit}" if finite.size else "–"])
+    for b in o.judgement.conserved if o.judgement else ():
+        rows.append([f"conserved: {escape(b.title)}", f"{b.value:.2e} of {b.turnover:.3g} {escape(b.unit)}"])
     rows.append(["reached", f"{o.reached:.9g} s"])
     return table(("", ""), rows, left=(0,))
 

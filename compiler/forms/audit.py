@@ -17,7 +17,7 @@ from collections.abc import Iterator
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations
-from sysdyn.compiler.forms.ledgers import POWERS, STORED, Element, Entry, Ledger, elements, ledgers
+from sysdyn.compiler.forms.ledgers import POWERS, STORED, Element, Entry, Ledger, ledgers
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.terms import Term, counter, local_variables
 from sysdyn.dsl.model.expression import (
@@ -72,11 +72,15 @@ def _add_ledger(
     for name in LEDGER:
         power = "W" if ledger.unit == "J" else f"({ledger.unit})/s"
         unit = ledger.unit if name == "stored" else power
-        assembly.family(Equations("audit", ledger.kind, f"#ledger {number} {name}", "ledger", unit, place))
+        label = f"{ledger.kind}: {ledger.title}"
+        assembly.family(Equations("audit", label, f"#ledger {number} {name}", "ledger", unit, place))
     for entry in ledger.entries:
+        if entry.account == "exchanged":
+            assembly.add("audit", f"#ledger {number} gross", (), entry.nest, call("abs", entry.expression))
+            continue
         account = "stored" if entry.account in STORED else entry.account
         assembly.add("audit", f"#ledger {number} {account}", (), entry.nest, entry.expression)
-    for found in elements(ledger.entries):
+    for found in ledger.elements():
         magnitude = call("abs", found.expression)
         if found.account in POWERS:
             assembly.add("audit", f"#ledger {number} gross", (), found.nest, magnitude)

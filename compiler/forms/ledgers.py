@@ -2,32 +2,38 @@
 
 Coordinates are of one part where an energy, a content, the displacement of a work or a constraint reads both; works of
 one statement (a gyrator's) join theirs.  A part's ledger is in joules, or in what effort times displacement is in a
-pseudo domain.  A linear combination of dynamic variables whose rate vanishes identically is a ledger too: of what
-nobody dissipates or supplies (kind `invariant`).
+pseudo domain.  Combinations with constant coefficients whose rate vanishes identically are ledgers too (kind
+`invariant`): of dynamic variables, and of momenta dT*/df + p, the efforts on whose coordinates cancel (a cyclic
+coordinate has none; the displacement of several alike leaves the energies as they are).
 
 Received: an EnergyModel and the audit's entries.  Returned: ledgers, each with its own entries.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import TypeVar
 
-from sysdyn.compiler.model.energies import EnergyModel, Row
+from sysdyn.compiler.forms.efforts import Effort, efforts
+from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, local_variables, summands
-from sysdyn.dsl.model.expression import Node, add, is_const, scale, var, variables
+from sysdyn.dsl.model.expression import Node, add, const, derivative, is_const, scale, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 
-MOST_STATES = 200
-"""Dynamic variables among which linear invariants are sought."""
+MOST = 200
+"""Dynamic variables, or coordinates, among which linear invariants are sought."""
+SHOWN = 4
+"""Names of a part that its title says."""
+K = TypeVar("K")
 STORED, POWERS = ("kinetic", "potential"), ("dissipated", "supplied")
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One term of the audit.  account: kinetic, potential (stored), dissipated, supplied; owners: the coordinates
-    whose part it belongs to.
+    """One term of the audit.  account: kinetic, potential (stored), dissipated, supplied, or exchanged between the
+    coordinates of an invariant; owners: the coordinates whose part it belongs to.
     """
 
     account: str
@@ -51,12 +57,22 @@ class Element:
 
 @dataclass(frozen=True, slots=True)
 class Ledger:
-    """The entries of one part.  kind: energy or invariant; unit of what is stored; names: coordinates or states."""
+    """The entries of one part.  kind: energy or invariant; unit of what is stored; names: coordinates or states;
+    title: what is kept, for a reader.
+    """
 
     kind: str
     unit: str
     entries: tuple[Entry, ...]
     names: tuple[str, ...]
+    title: str
+
+    def elements(self) -> tuple[Element, ...]:
+        """What is stored, dissipated and supplied by statement; of an invariant term by term, for these may cancel."""
+        if self.kind == "invariant":
+            kept = (e for e in self.entries if e.account in STORED)
+            return tuple(Element("stored", e.nest, e.expression, e.place) for e in kept)
+        return elements(self.entries)
 
     def label(self, element: Element) -> str:
         """A name for an element that no component or branch names: the unknown that it reads first."""
@@ -67,7 +83,9 @@ class Ledger:
 
 
 def ledgers(model: EnergyModel, entries: Sequence[Entry]) -> tuple[Ledger, ...]:
-    """The ledgers of all parts that have stores, dissipators or sources, then the linear invariants of states."""
+    """The ledgers of all parts that have stores, dissipators or sources, then the linear invariants of states and of
+    momenta.
+    """
     head = _parts(model, entries)
     units = {c.name: c.units.get("balance", "J") for c in model.coordinates}
     found: dict[str, list[Entry]] = {}
@@ -78,8 +96,16 @@ def ledgers(model: EnergyModel, entries: Sequence[Entry]) -> tuple[Ledger, ...]:
     members: dict[str, list[str]] = {}
     for name, first in head.items():
         members.setdefault(first, []).append(name)
-    parts = [Ledger("energy", units[first], tuple(own), tuple(members[first])) for first, own in found.items()]
-    return (*parts, *_invariants(model))
+    parts = [
+        Ledger("energy", units[first], tuple(own), tuple(members[first]), _listed(members[first]))
+        for first, own in found.items()
+    ]
+    return (*parts, *_of_states(model), *_of_momenta(model))
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return f"energy of {', '.join(names[:SHOWN])}{more}"
 
 
 def elements(entries: Iterable[Entry]) -> tuple[Element, ...]:
@@ -135,23 +161,70 @@ def _parts(model: EnergyModel, entries: Sequence[Entry]) -> dict[str, str]:
     return {name: find(name) for name in head}
 
 
-def _invariants(model: EnergyModel) -> tuple[Ledger, ...]:
-    """Linear combinations of scalar dynamic variables whose rates add up to nothing, term by term."""
+def _of_states(model: EnergyModel) -> Iterator[Ledger]:
+    """Combinations of scalar dynamic variables whose rates add up to nothing, term by term."""
     rows = _single(model.of_kind("lambda"))
-    names = list(rows)
-    places = {s.name: s.place for s in model.states}
-    units = {s.name: s.units["s"] for s in model.states}
-    found = []
-    for combination in _null_space([_coefficients(rows[name]) for name in names]):
+    states = {s.name: s for s in model.states}
+    rates = {name: _coefficients(t.expression for t in row.terms) for name, row in rows.items()}
+    for combination in _null_space(rates):
         entries = tuple(
-            Entry("potential", (), (), scale(float(c), var(name, "s")), places[name])
-            for name, c in zip(names, combination, strict=True)
-            if c
+            Entry("potential", (), (), scale(float(c), var(name, "s")), states[name].place)
+            for name, c in combination.items()
         )
-        own = tuple(name for name, c in zip(names, combination, strict=True) if c)
         if len(entries) > 1:
-            found.append(Ledger("invariant", units[own[0]], entries, own))
-    return tuple(found)
+            unit = states[next(iter(combination))].units["s"]
+            yield Ledger("invariant", unit, entries, tuple(combination), _sum(combination))
+
+
+def _of_momenta(model: EnergyModel) -> Iterator[Ledger]:
+    """Combinations of momenta of scalar coordinates, of one unit, on which the efforts add up to nothing."""
+    scalars = {c.name: c for c in model.coordinates if not c.shape}
+    if len(scalars) > MOST:
+        return
+    found: dict[str, list[Effort]] = {name: [] for name in scalars}
+    for effort in efforts(model):
+        found.setdefault(effort.on.data[0], []).append(effort)
+    free = [name for name in scalars if not any(e.nest or e.on.args for e in found[name])]
+    for unit in dict.fromkeys(scalars[name].units["p"] for name in free):
+        alike = {n: _coefficients(e.value for e in found[n]) for n in free if scalars[n].units["p"] == unit}
+        for combination in _null_space(alike):
+            entries = [e for name, c in combination.items() for e in _momentum(model, scalars[name], float(c))]
+            if not entries:
+                continue
+            passed: dict[Node | None, Fraction] = {}
+            for name, c in combination.items():
+                for node, factor in alike[name].items():
+                    passed[node] = passed.get(node, Fraction(0)) + abs(c * factor)
+            place = scalars[next(iter(combination))].place
+            gross = [
+                Entry("exchanged", (), (), scale(float(c), const(1.0) if node is None else node), place)
+                for node, c in passed.items()
+            ]
+            moving = {name: combination[name] for name in alike if any(e.owners == (name,) for e in entries)}
+            title = f"momentum of {_sum(moving)}"
+            yield Ledger("invariant", unit, (*entries, *gross), tuple(moving), title)
+
+
+def _momentum(model: EnergyModel, family: Family, factor: float) -> Iterator[Entry]:
+    """The summands of p + dT*/df: p of stores given by T(p)."""
+    m = model.mirror
+    own = [(t, n) for t in model.function(m.energy) for n in local_variables(t.expression, m.conjugate)]
+    if any(n.data[0] == family.name for _, n in own):
+        yield Entry("potential", (family.name,), (), scale(factor, var(family.name, m.conjugate)), family.place)
+    for term in model.function(m.coenergy):
+        for node in local_variables(term.expression, m.rate):
+            if node.data[0] == family.name:
+                for piece in summands(derivative(term.expression, node)):
+                    yield Entry("potential", (family.name,), term.loops, scale(factor, piece), term.place)
+
+
+def _sum(combination: Mapping[str, Fraction]) -> str:
+    """A combination as text."""
+    text = ""
+    for name, c in combination.items():
+        size = "" if abs(c) == 1 else f"{float(abs(c)):g}*"
+        text += f"{' - ' if c < 0 else ' + ' if text else ''}{size}{name}"
+    return text.strip()
 
 
 def _single(rows: Sequence[Row]) -> dict[str, Row]:
@@ -161,14 +234,14 @@ def _single(rows: Sequence[Row]) -> dict[str, Row]:
         counted.setdefault(row.name, []).append(row)
     once = {name: found[0] for name, found in counted.items() if len(found) == 1 and not found[0].nest}
     single = {name: row for name, row in once.items() if all(not t.loops for t in row.terms)}
-    return single if len(single) <= MOST_STATES else {}
+    return single if len(single) <= MOST else {}
 
 
-def _coefficients(row: Row) -> dict[Node | None, Fraction]:
-    """The rate as a combination of terms that hold no sums."""
+def _coefficients(expressions: Iterable[Node]) -> dict[Node | None, Fraction]:
+    """The sum as a combination of terms that hold no sums."""
     found: dict[Node | None, Fraction] = {}
-    for term in row.terms:
-        for piece in summands(term.expression):
+    for expression in expressions:
+        for piece in summands(expression):
             factor, node = (piece.data, None) if is_const(piece) else _split(piece)
             found[node] = found.get(node, Fraction(0)) + Fraction(factor)
     return {node: c for node, c in found.items() if c}
@@ -181,24 +254,24 @@ def _split(piece: Node) -> tuple[float, Node]:
     return 1.0, piece
 
 
-def _null_space(rows: Sequence[dict[Node | None, Fraction]]) -> list[list[Fraction]]:
+def _null_space(rows: Mapping[str, dict[Node | None, Fraction]]) -> list[dict[str, Fraction]]:
     """Combinations c of sparse rows with sum c_i rows_i = 0, by elimination in exact numbers."""
-    size = len(rows)
-    pivots: list[tuple[Node | None, dict[Node | None, Fraction], list[Fraction]]] = []
-    found: list[list[Fraction]] = []
-    for k, row in enumerate(rows):
-        left = dict(row)
-        weights = [Fraction(int(i == k)) for i in range(size)]
+    pivots: list[tuple[Node | None, dict[Node | None, Fraction], dict[str, Fraction]]] = []
+    found: list[dict[str, Fraction]] = []
+    for name, row in rows.items():
+        left, weights = dict(row), {name: Fraction(1)}
         for column, values, combination in pivots:
-            factor = left.get(column, Fraction(0))
-            if factor:
-                factor /= values[column]
-                for node, value in values.items():
-                    left[node] = left.get(node, Fraction(0)) - factor * value
-                left = {node: value for node, value in left.items() if value}
-                weights = [a - factor * b for a, b in zip(weights, combination, strict=True)]
+            if column in left:
+                factor = left[column] / values[column]
+                left, weights = _less(left, factor, values), _less(weights, factor, combination)
         if left:
             pivots.append((next(iter(left)), left, weights))
-        elif any(weights):
+        else:
             found.append(weights)
     return found
+
+
+def _less(left: Mapping[K, Fraction], factor: Fraction, right: Mapping[K, Fraction]) -> dict[K, Fraction]:
+    """Left - factor right, without zeros."""
+    result = {**left, **{k: left.get(k, Fraction(0)) - factor * c for k, c in right.items()}}
+    return {k: c for k, c in result.items() if c}

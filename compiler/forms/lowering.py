@@ -15,6 +15,7 @@ from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.audit import add_audit
 from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
 from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.forms.efforts import Effort, efforts
 from sysdyn.compiler.forms.momenta import given, inertial, resolved
 from sysdyn.compiler.forms.observing import add_initials, add_observations, observed, pins_and_equations
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
@@ -24,9 +25,7 @@ from sysdyn.dsl.model.expression import (
     add,
     derivative,
     differential,
-    mul,
     neg,
-    signals_held,
     substitute,
     time_derivative,
     to_text,
@@ -46,8 +45,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     form = _Lowering(model, stores, frozenset(carriers))
     form.declare()
     form.kinetic()
-    form.gradients()
-    form.works()
+    form.efforts()
     form.constraints()
     add_observations(form.assembly, model, form.carriers)
     stored = add_audit(form.assembly, model)
@@ -222,25 +220,13 @@ class _Lowering:
         self.assembly.add("momentum", owner, at, nest, expression)
         self.assembly.add("momentum_rate", owner, at, nest, time_derivative(expression))
 
-    def gradients(self) -> None:
-        """-dT*/dq + dT/dq + dV/dq + dD/df."""
-        m = self.model.mirror
-        functions = ((m.coenergy, -1.0, m.coordinate), (m.energy, 1.0, m.coordinate), (m.potential, 1.0, m.coordinate))
-        for name, sign, kind in (*functions, (m.content, 1.0, m.rate)):
-            for term in self.model.function(name):
-                for node in local_variables(term.expression, kind):
-                    slope = derivative(term.expression, node)
-                    self._effort("dynamics", node, term.loops, slope if sign > 0 else neg(slope))
-
-    def works(self) -> None:
-        """-Q_j = -E du/dq_j."""
-        for work in self.model.works:
-            for node in local_variables(work.on, self.model.mirror.coordinate):
-                force = mul(work.effort, derivative(work.on, node))
-                self._effort("dynamics", node, work.loops, neg(force))
+    def efforts(self) -> None:
+        """Gradients, works and reactions."""
+        for found in efforts(self.model):
+            self._effort(found)
 
     def constraints(self) -> None:
-        """Phi, Psi with their reactions, Gamma, Lambda, and the total time derivatives of all."""
+        """Phi, Psi, Gamma, Lambda, and the total time derivatives of all."""
         for row in self.model.rows:
             for term in row.terms:
                 expression = term.expression
@@ -249,8 +235,6 @@ class _Lowering:
                     continue
                 self.assembly.add(row.kind, row.name, row.at, term.loops, expression)
                 self._rates(row, term.loops, expression)
-                if row.kind in ("phi", "psi"):
-                    self._reaction(row, term.loops, expression)
             if row.kind == "lambda":
                 own = var(row.name, "s", *row.at, order=1)
                 self.assembly.add("lambda", row.name, row.at, row.nest, own)
@@ -272,21 +256,13 @@ class _Lowering:
         at, speed = self.speeds[rate.data[0]]
         return substitute(speed, dict(zip(at, rate.args, strict=True)))
 
-    def _reaction(self, row: Row, nest: Nest, expression: Node) -> None:
-        m = self.model.mirror
-        kind, name = (m.coordinate, "kappa") if row.kind == "phi" else (m.rate, "mu")
-        multiplier = var(row.name, name, *row.at)
-        held, signals = signals_held(expression)
-        for node in local_variables(held, kind):
-            value = mul(substitute(derivative(held, node), signals), multiplier)
-            self._effort(f"{row.kind}_reaction", node, nest, value)
-
-    def _effort(self, block: str, on: Node, nest: Nest, value: Node) -> None:
+    def _effort(self, effort: Effort) -> None:
         """A summand of the balance of a coordinate; where that is algebraic, its rate holds too."""
-        self.assembly.add(block, on.data[0], on.args, nest, value)
+        on = effort.on
+        self.assembly.add(effort.block, on.data[0], on.args, effort.nest, effort.value)
         if on.data[0] in self.massless:
-            rate = total_rate(self._in_states(value, f"the balance of {on.data[0]}", None))
-            self.assembly.add("dynamics_rate", on.data[0], on.args, nest, rate)
+            rate = total_rate(self._in_states(effort.value, f"the balance of {on.data[0]}", None))
+            self.assembly.add("dynamics_rate", on.data[0], on.args, effort.nest, rate)
 
     def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
         if not self._has_rate(row):

@@ -18,18 +18,26 @@ HEAD, ROWS = 4, 4
 class Balance:
     """A ledger over a run.
 
-    kind: energy or invariant; unit: of value and turnover; turnover: the sum over elements of what each stored at most
-    and of what went through it; value: largest magnitude of the balance (infinite where it is no number); element:
-    whose content changed most in the step that spoiled the balance most (else the first of the ledger); risen: (instant
-    [s], magnitude) whenever it became larger than before.
+    kind: energy or invariant; title: what is kept; unit: of value and turnover; passed: what elements were supplied
+    with and dissipated, or passed to each other; turnover: that, and the sum over elements of what each stored at most;
+    value: largest magnitude of the balance (infinite where it is no number); element: whose content changed most in
+    the step that spoiled the balance most (else the first of the ledger); risen: (instant [s], magnitude) whenever it
+    became larger than before.
     """
 
     kind: str
+    title: str
     unit: str
+    passed: float
     turnover: float
     value: float
     element: RowLabel
     risen: tuple[tuple[float, float], ...]
+
+    @property
+    def conserved(self) -> bool:
+        """Whether it should keep its value: an invariant, or what is nowhere dissipated or supplied."""
+        return self.turnover > 0.0 and (self.kind == "invariant" or self.passed == 0.0)
 
     def first_beyond(self, limit: float) -> float | None:
         """The instant [s] from which the balance was beyond a limit; None where it never was."""
@@ -82,9 +90,11 @@ class Ledgers:
         return tuple(self._balance(k, [r for r in found if r.ledger == k]) for k in range(len(self._heads)))
 
     def _balance(self, k: int, records: list[lib.Record]) -> Balance:
-        kind, unit, first = self._heads[k]
+        label, unit, first = self._heads[k]
+        kind, _, title = label.partition(": ")
         own = self._of[:-1] == k
-        turnover = float(self._arrays["gross"][k] + self._arrays["most"][:-1][own].sum())
+        passed = float(self._arrays["gross"][k])
+        turnover = passed + float(self._arrays["most"][:-1][own].sum())
         value = float(self._arrays["highest"][k])
         highest = max((r.value for r in records), default=0.0) if np.isfinite(value) else np.inf
         element = first
@@ -92,7 +102,7 @@ class Ledgers:
             row, position = self._labels[self._element[k]]
             element = row.at(position)
         risen = tuple((float(r.t), float(r.value) if np.isfinite(r.value) else np.inf) for r in records)
-        return Balance(kind, unit, turnover, highest, element, risen)
+        return Balance(kind, title, unit, passed, turnover, highest, element, risen)
 
     def __del__(self) -> None:
         if getattr(self, "core", None) is not None:

@@ -397,6 +397,11 @@ class Trace:
         return tuple(str(self.attributes.get("judged", "")).split())
 
     @property
+    def conserved(self) -> list[dict[str, Any]]:
+        """What should have kept its value: {what, drift: how far it went, of: the sum of its parts at most, unit}."""
+        return list(json.loads(self.attributes.get("conserved", "[]")))
+
+    @property
     def statistics(self) -> dict[str, Any]:
         """Counters of the run."""
         return dict(json.loads(self.attributes.get("statistics", "{}")))
