@@ -72,7 +72,8 @@ class Judgement:
 
     def attributes(self) -> dict[str, str | int]:
         """Root attributes of the trace."""
-        return {"met": int(self.met), "judged": " ".join(self.judged), "conserved": json.dumps(self.kept())}
+        kept = {"conserved": json.dumps(self.kept())} if self.conserved else {}
+        return {"met": int(self.met), "judged": " ".join(self.judged), **kept}
 
     def kept(self) -> list[dict[str, Any]]:
         """What should have kept its value, how far it went from it, and of how much, in `unit`."""

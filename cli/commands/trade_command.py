@@ -51,7 +51,7 @@ def command(
     Errors are those of the traced quantities against a reference that trade makes itself: the finest run, and one by
     another method, in another formulation where there is one. Cost is CPU time and counted work, which is what the
     choice goes by. --formulation, --index, --method fix a choice; --max-wall limits the whole search; --jobs makes
-    runs ahead side by side, with equal results but for CPU times.
+    runs ahead side by side, with equal results but for CPU times. A trade that was stopped goes on where it was.
     """
     target = _target(output)
     if locks and options["file"] == "-":
@@ -118,7 +118,7 @@ def _lock(request: Request, found: Traded, best: Measured) -> Path:
 def _judged(found: Traded, console: Console, use: str) -> int:
     """Says what is wrong; the exit code."""
     if not found.ended:
-        console.say("the budget of wall time is spent: settings that were not tried may be cheaper")
+        console.say("the budget of wall time is spent: settings that were not tried may be cheaper; ask again to go on")
     if found.reference.until < found.span[1]:
         text = f"errors count up to {found.reference.until:g} s of {found.span[1]:g} s: beyond, the finest runs differ"
         console.say(text)

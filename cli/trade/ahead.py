@@ -17,16 +17,13 @@ from sysdyn.cli.run.crew import Lost, each
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.trade.measuring import Bench, Limits
 from sysdyn.cli.trade.search import FIRST, Search, tolerance
-from sysdyn.cli.trade.traded import Combination, Measured
+from sysdyn.cli.trade.traded import Combination, Measured, Runs
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
 
 STEPS = 20_000
 """Of a first run made ahead at most: one that takes more may be one that the search never makes."""
 _benches: dict[tuple[Request, Path], Bench] = {}
-
-Runs = dict[tuple[Combination, float], Measured | str]
-"""By combination and tolerance: what was measured, or why there is no such setting."""
 
 
 @dataclass(frozen=True, slots=True)

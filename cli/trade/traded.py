@@ -59,6 +59,10 @@ class Measured:
         return not self.reason and self.error is not None
 
 
+Runs = dict[tuple[Combination, float], Measured | str]
+"""By combination and tolerance: what was measured, or why there is no such setting."""
+
+
 @dataclass(frozen=True, slots=True)
 class Refusal:
     """A formulation or combination that cannot be run, and why; code: of the finding."""

@@ -13,11 +13,12 @@ from pathlib import Path
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.running import Request, check_tolerances
-from sysdyn.cli.trade.ahead import Asked, Runs, ahead
+from sysdyn.cli.trade.ahead import Asked, ahead
+from sysdyn.cli.trade.journal import journal as journal_of
 from sysdyn.cli.trade.measuring import Bench, Limits
 from sysdyn.cli.trade.reference import reference
-from sysdyn.cli.trade.search import Search
-from sysdyn.cli.trade.traded import Combination, Measured, Refusal, Traded
+from sysdyn.cli.trade.search import FIRST, Search, tolerance
+from sysdyn.cli.trade.traded import Combination, Measured, Refusal, Runs, Traded
 from sysdyn.cli.trade.work import HISTORY
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -40,6 +41,7 @@ def trade(
 ) -> Traded | None:
     """Measure; None where the report says why the scene cannot run.  Raises NoReference.
 
+    A trade that was stopped goes on where it was (journal.py).
     full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead.
     """
     check_tolerances(request)
@@ -55,27 +57,36 @@ def trade(
     bench = Bench(request, target, report, folder, began)
     if not bench.prepare():
         return None
-    kept, known = reference(bench, budget)
+    journal = journal_of(request, document.file.source, document.file.items)
+    kept, known = (journal.reference if journal else None) or reference(bench, budget)
+    if journal is not None and journal.reference is None:
+        journal.refer(kept, known)
     limit = None if budget is None else began + budget
 
     def wall() -> float:
         return SECONDS if limit is None else max(limit - time.monotonic(), 1e-3)
 
     combinations = list(bench.combinations())
-    made_ahead: Runs = {}
+    made_before: Runs = dict(journal.runs) if journal else {}
     if jobs > 1:
-        made_ahead = ahead([Asked(request, folder, c, kept, known.until, full, wall()) for c in combinations], jobs)
+        left = [c for c in combinations if full or (c, tolerance(FIRST)) not in made_before]
+        made = ahead([Asked(request, folder, c, kept, known.until, full, wall()) for c in left], jobs)
+        made_before = made | made_before
 
     def measure(combination: Combination, tolerance: float, most: float) -> Measured | str:
         left = wall()
         steps = max(math.ceil(most / (HISTORY * bench.size(combination)[0])), LEAST) if math.isfinite(most) else None
-        made = made_ahead.get((combination, tolerance))
-        if isinstance(made, str) or (made is not None and (steps is None or made.steps < steps)):
-            return made
-        return bench.measure(combination, tolerance, kept, known.until, Limits(steps, left))
+        made = made_before.get((combination, tolerance))
+        if made is None or (isinstance(made, Measured) and steps is not None and made.steps >= steps):
+            made = bench.measure(combination, tolerance, kept, known.until, Limits(steps, left))
+        if journal is not None and (combination, tolerance) not in journal.runs:
+            journal.take(combination, tolerance, made)
+        return made
 
     search = Search(bench.accuracy, known.uncertainty, measure, limit, progress)
     (search.full if full else search.thrifty)(combinations)
+    if journal is not None and search.ended:
+        journal.remove()
     return Traded(
         target.name,
         bench.accuracy,

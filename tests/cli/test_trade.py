@@ -5,6 +5,10 @@ import math
 import os
 import re
 import shlex
+import signal
+import subprocess
+import sys
+import time
 from fractions import Fraction
 from pathlib import Path
 from xml.etree import ElementTree
@@ -189,6 +193,40 @@ def test_runs_made_ahead_change_nothing(tmp_path, capsys, options):
     one, two = (run_json(capsys, "trade", str(file), "--no-timings", "--jobs", n, *options) for n in "12")
     assert one == two
     assert one[0] == 0
+
+
+def test_a_trade_that_is_killed_goes_on_where_it_was(tmp_path, capsys, monkeypatch):
+    file = write(tmp_path, PENDULUM)
+    _, whole = run_json(capsys, "trade", file, "--no-timings")
+    monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
+    asked = [sys.executable, "-m", "sysdyn", "trade", file, "--quiet"]
+    process = subprocess.Popen(asked, stdout=subprocess.DEVNULL)
+    kept: list[str] = []
+    while len(kept) < 6 and process.poll() is None:
+        time.sleep(0.01)
+        for journal in (tmp_path / "cache").glob("trades/*/runs.jsonl"):
+            kept = journal.read_text().split("\n")
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    (journal,) = (tmp_path / "cache").glob("trades/*/runs.jsonl")
+    before = [json.loads(line) for line in journal.read_text().splitlines() if line.endswith("}")]
+    assert len(before) >= 5
+    with journal.open("a") as lines:
+        lines.write('\n{"combination": {"formu')  # what a kill may leave
+    _, found = run_json(capsys, "trade", file)
+    seconds = {tuple(m["combination"].values()) + (m["tolerance"],): m.get("cpu_s") for m in before}
+    taken = 0
+    for s in found["result"]["settings"]:
+        key = s["formulation"], s["index"], s["method"], s["level"] or "", s["tolerance"]
+        if seconds.get(key) is not None:
+            taken += s["cpu_s"] == seconds[key]
+            s["cpu_s"] = None
+    assert taken == sum(m.get("cpu_s") is not None for m in before)
+    for result in (whole["result"], found["result"]):
+        for s in (*result["settings"], result["chosen"]):
+            s["cpu_s"] = None
+    assert found["result"] == whole["result"]
+    assert not list((tmp_path / "cache").glob("trades/*"))
 
 
 def test_runs_that_are_not_met_are_kept_and_never_chosen():
