@@ -16,6 +16,7 @@ from sysdyn.cli.reduce.activity import Activities
 from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
 from sysdyn.cli.run.running import Request
 
+KINDS = (".png", ".svg")
 WORDS = {"held": "stored", "out": "dissipated", "in": "supplied", "through": "passed on"}
 BAR = 24
 """Characters of the longest bar."""
@@ -27,11 +28,12 @@ BAR = 24
 @solved
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("-o", "output", metavar="FILE.sd", help="The reduced text. Default: <stem>-reduced.sd beside FILE.")
+@click.option("--plot", metavar="FILE.png|.svg", help="Activities as bars, and where the energy went.")
 @click.option("--activity", "only", is_flag=True, help="The table of activities alone.")
 @click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
 def command(
-    console: Console, progress: str, no_timings: bool, only: bool, output: str | None, max_wall: str | None,
-    **options: Any,
+    console: Console, progress: str, no_timings: bool, only: bool, plot: str | None, output: str | None,
+    max_wall: str | None, **options: Any,
 ) -> int:  # fmt: skip
     """Measure which elements a scene of FILE needs, and write the model without the others.
 
@@ -47,6 +49,8 @@ def command(
     target = Path(output) if output else Path(request.file).with_name(f"{Path(request.file).stem}-reduced.sd")
     if target.exists() and Path(request.file).exists() and target.samefile(request.file):
         raise UsageError(f"-o {target} is the model itself")
+    if plot is not None and Path(plot).suffix not in KINDS:
+        raise UsageError(f"--plot '{plot}': a picture of activities is one of {', '.join(KINDS)}")
     line = ProgressLine("never" if console.quiet else progress)
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
         try:
@@ -60,6 +64,11 @@ def command(
     kept = any(t.kept for t in found.trials)
     console.result = _result(found, str(target) if kept else None, timings=not no_timings)
     console.data(_activity(found.found))
+    if plot is not None:
+        from sysdyn.cli.reduce.sankey import picture
+
+        Path(plot).write_bytes(picture(found.found, found.name, Path(plot).suffix[1:]))
+        console.say(plot)
     if not only:
         console.data(_summary(found, target, kept=kept, timings=not no_timings))
         if kept:
@@ -115,7 +124,7 @@ def _result(found: Reduced, target: str | None, *, timings: bool) -> dict[str, A
         "activity": [
             {
                 "element": a.label, "role": WORDS[a.role], "activity": a.activity, "share": a.share,
-                "file": a.place.file, "line": a.place.start[0],
+                "energy": a.energy, "domain": a.domain, "file": a.place.file, "line": a.place.start[0],
             }
             for a in found.found.items
         ],

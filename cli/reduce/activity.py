@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.report.balance import Part, observed
+from sysdyn.cli.report.balance import Part, observed, shares
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.running import Ran, Request, integrate, options_of, ready
 from sysdyn.cli.run.targets import Target
@@ -28,7 +28,8 @@ Floats = NDArray[np.float64]
 @dataclass(frozen=True, slots=True)
 class Activity:
     """One element or statement.  name: of the branch ("" of a statement); role: held, out, in, through; activity [J];
-    share: of the sum over all but what couplings pass on (theirs is taken of the same sum).
+    share: of the sum over all but what couplings pass on (theirs is taken of the same sum); energy [J]: over the scene
+    stored, dissipated, supplied, absorbed; domain: where.
     """
 
     label: str
@@ -36,6 +37,8 @@ class Activity:
     role: str
     activity: float
     share: float
+    energy: float
+    domain: str
     place: Place
 
 
@@ -78,10 +81,11 @@ def activities(
 def _sorted(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
     found = [(part, variation(trace.time, trace[part.name])) for part in parts]
     total = float(sum(value for part, value in found if part.role != "through"))
+    energies = {part.name: share.energy for part, share in zip(parts, shares(trace, parts), strict=True)}
     items = [
         Activity(
             part.label, part.name.removeprefix("power of ") if part.power else "", part.role, value,
-            value / total if total > 0.0 else 0.0, part.place,
+            value / total if total > 0.0 else 0.0, energies[part.name], part.domain, part.place,
         )
         for part, value in found
     ]  # fmt: skip

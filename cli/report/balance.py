@@ -38,13 +38,16 @@ MOST = 400
 """Elements and statements whose power is observed."""
 ROLES = {"kinetic": "held", "potential": "held", "dissipator": "out", "effort": "in", "flow": "in", "port": "through"}
 _RATES = {"T*": ("f", "nf", "bf"), "D": ("f", "nf", "bf"), "V*": ("f", "ne", "be"), "G": ("f", "ne", "be")}
+_KINDS = ("q", "f", "p", "e")
 REST = 1e-6
 """Of the largest energy: what is left below that is round-off and the solver's error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """An element or statement.  name: of its observation; power: expression is integrated, else an energy."""
+    """An element or statement.  name: of its observation; power: expression is integrated, else an energy; domain: of
+    the branch, or of the first coordinate that a statement reads.
+    """
 
     name: str
     label: str
@@ -52,6 +55,7 @@ class Part:
     power: bool
     expression: Node
     place: Place
+    domain: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +126,7 @@ def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
             _over(b.loops, mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at))) for b in pieces if b.kind in ROLES
         ]
         label = shown(name) + (f"[{_ranges(pieces)}]" if first.at else "")
-        yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place)]
+        yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)]
 
 
 def shown(name: str) -> str:
@@ -139,6 +143,7 @@ def _ranges(pieces: Sequence[Branch]) -> str:
 
 def _of_statements(network: Network) -> Iterator[list[Part]]:
     counts: dict[str, int] = {}
+    domains = {c.name: c.domain.name for c in network.coordinates if c.domain is not None}
     statements: tuple[Energy | Work, ...] = (*network.energies, *network.works)
     for statement in statements:
         kind = statement.function if isinstance(statement, Energy) else "work"
@@ -148,7 +153,8 @@ def _of_statements(network: Network) -> Iterator[list[Part]]:
             role, power, value = _measure(statement)
         except (ModelError, ValueError):  # a product over a range has no derivative here
             continue
-        yield [Part(f"power of {kind} {counts[kind]}", label, role, power, value, statement.place)]
+        domain = next((domains[n.data[0]] for n in local_variables(value, _KINDS) if n.data[0] in domains), "")
+        yield [Part(f"power of {kind} {counts[kind]}", label, role, power, value, statement.place, domain)]
 
 
 def _measure(statement: Energy | Work) -> tuple[str, bool, Node]:

@@ -9,7 +9,12 @@ import pytest
 from schema import NUMBER, conforms, envelope
 from sysdyn import api
 from sysdyn.cli.main import run
+from sysdyn.cli.reduce import activity
 from sysdyn.cli.reduce.activity import variation
+from sysdyn.cli.reduce.sankey import flows
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.running import Request
+from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.arrays import arrays_of
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.verdict import Tolerance
@@ -270,3 +275,36 @@ def test_a_drivetrain_of_forty_elements(tmp_path, capsys):
     text = (tmp_path / "small.sd").read_text()
     assert "flow(f = 0" not in text
     assert len(re.findall(r"^  \w+: \w+\(", text, re.MULTILINE)) < 25
+
+
+def test_energies_go_from_bus_to_bus(tmp_path):
+    file = write(tmp_path, DRIVE)
+    report = Report()
+    request = Request(file)
+    target = targets.one(targets.read(file, report), file, None, None, report)
+    found = activity.activities(request, target, report, tmp_path, 0.0, None)
+    where = flows(found.items)
+    assert [bus.name for bus in where.buses] == ["electrical", "rotation"]
+    (passed,) = where.passes
+    assert (passed.label, passed.source, passed.target) == ("emf", "electrical", "rotation")
+    trace = api.simulate(file, accuracy=1e-8, output=tmp_path / "out.h5")
+    speed = trace[trace.names[0]].values[-1]
+    for bus, moved in zip(where.buses, (-passed.energy, passed.energy), strict=True):
+        rest = sum(s.energy for s in bus.enters) - sum(s.energy for s in bus.leaves) + moved
+        assert abs(rest) < 1e-4 * passed.energy
+    stored = sum(s.energy for s in where.buses[1].leaves if s.role == "held")
+    assert stored == pytest.approx(0.5 * 0.200001 * speed**2, rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_the_picture_shows_activities_and_where_the_energy_went(tmp_path, kind):
+    file = write(tmp_path, DRIVE)
+    target = tmp_path / f"energy.{kind}"
+    assert run(["reduce", file, "--activity", "--plot", str(target), "--quiet"]) == 0
+    drawn = target.read_bytes()
+    if kind == "svg":
+        for word in (b"electrical", b"rotation", b"emf", b"dissipated", b"activity"):
+            assert word in drawn
+    else:
+        assert drawn.startswith(b"\x89PNG")
+    assert run(["reduce", file, "--activity", "--plot", str(tmp_path / "energy.pdf"), "--quiet"]) == 2
