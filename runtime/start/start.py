@@ -320,6 +320,11 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
         found, holds = _rescaled(starter, t, shaken, guess, free)
         if holds or found.residual < best.residual:
             best = found
+    if not holds:
+        own, starter.work, starter.generous = starter.work, Work(), True
+        found, holds = _rescaled(starter, t, x, guess, free)
+        starter.work, starter.generous = own, holds
+        best = found if holds else best
     return best, holds
 
 

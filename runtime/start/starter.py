@@ -99,6 +99,7 @@ class Starter:
     def __init__(self, system: System, *, measuring: bool = False) -> None:
         self.system = system
         self.work = Work()  # of one search for a start
+        self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = system.another("start")
         self.rates = rates_of(self.settled)
         self.given = _given(system)
@@ -352,8 +353,10 @@ class Starter:
         np.maximum.at(largest, self._alike, np.abs(x))
         return np.where(np.abs(x) > NOISE * np.maximum(scale, largest[self._alike]), x, 0.0)
 
-    def scale(self, t: float, x: Floats) -> Floats:
-        """Magnitudes of x, found by balancing rows where the guess is zero."""
+    def scale(self, t: float, x: Floats, *, most: bool = False) -> Floats:
+        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes, or the
+        largest (rates of fast and slow stores 1e12 apart).
+        """
         known = np.abs(x)
         nominal = self.system.nominal[: self.n]
         known[: self.n] = np.where(nominal > 0.0, nominal, known[: self.n])
@@ -364,17 +367,18 @@ class Starter:
         values = values - told
         # how fast what follows from the state moves says nothing of its size
         sizes = ~self.groups("dynamics_rate")[self.rows]
-        found = propagate(known, self.rows[sizes], self.columns[sizes], values[sizes], free, self._alike)
+        own = self.rows[sizes], self.columns[sizes], values[sizes]
+        found = propagate(known, *own, free, self._alike, largest=most)
         for kind in np.unique(self.kinds):
             members = np.flatnonzero(self.kinds == kind)
             largest = found[members].max(initial=0.0)
             found[members] = np.maximum(found[members], 1e-3 * largest)
         found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
-        found = propagate(found, self.rows, self.columns, values, free, self._alike)
+        found = propagate(found, self.rows, self.columns, values, free, self._alike, largest=most)
         # guesses of one unit are measured alike
         size, largest = np.zeros(self.settled.rows), np.zeros(int(self._family.max(initial=0)) + 1)
-        own = self.columns < self.first
-        np.add.at(size, self.rows[own], (told * found[self.columns])[own])
+        text = self.columns < self.first
+        np.add.at(size, self.rows[text], (told * found[self.columns])[text])
         np.maximum.at(largest, self._family, size[self.missed])
         found[self.first :] = largest[self._family]
         return np.where(found > 1e-280, found, 1.0)
@@ -387,7 +391,7 @@ def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Ma
     weight[starter.written] = WEIGHT["written"]
     weight[follows] = WEIGHT["following"]
     # unknowns of one kind and unit are moved by one measure, whatever their values
-    scale = starter.scale(t, x)
+    scale = starter.scale(t, x, most=starter.generous)
     weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
     return weighted(starter, t, guess, rows=rows, free=free, scale=scale, weight=weight)
 

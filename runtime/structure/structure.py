@@ -25,6 +25,9 @@ MAX_INDEX = 6
 ROUSED = 1e-2
 """Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""
 
+GENERIC = 0.7310585786300049
+POINTS = tuple(GENERIC * 10.0**power for power in (3, -3, 6, -6, 9, -9))
+"""At which a pencil is looked at, after equilibration: at GENERIC first."""
 SLIDES = 2.0
 """Of a branch (events/kinks.py)."""
 
@@ -75,15 +78,33 @@ def pencil_index(e: Floats, b: Floats) -> int | None:
     return None
 
 
+def null_vectors(e: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Columns [n, k] that the pencil e x' + b x [n, n] maps to zero and rows [k, n] that map it to zero; k = 0 where it
+    is regular.
+
+    A singular pencil is singular at every cj; a regular one whose entries lie far apart is badly scaled at most.
+    """
+    e, b = equilibrated(e, b)
+    u, sigma, vt = decomposed(b + GENERIC * e)
+    rank = count(sigma, CERTAIN)
+    if rank < sigma.size and any(_regular(b + cj * e) for cj in POINTS):
+        rank = sigma.size
+    return vt[rank:].T, u[:, rank:].T
+
+
+def _regular(matrix: Floats) -> bool:
+    sigma = decomposed(equilibrated(matrix)[0])[1]
+    return count(sigma, CERTAIN) == sigma.size
+
+
 def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...], int]:
-    """Unknowns in the null vector of dF/dy + cj dF/dyd at a generic cj, () where it is regular; its row."""
-    e, b = equilibrated(system.dense(jyd), system.dense(jy))
-    u, sigma, vt = decomposed(b + 0.7310585786300049 * e)
-    if count(sigma, CERTAIN) == sigma.size:
+    """Unknowns in the null vectors of dF/dy + cj dF/dyd, () where it is regular; its row."""
+    columns, rows = null_vectors(system.dense(jyd), system.dense(jy))
+    if not columns.size:
         return (), -1
-    null = np.abs(vt[count(sigma, CERTAIN) :]).max(axis=0)
+    null = np.abs(columns).max(axis=1)
     names = tuple(system.name(int(k)) for k in np.flatnonzero(null > 1e-6 * null.max()))
-    return names, int(np.argmax(np.abs(u[:, -1])))
+    return names, int(np.argmax(np.abs(rows[-1])))
 
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:

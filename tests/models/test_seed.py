@@ -65,7 +65,7 @@ def simulated(tmp_path, model, *, formulation, times, backend="c", settings=(), 
         at=",".join(map(repr, times)),
         settings=tuple((name, repr(value)) for name, value in settings),
         output=str(tmp_path / "trace.h5"),
-        max_wall="60",
+        max_wall="600",
     )
     ran = run(request, report)
     assert ran is not None, [f"{d.code} {d.message}" for d in report]

@@ -4,7 +4,7 @@ import small_models as models
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
-from sysdyn.runtime.structure.structure import _growth_index, pencil_index, structure
+from sysdyn.runtime.structure.structure import _growth_index, null_vectors, pencil_index, structure
 
 # differential index of the seed's catalogue (seed/README.md, sections 3 and 4)
 CASES = {
@@ -62,3 +62,24 @@ def test_pencil_of_known_index(size):
     b[size:, size:] = rng.normal(size=(3, 3))
     left, right = rng.normal(size=(n, n)), rng.normal(size=(n, n))
     assert pencil_index(left @ e @ right, left @ b @ right) == size
+
+
+@pytest.mark.parametrize("spread", [0, 6, 12, 15])
+@pytest.mark.parametrize("singular", [False, True])
+def test_a_singular_pencil_is_told_from_one_whose_entries_lie_far_apart(spread, singular):
+    """Chains of masses whose springs and masses lie up to 10^spread apart; singular ones hold one spring and one mass
+    of another body twice.
+    """
+    rng = np.random.default_rng(spread)
+    for _ in range(50):
+        n = int(rng.integers(2, 7))
+        springs = 10.0 ** rng.uniform(-spread / 2, spread / 2, n)
+        mass = np.diag(10.0 ** rng.uniform(-spread / 2, spread / 2, n))
+        stiff = np.diag(springs) + np.diag([*springs[1:], 0.0]) - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)
+        zero, one = np.zeros((n, n)), np.eye(n)
+        e, b = np.block([[one, zero], [zero, mass]]), np.block([[zero, -one], [stiff, zero]])
+        if singular:
+            k = int(rng.integers(n, 2 * n - 1))
+            e[k], b[k] = 3.0 * e[2 * n - 1], 3.0 * b[2 * n - 1]
+        columns, rows = null_vectors(e, b)
+        assert columns.shape[1] == rows.shape[0] == int(singular)

@@ -1,0 +1,105 @@
+"""The search of `trade` against the exhaustive one: python tests/bench/trades.py [--accuracy A,...] [MODEL...]
+
+For each model of the book and each accuracy: the work of the setting that the search chose over that of the cheapest
+of all combinations at all half-decade tolerances, and what the search's runs cost over what all runs cost (work beside
+the trace's rows).  Last column: errors as `trade` states them over those from `references.json`, least and largest of
+a dozen runs; the traces stand at the instants of the book (a larger error may lie between these).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import re
+import sys
+import tempfile
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.run.running import Request, run
+from sysdyn.cli.trade.traded import Measured, cheapest
+from sysdyn.cli.trade.trading import trade
+from sysdyn.dsl.text.diagnostics import Report
+
+SEED = Path(__file__).parents[2] / "models" / "seed"
+MODELS = (
+    "dc_motor", "fluid_tank", "nonlinear_spring", "thermal_two_node", "lc_ladder", "diode_circuit", "slider_crank",
+    "two_link_arm", "two_tank", "em_suspension", "pi_controller", "lead_filter",
+)  # fmt: skip
+SOME = 12
+"""Runs whose error is compared with the book's values."""
+
+
+def at_instants(name: str, entry: dict[str, Any], folder: Path) -> str:
+    """The model with a trace at the coarsest grid that holds all instants of the book."""
+    instants = [Fraction(t).limit_denominator(10**6) for t in entry["t"]]
+    common = math.lcm(*(t.denominator for t in instants))
+    every = math.gcd(*(int(t * common) for t in instants)) / common
+    text = (SEED / f"{name}.sd").read_text(encoding="utf-8")
+    path = folder / f"{name}.sd"
+    path.write_text(re.sub(r"every [^;\n}]+", f"every {every!r} s", text), encoding="utf-8")
+    return str(path)
+
+
+def true_error(file: str, m: Measured, entry: dict[str, Any], folder: Path) -> float:
+    """Of one setting, by the book's values."""
+    c = m.combination
+    how = {"formulation": c.formulation, "index": c.index, "method": c.method, "rtol": m.tolerance}
+    ran = run(Request(file, scene="reference", output=str(folder / "run.h5"), **how), Report())
+    assert ran is not None
+    trace, t = ran.outcome.traced, np.array(entry["t"])
+    rows = np.searchsorted(trace.time, t + 1e-9 * t[-1], side="right") - 1
+    return max(
+        float(np.abs(trace[v].values[rows] - np.array(entry["values"][v])).max()) / (trace[v].nominal or 1.0)
+        for v in entry["variables"]
+    )
+
+
+def rows(name: str, accuracies: list[float], entry: dict[str, Any], folder: Path) -> list[str]:
+    """A line an accuracy."""
+    file = at_instants(name, entry, folder)
+    full = trade(Request(file, scene="reference"), Report(), folder, full=True)
+    assert full is not None
+    spent = sum(m.work - m.fixed for m in full.measured)
+    known = full.reference.uncertainty
+    sure = [m for m in full.measured if m.usable and 10.0 * known < (m.error or 0.0) < 0.5]
+    some = sure[:: max(len(sure) // SOME, 1)]
+    ratios = [(m.error or 0.0) / true_error(file, m, entry, folder) for m in some]
+    lines = []
+    for accuracy in accuracies:
+        found = trade(Request(file, scene="reference", accuracy=accuracy), Report(), folder)
+        best = cheapest(full.measured, accuracy, known)
+        if found is None or found.chosen is None or best is None:
+            lines.append(f"{name:18s} {accuracy:8.0e} nothing chosen")
+            continue
+        cost = sum(m.work - m.fixed for m in found.measured) / spent
+        chosen = f"{found.chosen.combination.name} at {found.chosen.tolerance:.0e}"
+        lines.append(
+            f"{name:18s} {accuracy:8.0e} {len(full.measured):5d} {len(found.measured):5d} "
+            f"{found.chosen.work / best.work:6.2f} {cost:7.3f}  {min(ratios):5.2f} .. {max(ratios):5.2f}  {chosen}"
+        )
+    return lines
+
+
+def main() -> int:
+    """The table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("models", nargs="*", default=list(MODELS), metavar="MODEL")
+    parser.add_argument("--accuracy", default="1e-2,1e-4,1e-6", metavar="A,...")
+    asked = parser.parse_args()
+    shared = Path(os.environ.get("SYSDYN_SHARED", Path(__file__).parents[3] / "shared"))
+    book = json.loads((shared / "seed" / "references.json").read_text(encoding="utf-8"))
+    print(f"{'model':18s} accuracy  runs tried   work    cost  stated / true    chosen")
+    for name in asked.models:
+        with tempfile.TemporaryDirectory() as folder:
+            for line in rows(name, [float(a) for a in asked.accuracy.split(",")], book[name], Path(folder)):
+                print(line, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
