@@ -9,14 +9,16 @@ what the row misses; these are what moves least, and the coordinates follow.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.model.scales import alike, group_maximum, propagate
+from sysdyn.runtime.model.scales import alike, group_maximum, of_a_kind, propagate
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
@@ -89,6 +91,24 @@ class _Sums:
     place: Places
 
 
+def remembered(
+    ask: Callable[[Starter, float, Floats], NDArray[Any]],
+) -> Callable[[Starter, float, Floats], NDArray[Any]]:
+    """The answer at the point asked last is known: stages that move nothing ask again and again at one point."""
+    name = ask.__name__
+
+    @functools.wraps(ask)
+    def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
+        if not self.remember:
+            return ask(self, t, x)
+        known = self.known.get(name)
+        if known is None or known[0] != t or not np.array_equal(known[1], x):
+            known = self.known[name] = (t, x.copy(), ask(self, t, x))
+        return known[2].copy()  # type: ignore[no-any-return]
+
+    return answer
+
+
 class Starter:
     """The equations of the start of one model (t0 apart).
 
@@ -96,8 +116,10 @@ class Starter:
     behind those of y and its rates; sums of balances without inertia have their rates.
     """
 
-    def __init__(self, system: System, *, measuring: bool = False) -> None:
+    def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
         self.system = system
+        self.remember = remember  # one search for a start: nothing but t and x changes
+        self.known: dict[str, tuple[float, Floats, NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
         self.settled = system.another("start")
         self.rates = rates_of(self.settled)
@@ -145,6 +167,11 @@ class Starter:
         self.moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
         self.moving[self.first :] = self._read()
 
+    @functools.cached_property
+    def _of_a_kind(self) -> NDArray[np.int64]:
+        """Number of the row and the kind of its unknown, of each place [entries]."""
+        return of_a_kind(self.rows, self.columns, self._alike)
+
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
         y, yd = x[: self.n].copy(), np.zeros(self.n)
@@ -161,6 +188,7 @@ class Starter:
             rows[self._sums.rows] = self._sums.weights @ rows[self._sums.of]
         return rows
 
+    @remembered
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
         jy, jyd = self.settled.jacobian(t, *self.expand(x))
@@ -302,6 +330,8 @@ class Starter:
 
     def _read(self) -> NDArray[np.str_]:
         """The kind of unknowns that each guess is of; none where it is of several."""
+        if not self.missed.size:
+            return np.zeros(0, dtype=self.moving.dtype)
         found = np.full(self.settled.rows, "", dtype=self.moving.dtype)
         many = np.zeros(self.settled.rows, dtype=bool)
         read = self._structural & (self.columns < self.first)
@@ -328,6 +358,7 @@ class Starter:
                 mask[first : first + size] = inertial[own : own + size]
         return mask
 
+    @remembered
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
 
@@ -352,6 +383,7 @@ class Starter:
         np.maximum.at(largest, self._alike, np.abs(x))
         return np.where(np.abs(x) > NOISE * np.maximum(scale, largest[self._alike]), x, 0.0)
 
+    @remembered
     def scale(self, t: float, x: Floats) -> Floats:
         """Magnitudes of x, found by balancing rows where the guess is zero."""
         known = np.abs(x)
@@ -364,13 +396,16 @@ class Starter:
         values = values - told
         # how fast what follows from the state moves says nothing of its size
         sizes = ~self.groups("dynamics_rate")[self.rows]
-        found = propagate(known, self.rows[sizes], self.columns[sizes], values[sizes], free, self._alike)
+        of = self._of_a_kind
+        found = propagate(
+            known, self.rows[sizes], self.columns[sizes], values[sizes], free, self._alike, group=of[sizes]
+        )
         for kind in np.unique(self.kinds):
             members = np.flatnonzero(self.kinds == kind)
             largest = found[members].max(initial=0.0)
             found[members] = np.maximum(found[members], 1e-3 * largest)
         found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
-        found = propagate(found, self.rows, self.columns, values, free, self._alike)
+        found = propagate(found, self.rows, self.columns, values, free, self._alike, group=of)
         # guesses of one unit are measured alike
         size, largest = np.zeros(self.settled.rows), np.zeros(int(self._family.max(initial=0)) + 1)
         own = self.columns < self.first
