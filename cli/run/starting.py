@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.run.contradiction import inconsistent, place_of
 from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Expectation
@@ -52,7 +53,7 @@ def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None 
     except NotFiniteError:
         _steep(prepared, report)
         return None
-    _structural(prepared, facts if not implicit else replace(facts, undetermined=()), policy, report)
+    _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
     for name in implicit:
         place = next(
@@ -96,11 +97,16 @@ def _steep(prepared: Prepared, report: Report) -> None:
     report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")
 
 
-def _structural(prepared: Prepared, facts: Structure, policy: str, report: Report) -> None:
+def _structural(
+    prepared: Prepared, system: System, state: ConsistentState, facts: Structure, policy: str, report: Report
+) -> None:
     if facts.singular:
         near = facts.rank
         message = f"the initial configuration is singular: rank {near - facts.singular}, {near} nearby"
-        report.error("E512", message, prepared.network.place, help="move the guess off the dead centre")
+        lost = LastState(prepared, system, state.t, state.y).dependent()
+        message += f": {', '.join(c.name for c in lost)} depend on each other there" if lost else ""
+        where = lost[-1].place if lost else prepared.network.place
+        report.error("E512", message, where, help="move the guess off the dead centre")
     if facts.redundant and policy != "error":
         return
     if facts.redundant:
