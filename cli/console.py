@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import click
 from sysdyn.cli.failures import envelope, plain, shown
-from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report, shortened
+from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
 
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
 ALWAYS = ("W921",)
@@ -66,6 +66,8 @@ class Console:
             code = 1
         if self.as_json:
             diagnostics = [*(d.to_json() for d in found), *self._plain]
+            if self.command == "check":
+                self.result["edits"] = [edited(k, d.edit) for k, d in enumerate(found) if d.edit is not None]
             print(json.dumps(finite(envelope(self.command, code, diagnostics, self.result)), allow_nan=False))
         elif self.format is not None:
             kept = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
@@ -87,6 +89,13 @@ class Console:
         errors = sum(d.severity == "error" for d in self.report)
         if errors > 1:
             print(f"{errors} errors", file=sys.stderr)
+
+
+def edited(number: int, edit: Edit) -> dict[str, object]:
+    """A change of the text that mends a finding, by the finding's place in `diagnostics`; `--fix` makes the same."""
+    (line, column), (end_line, end_column) = edit.place.start, edit.place.end
+    place = {"file": edit.place.file, "line": line, "column": column, "end_line": end_line, "end_column": end_column}
+    return {"diagnostic": number, **place, "text": edit.text}
 
 
 def finite(value: Any) -> Any:

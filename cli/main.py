@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import click
 from sysdyn.cli.streams import standing_streams
@@ -92,7 +93,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     with _ended_like_an_interruption(), standing_streams():
         try:
-            code = group.main(given, prog_name="sysdyn", standalone_mode=False)
+            code = group.main(given, prog_name="sysdyn", standalone_mode=False, default_map=_defaults(given))
             for stream in (sys.stdout, sys.stderr):
                 stream.flush()  # what a full disk refuses is found here, not at exit
             return code if isinstance(code, int) else 0
@@ -100,6 +101,15 @@ def run(arguments: Sequence[str] | None = None) -> int:
             from sysdyn.cli.failures import report_failure
 
             return report_failure(error, given)
+
+
+def _defaults(given: Sequence[str]) -> dict[str, Any]:
+    """What the project's configuration says, for a command that runs."""
+    if not given or given[0] not in COMMANDS or not {"-h", "--help"}.isdisjoint(given):
+        return {}
+    from sysdyn.cli.project.config import configured
+
+    return configured(given)
 
 
 @contextlib.contextmanager

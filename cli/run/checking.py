@@ -5,7 +5,7 @@ from __future__ import annotations
 from sysdyn.cli.run import targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model.network import Network
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.diagnostics import ModelError, Report
 
 
 def checked(target: targets.Target, report: Report, refused: bool = False) -> dict[str, object]:
@@ -22,6 +22,14 @@ def checked(target: targets.Target, report: Report, refused: bool = False) -> di
 
 
 def _started(network: Network, report: Report) -> dict[str, object]:
+    try:
+        return _judged(network, report)
+    except ModelError as error:  # of numbers that make no model
+        report.extend(error.diagnostics)
+        return {"ok": False}
+
+
+def _judged(network: Network, report: Report) -> dict[str, object]:
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
     from sysdyn.cli.run.starting import described, start
 

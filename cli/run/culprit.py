@@ -6,15 +6,18 @@ first operation whose arguments are numbers and whose value is none is named wit
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
+from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES
 from sysdyn.dsl.model.expression import Node, to_text, topological
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+from sysdyn.runtime.model.system import System
 
 AHEAD = (0.0, 1e-9, 1e-6, 1e-3, 1e-2, 1e-1)
 """Times ahead at which rows are evaluated, of the time passed so far (and multiples of the step)."""
@@ -30,11 +33,12 @@ class Culprit:
     row: RowLabel
 
 
-def culprit(prepared: Prepared, error: SolverFailure) -> Culprit | None:
+def culprit(prepared: Prepared, system: System, error: SolverFailure) -> Culprit | None:
     """The operation that is no number at the failure, or just ahead of the last good point; None where all are."""
     if error.state is None:
         return None
     t, y, yd = error.state
+    last = LastState(prepared, system, t, y)
     oracle = Oracle(prepared.compiled.form, prepared.binding)
     blocks = [b for b in prepared.compiled.form.blocks if b.name not in (*WITHOUT_ENTRIES, "initial")]
     rates = np.where(np.isfinite(yd), yd, 0.0)
@@ -43,22 +47,44 @@ def culprit(prepared: Prepared, error: SolverFailure) -> Culprit | None:
         for block in blocks:
             found = oracle.undefined(block.name, *point, infinite=error.cause == "nonfinite")
             if found is not None:
-                return _told(prepared, *found)
+                last.time, last.y = point[0], point[1]
+                return _told(prepared, *found, last)
     return None
 
 
-def _told(prepared: Prepared, row: int, node: Node, arguments: list[float]) -> Culprit:
+def _told(prepared: Prepared, row: int, node: Node, arguments: list[float], last: LastState) -> Culprit:
     place = _statement(prepared, node) or prepared.compiled.form.rows[row].place
-    label = RowLabel(
-        place.element if place else "", "law", place.file if place else "", place.start[0] if place else 0
-    )
+    label = RowLabel(place.element if place else "", "law", place.file if place else "", place.start[0] if place else 0)
     listed = ", ".join(f"{a:.9g}" for a in arguments)
+    read = ", ".join(last.of(node)[:3])
     if node.op == "table":
-        return Culprit("E932", f"the argument of table {node.data[0]} left its range: it is {listed}", label)
+        said = f"the argument of table {node.data[0]} left its range: it is {read or listed}"
+        return Culprit("E932", said, label)
     text = to_text(node)
+    function = re.match(r"\w+(?=\()", text)
+    if function is not None and len(arguments) <= 2:
+        written = _written(place, function[0])
+        values = f"its argument is {arguments[0]:.3g}" + (f", {read}" if read else "")
+        return Culprit("E933", f"{written or text[:60]} is no number: {values}", label)
     shown = text if len(text) <= 60 else text[:57] + "..."
     name = {"call": str(node.data), "pow": "a power", "mul": "a quotient or power", "sum": "a sum"}[node.op]
     return Culprit("E933", f"{name} is outside its domain: {shown} with {listed}", label)
+
+
+def _written(place: Place | None, function: str) -> str | None:
+    """The function's call as the author wrote it, where the statement has one of them: `sqrt(2*g0*h)`."""
+    if place is None:
+        return None
+    text = place.source.text[place.span.start : place.span.end]
+    starts = [m.start() for m in re.finditer(rf"(?<!\w){function}\(", text)]
+    if len(starts) != 1:
+        return None
+    depth = 0
+    for k in range(starts[0], len(text)):
+        depth += (text[k] == "(") - (text[k] == ")")
+        if text[k] == ")" and not depth:
+            return " ".join(text[starts[0] : k + 1].split())
+    return None
 
 
 def _statement(prepared: Prepared, node: Node) -> Place | None:

@@ -134,9 +134,7 @@ def _file(outcome: Outcome) -> Iterator[Path]:
         yield path
 
 
-def _sides(
-    outcome: Outcome, k: int, e: Expectation
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _sides(outcome: Outcome, k: int, e: Expectation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     samples = outcome.samples
     column = {name: j for j, name in enumerate(samples.names)}
     return samples.time, *_columns(samples.values, column, k, e)

@@ -6,13 +6,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from sysdyn.cli.run.contradiction import inconsistent, place_of
 from sysdyn.cli.run.events import plan
-from sysdyn.cli.run.prepare import Prepared, place_at, prepare
+from sysdyn.cli.run.last_state import LastState
+from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Expectation
-from sysdyn.dsl.text.diagnostics import Place, Related, Report
+from sysdyn.dsl.model.units import quantity
+from sysdyn.dsl.text.diagnostics import Related, Report
 from sysdyn.runtime.events.start import eventful_start
-from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.failures import InconsistentStart
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.start import ConsistentState
@@ -45,12 +48,12 @@ def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None 
             facts = structure(system, state)
             implicit = undetermined(system, state)
     except InconsistentStart as error:
-        _inconsistent(prepared, error, report)
+        inconsistent(prepared, t0, error, report)
         return None
     except NotFiniteError:
         _steep(prepared, report)
         return None
-    _structural(prepared, facts if not implicit else replace(facts, undetermined=()), policy, report)
+    _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
     for name in implicit:
         place = next(
@@ -88,58 +91,34 @@ def shortened(lines: list[str]) -> list[str]:
     return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
 
 
-def _place(prepared: Prepared, label: RowLabel) -> Place:
-    return place_at(prepared.network, label.file, label.line)
-
-
-def _inconsistent(prepared: Prepared, error: InconsistentStart, report: Report) -> None:
-    where = _place(prepared, error.rows[0]) if error.rows else prepared.network.place
-    names = ", ".join(dict.fromkeys(r.label for r in error.rows)) or ", ".join(error.names)
-    unit = f"residual {error.residual:.3g}"
-    related = tuple(Related("this value is fixed", _place(prepared, c)) for c in error.candidates)
-    free = ", ".join(f"'{c.label}'" for c in error.candidates)
-    match error.kind:
-        case "gamma":
-            message = (
-                f"gamma '{names}' has no solution at the start: the residual cannot fall below {error.residual:.3g}"
-            )
-            report.error("E519", message, where, related=related)
-        case "implicit":
-            message = f"the gammas do not determine {', '.join(error.names)} at the start"
-            report.error("E505", message, where)
-        case "nonfinite":
-            message = f"{names} is not a number at the initial values: a root or logarithm out of its range?"
-            report.error("E519", message, where, help="other guesses: init ... ~ ...")
-        case _ if error.candidates:
-            message = f"fixed initial values contradict {names}: {unit}"
-            report.error("E903", message, where, help=f"free one of {free}: '~' for '='", related=related)
-        case "fixed":
-            report.error("E510", f"the constraints contradict each other at the start: {unit} in {names}", where)
-        case _:
-            message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
-            report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
-
-
 def _steep(prepared: Prepared, report: Report) -> None:
     """E519: the slopes of the rows at the start are no numbers."""
     message = "the slopes of the equations are no numbers at the start: values beyond 1e308, or a root at zero?"
     report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")
 
 
-def _structural(prepared: Prepared, facts: Structure, policy: str, report: Report) -> None:
+def _structural(
+    prepared: Prepared, system: System, state: ConsistentState, facts: Structure, policy: str, report: Report
+) -> None:
     if facts.singular:
         near = facts.rank
         message = f"the initial configuration is singular: rank {near - facts.singular}, {near} nearby"
-        report.error("E512", message, prepared.network.place, help="move the guess off the dead centre")
+        lost = LastState(prepared, system, state.t, state.y).dependent()
+        message += f": {', '.join(c.name for c in lost)} depend on each other there" if lost else ""
+        where = lost[-1].place if lost else prepared.network.place
+        report.error("E512", message, where, help="move the guess off the dead centre")
     if facts.redundant and policy != "error":
         return
     if facts.redundant:
-        first = facts.dependent[0][0] if facts.dependent else None
-        where = _place(prepared, first) if first else prepared.network.place
+        # the last one written is the one too many, unless a library has it
+        places = [(place_of(prepared, label), label.label) for label, _ in facts.dependent]
+        own = [p for p in places if p[0].source is prepared.network.place.source]
+        where = max(own or places, key=lambda p: p[0].span.start)[0] if places else prepared.network.place
+        beside = [Related(f"{name} belongs to it", p) for p, name in places if p != where]
         group = ", ".join(f"{label.label} ({weight:+.3g})" for label, weight in facts.dependent)
         plural = "s" if facts.redundant > 1 else ""
         message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
-        report.error("E509", message, where, help="delete one of them, or redundancy minimum_norm in the scene")
+        report.error("E509", message, where, related=beside)
     elif facts.undetermined and not facts.singular:  # multipliers of a singular configuration are not determined
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
         message = f"the equations do not determine {names}"
@@ -171,8 +150,15 @@ def _inertia(prepared: Prepared, system: System, state: ConsistentState, report:
     places |= {n.name: n.place for n in prepared.network.nodes}
     energies = [e.place for e in prepared.network.energies if e.function in ("T*", "T")]
     where = energies[0] if len(energies) == 1 else places.get(family, prepared.network.place)
-    message = f"the inertia along {name} is negative ({value:g}): T* has no minimum"
-    report.error("E321", message, where, help="a positive mass, inertia or inductance")
+    negative = [
+        p for p in prepared.network.parameters if np.ndim(v := prepared.binding.values.get(p.name, 0)) == 0 and v < 0
+    ]
+    read = {n.data for e in prepared.network.energies for n in ex.topological([e.expression]) if n.op == "param"}
+    guilty = [p for p in negative if p.name in read]
+    shown = ", ".join(f"{p.name} = {quantity(prepared.binding.values[p.name], p.unit)}" for p in guilty)
+    what = f"the inertia along {name} is negative: {shown or f'{value:g} in SI units'}; T* has no minimum"
+    related = tuple(Related("negative", p.place) for p in guilty)
+    report.error("E321", what, where, related=related)
 
 
 def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: Structure, report: Report) -> None:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable
 
 from sysdyn.cli.run.culprit import Culprit, culprit
+from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, place_at
 from sysdyn.cli.run.starting import Started
 from sysdyn.cli.run.targets import Target
@@ -17,9 +18,6 @@ from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.judgement import Cancelled, Judgement, NotMet
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.simulate import Outcome
-
-SHOWN = 4
-"""Unknowns of the last good state that a finding lists."""
 
 _CAUSES = {
     "newton": ("E930", "Newton's iteration does not converge"),
@@ -49,24 +47,40 @@ _REMEDIES = {
 }
 
 
+_BOUNDED = "a law that keeps it in bounds (an energy with a minimum, a stop), or an earlier end: --until"
+
+
+_RANK = "an earlier end, or lengths with which the mechanism does not reach its dead centre"
+
+
 def stopped(target: Target, prepared: Prepared, started: Started, error: SolverFailure, report: Report) -> str:
     """Reports where the solver stopped; the sentence of it."""
     code, cause = _CAUSES.get(error.cause, ("E930", error.cause))
-    found = culprit(prepared, error) if error.cause in ("nonfinite", "newton", "step_too_small") else None
+    found = (
+        culprit(prepared, started.system, error) if error.cause in ("nonfinite", "newton", "step_too_small") else None
+    )
     if found is not None:
         code, cause = found.code, found.text
-    where = _place(target, prepared, error, found)
+    last = None if error.state is None else LastState(prepared, started.system, *error.state[:2])
+    lost = last.dependent(started.state.y) if last is not None and code == "E930" else []
+    if lost:
+        code, cause = "E931", f"{', '.join(c.name for c in lost)} lose their rank: they depend on each other there"
+    where = lost[-1].place if lost else _place(target, prepared, error, found, last)
     text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {cause}"
     if error.row is not None and found is None:
-        text += f", in {_named(error.row)}, {where.file}:{where.start[0]}"
+        text += f", in {_named(error.row)}"
     if error.unknown is not None:
         text += f", {'of' if error.cause in _OF_EVENTS else 'unknown'} {error.unknown}"
-        if error.row is None:
-            text += f", {where.file}:{where.start[0]}"
+    why = None
+    if last is not None and code == "E930":
+        why = last.grown(started.state.y) or last.vanishing(started.state.y)
+        text += f"; {why}" if why else ""
     partial = error.partial
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
-    help_ = "; ".join(filter(None, (_REMEDIES[code], _last_good(started, error))))
+    remedy = _BOUNDED if why else _RANK if lost else _REMEDIES[code]
+    known = f"last good state at {last.time:.9g} s: {last.listed()}" if last is not None and last.states() else ""
+    help_ = "; ".join(filter(None, (remedy, known)))
     report.error(code, text, where, help=help_)
     return text
 
@@ -137,13 +151,22 @@ def _statements(body: Iterable[syntax.Statement]) -> Iterable[syntax.Statement]:
         yield from _statements(getattr(statement, "body", ()))
 
 
-def _place(target: Target, prepared: Prepared, error: SolverFailure, found: Culprit | None) -> Place:
+def _place(
+    target: Target, prepared: Prepared, error: SolverFailure, found: Culprit | None, last: LastState | None
+) -> Place:
     if found is not None:
         return author_place(target, prepared, found.row)
     if error.row is not None:
         return author_place(target, prepared, error.row)
+    own = target.document.file.source
+    driven = last.statement(error.unknown) if last is not None and error.unknown is not None else None
+    if driven is not None and driven.source is own and error.cause not in _OF_EVENTS:
+        return driven
     if error.unknown is not None and error.cause not in _OF_EVENTS:
         return _declared(target, prepared, re.split(r"[^\w]", error.unknown, maxsplit=1)[0])
+    if error.cause in ("max_steps", "max_wall", "max_events") and target.scene is not None:
+        limits = [s for s in target.scene.body if isinstance(s, syntax.Limit) and error.cause == f"max_{s.name.name}"]
+        return Place(own, limits[0].span if limits else target.scene.name.span)
     return prepared.network.place
 
 
@@ -151,14 +174,3 @@ def _named(row: RowLabel) -> str:
     """The row, or the element, by its name."""
     kind = "" if row.kind[:1].isdigit() else f"{row.kind} "
     return f"{kind}{row.label}"
-
-
-def _last_good(started: Started, error: SolverFailure) -> str:
-    """A few unknowns at the last good point."""
-    if error.state is None:
-        return ""
-    time, y, _ = error.state
-    names = started.system.unknown_names
-    kept = [k for k in range(min(len(names), y.size)) if started.system.kinds[k] in ("q", "f", "p", "s")][:SHOWN]
-    listed = ", ".join(f"{names[k]} = {y[k]:.6g}" for k in kept)
-    return f"last good state at {time:.9g} s: {listed}" if listed else ""

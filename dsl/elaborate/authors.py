@@ -27,8 +27,9 @@ def told(elaborator: Elaborator, found: Iterable[Diagnostic]) -> Iterator[Diagno
 def _told(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
     assert d.place is not None
     spaces = [s for s, _ in elaborator.bodies if s.path and _within(elaborator, s, d.place)]
+    meant = [s for s in spaces if s.path == d.place.element]
     named = [s for s in spaces if re.search(rf"(?<![\w.]){re.escape(s.path)}(?![\w])", d.message)]
-    for space in (*sorted(named, key=lambda s: -len(s.path)), *spaces):
+    for space in (*meant, *sorted(named, key=lambda s: -len(s.path)), *spaces):
         place = _author(elaborator, space, d)
         if place is not None:
             said = f"in component '{space.component}'"

@@ -84,9 +84,15 @@ class Connections(Statements):
                 connection.span,
                 help="connect a node or name the coordinate",
             )
-        if any(d.name != domains[0].name for d in domains):
-            message = f"'{s.decl.name}' joins {domains[0].name} and {domains[1].name}"
-            raise self.resolver.fail("E401", message, connection.span, help="a gyrator or transformer couples domains")
+        own = domain or domains[0]
+        other = next((e for e in found if e.node is not None and e.domain.name != own.name), None)
+        if other is not None and other.node is not None:
+            first = next((e.node.name for e in found if e.node is not None and e is not other), None)
+            what = f"its node '{other.node.name}' is {other.domain.name}"
+            message = f"'{s.decl.name}' is {own.name}, {what}"
+            if domain is None:
+                message = f"'{s.decl.name}' joins {own.name} and {other.domain.name}: {first} and {other.node.name}"
+            raise self.other_domain(message, own, other, connection.span)
         plus, minus = (
             e if e is not None and e.domain is not None else End(None, (), domains[0]) for e in (plus, minus)
         )
@@ -94,6 +100,16 @@ class Connections(Statements):
             message = f"both ends of '{s.decl.name}' are node {plus.node.name}"
             raise self.resolver.fail("E413", message, connection.span)
         return self._along(plus, minus, domains[0])
+
+    def other_domain(self, message: str, wanted: DomainSymbol, end: End, span: syntax.Span) -> Failed:
+        """Report E401: an end of another domain than is wanted, with the nodes that would do."""
+        right = [
+            n for n in self.scope.names() if isinstance(s := self.scope.find(n), NodeSymbol) and s.domain is wanted
+        ]
+        help_ = f"{wanted.name}: {', '.join(right[:5])}; " if right else f"a node of {wanted.name}; "
+        help_ += "a transformer, gyrator or source couples domains"
+        subject = None if end.node is None else f"domain of {end.node.name}"
+        return self.resolver.fail("E401", message, span, help=help_, subject=subject)
 
     def _is_displacement_of(
         self, s: syntax.Instance, domain: DomainSymbol | None, value: Typed, connection: syntax.On

@@ -101,7 +101,9 @@ def every(frame: Frame, s: syntax.Every) -> None:
     message = "the period of 'every' is in {}, wants s"
     period = frame.resolver.wanted(s.period, dim.TIME, "E703", message)
     if ex.variables(period) or _discretes(frame, period) or (ex.is_const(period) and not period.data > 0.0):
-        raise frame.resolver.fail("E703", "the period of 'every' must be a positive constant", s.period.span)
+        text = " ".join(frame.resolver.source.text[s.period.span.start : s.period.span.end].split())
+        message = f"the period of 'every' must be a positive constant, not {text}"
+        raise frame.resolver.fail("E703", message, s.period.span)
     place = frame.place(s.span)
     name = " ".join(frame.resolver.source.text[s.period.span.start : s.period.span.end].split())
     frame.parts.events.append(Event(f"every {name}", None, period, _actions(frame, s.actions), place))
@@ -172,7 +174,8 @@ def _target(frame: Frame, action: syntax.Action) -> tuple[Typed, bool]:
             return Typed(ex.var(name, "f"), value.dimension), False
     text = " ".join(frame.resolver.source.text[action.target.span.start : action.target.span.end].split())
     message = f"event assigns {text} (only discrete variables, states and x' of a coordinate may jump)"
-    raise frame.resolver.fail("E702", message, action.target.span, help="a constraint")
+    help_ = f"discrete {text} = ... in place of its declaration" if node.op == "param" else f"{text}' := ..., its rate"
+    raise frame.resolver.fail("E702", message, action.target.span, help=help_)
 
 
 # -- constraints that hold at times --------------------------------------------------------------------------

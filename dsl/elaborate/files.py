@@ -144,7 +144,7 @@ class FileScope:
                 help_ = f"nearest exported name: '{near}'" if near else f"it exports {', '.join(module.symbols)}"
                 help_ = f"from std.{other} import {word.name}" if other else help_
                 self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
-                self.scope.broken.add(word.name)
+                self.scope.broken |= {word.name} | ({near} - self.scope.symbols.keys() if near else set())
 
     def _module(self, item: syntax.Import, source: SourceText) -> Scope | None:
         """The names of a module: std.x from the library, others from the folder of the importing file."""

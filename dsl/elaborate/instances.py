@@ -195,10 +195,11 @@ class Instances(Elements):
         others = set(space.elsewhere) - set(head.parameters) if space.path in self.levels else ()
         for arg in s.args or ():
             if arg.name is None:
-                names = ", ".join(head.parameters)
-                raise self.resolver.fail(
-                    "E404", "positional argument", arg.span, help=f"name it: {names}" if names else None
-                )
+                text = self.source_text(arg.span)
+                names = [n for n, p in head.parameters.items() if p.value is None] or [*head.parameters]
+                help_ = f"{names[0]} = {text}" if len(names) == 1 else f"name it: {', '.join(head.parameters)}"
+                message = f"'{text}' is a positional argument: those of '{component.name}' are named"
+                raise self.resolver.fail("E404", message, arg.span, help=help_)
             if arg.name in head.inputs:
                 head.given[arg.name] = arg.value
                 continue
@@ -221,7 +222,8 @@ class Instances(Elements):
                 place = Place(self._outer_source(s), s.span)
                 unit = statement.unit.text if statement.unit else "..."
                 message = f"parameter '{name}' of '{component.name}' has no value"
-                self.report.error("E406", message, place, help=f"{component.name}({name} = ... {unit})")
+                help_, subject = f"{component.name}({name} = ... {unit})", f"value {self.current.path}.{name}"
+                self.report.error("E406", message, place, help=help_, subject=subject)
 
     def _outer_source(self, s: syntax.Instance):  # type: ignore[no-untyped-def]
         return self._instance_source
@@ -253,7 +255,7 @@ class Instances(Elements):
         for name in (*head.ports, *head.branches):
             if name not in bound:
                 what = f"port '{name}'" if name in head.ports else f"branch '{name}'" if name else "the branch"
-                help_ = "bind it, or to ground"
+                help_ = f"{name} = NODE, or {name} = ground" if name else "a -> b"
                 raise self.resolver.fail("E408", f"{what} of '{s.decl.name}' is not connected", s.span, help=help_)
         for name, statement in head.inputs.items():
             if name not in inputs and statement.value is None:
@@ -321,7 +323,7 @@ class Instances(Elements):
     def _same_domain(self, s: syntax.Instance, what: str, wanted: DomainSymbol, end: End, value: syntax.Expr) -> None:
         if end.domain.name != wanted.name:
             message = f"{what} of '{s.decl.name}' is {wanted.name}, node '{self._text(value)}' is {end.domain.name}"
-            raise self.resolver.fail("E401", message, value.span, help="a gyrator or transformer couples domains")
+            raise self.other_domain(message, wanted, end, value.span)
 
     def _bind_branch(
         self,
@@ -345,8 +347,10 @@ class Instances(Elements):
             raise Failed
         ends = self._ends(s, connection, wanted)
         if ends.domain is not None and ends.on is None and ends.domain.name != wanted.name:
-            message = f"'{s.decl.name}' is {wanted.name}, its nodes are {ends.domain.name}"
-            raise self.resolver.fail("E401", message, connection.span, help="a gyrator or transformer couples domains")
+            end = next(e for e in (ends.plus, ends.minus) if e is not None and e.node is not None)
+            assert end.node is not None
+            message = f"'{s.decl.name}' is {wanted.name}, its node '{end.node.name}' is {ends.domain.name}"
+            raise self.other_domain(message, wanted, end, connection.span)
         family = Family(f"{space.path}.{name}" if name else space.path, space.prefix, space.around, ())
         symbol = BranchSymbol(name or s.decl.name, family, wanted, self.place(s.decl.span))
         space.scope.symbols[name] = symbol

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from sysdyn.dsl.elaborate.level_ports import level_ports
 from sysdyn.dsl.model.network import LevelChoice
 from sysdyn.dsl.names.context import Failed
-from sysdyn.dsl.names.symbols import ComponentSymbol
+from sysdyn.dsl.names.symbols import ComponentSymbol, nearest
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 
@@ -35,7 +35,9 @@ def choose_level(
         return None, base
     if chosen not in levels:
         message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
-        frame.report.error("E802", message, place or frame.place(s.component.span))
+        near = nearest(chosen, levels)
+        remedy = f"nearest: '{near}'" if near else None
+        frame.report.error("E802", message, place or frame.place(s.component.span), help=remedy)
         raise Failed
     if len(levels) > 1:
         frame.choices[path] = LevelChoice(path, chosen, tuple(levels), free)

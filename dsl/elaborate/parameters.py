@@ -67,7 +67,9 @@ class Parameters(Frame):
                                 if other != name
                                 else f"circular definition: {name} -> {name}"
                             )
-                            self.report.error("E105", message, self.place(span))
+                            help_ = f"a value of its own for '{other}' or '{name}'"
+                            self.report.error("E105", message, self.place(span), help=help_)
+                            self.scope.broken |= {name, other}
                         elif other not in state:
                             stack.append((other, False))
         return order
@@ -133,6 +135,8 @@ class Parameters(Frame):
                     name = self.current.path or self.current.component
                     want = unit.text if unit is not None else want
                     message = f"argument {statement.decl.name} of '{name}' is {is_}, wants {want}"
+                    if help_ is None and isinstance(written, syntax.Name) and have != "dimensionless":
+                        help_ = f"'{written.name}' is {is_}, {want} is wanted"
                     if bare is not None and help_ is None and have == "dimensionless":
                         help_ = f"'{bare}' is a number without unit; in {want} it fits"
                 raise self.resolver.fail(code, message, self._where(statement), help=help_)

@@ -13,6 +13,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
+from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.context import Failed
 from sysdyn.dsl.names.members import Located
@@ -163,7 +164,8 @@ class SceneReader:
             )
         if value.dimension is not None and value.dimension != symbol.dimension:
             message = f"'{symbol.name}' is in {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
-            raise self.resolver.fail("E207", message, s.value.span)
+            help_ = self.resolver.missing(value.dimension, symbol.dimension, s.value)
+            raise self.resolver.fail("E207", message, s.value.span, help=help_)
         for inner in ex.topological([value.node]):
             if inner.op in ("var", "time"):
                 message = f"parameter '{symbol.name}' is set to something that depends on '{inner}'"
@@ -181,8 +183,17 @@ class SceneReader:
         return node
 
     def _time(self, s: syntax.Time) -> None:
-        self._once("start", self._constant(s.start, dim.TIME, "the start"), s.span)
-        self._found["end"] = self._constant(s.stop, dim.TIME, "the end")
+        start = self._constant(s.start, dim.TIME, f"the start '{self._text(s.start)}'")
+        end = self._constant(s.stop, dim.TIME, f"the end '{self._text(s.stop)}'")
+        self._once("start", start, s.span)
+        if start.op == end.op == "const" and end.data < start.data:
+            message = f"the time ends before it starts: {self._text(s.start)} to {self._text(s.stop)}"
+            help_ = f"time {self._text(s.stop)} to {self._text(s.start)}"
+            raise self.resolver.fail("E912", message, s.span, help=help_)
+        self._found["end"] = end
+
+    def _text(self, e: syntax.Expr) -> str:
+        return " ".join(self.resolver.source.text[e.span.start : e.span.end].split())[:40]
 
     def _limit(self, s: syntax.Limit) -> None:
         if s.name.name not in ("steps", "events"):
@@ -238,7 +249,10 @@ class SceneReader:
     def trace(self, s: syntax.Trace) -> None:
         """`trace`: quantities by name, and how often."""
         if s.every is not None:
-            every = self._constant(s.every, dim.TIME, "the interval of a trace")
+            every = self._constant(s.every, dim.TIME, f"the interval '{self._text(s.every)}' of a trace")
+            if every.op == "const" and not every.data > 0.0:
+                message = f"the interval '{self._text(s.every)}' of a trace is not positive"
+                raise self.resolver.fail("E912", message, s.every.span, help="every 10 ms")
             self._once("every", every, s.every.span)
         for item in s.items:
             self.guarded(self._item, item)
@@ -275,7 +289,7 @@ class SceneReader:
             raise Failed
         if value.dimension is not None and unit.dimension != value.dimension:
             message = f"'{format_expression(item.expr)}' is in {dim.show(value.dimension)}, not {unit.text}"
-            raise self.resolver.fail("E208", message, item.unit.span)
+            raise self.resolver.fail("E208", message, item.unit.span, help=f"in {common(value.dimension)}")
         return unit
 
     def _accuracy(self, s: syntax.Accuracy) -> None:
@@ -283,7 +297,7 @@ class SceneReader:
         self._once("accuracy", value, s.span)
         if value.op == "const" and not FINEST_ACCURACY <= value.data < 1.0:
             text = f"accuracy {value.data:g}: from {FINEST_ACCURACY:g} to less than 1, what doubles can tell"
-            raise self.resolver.fail("E906", text, s.value.span)
+            raise self.resolver.fail("E906", text, s.value.span, help="accuracy 1e-6")
         names = []
         for target in s.on:
             try:

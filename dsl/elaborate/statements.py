@@ -116,7 +116,9 @@ class Statements(Declarations):
                 else f"{others[0]}, which is no displacement"
             )
             message = f"work on an expression that contains {what}"
-            raise self.resolver.fail("E319", message, where.span, help="work E on q, or work E on quasi(w)")
+            text = self.source_text(where.span)
+            help_ = f"work ... on {text.replace(chr(39), '')}" if "'" in text else "work E on q, or work E on quasi(w)"
+            raise self.resolver.fail("E319", message, where.span, help=help_)
 
     def _dynamic(self, s: syntax.Dynamic) -> None:
         target = s.target.base if isinstance(s.target, syntax.Prime) else s.target
@@ -196,7 +198,8 @@ class Statements(Declarations):
         self.resolver.statics = moment == "static"
         try:
             left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
-            dimension = self._sides("expect", left, right, s.right, s.left, s.right)
+            what = f"expect {self.source_text(s.left.span)[:40]}"
+            dimension = self._sides(what, left, right, s.right, s.left, s.right)
             message = f"expect: within is in {{}}, wants {dim.show(dimension)}"
             within = None if s.within is None else self.resolver.wanted(s.within, dimension, "E208", message)
         finally:

@@ -25,6 +25,12 @@ class Unit:
     offset: Fraction = Fraction(0)
 
 
+def quantity(value: float, unit: Unit) -> str:
+    """A value in SI as the author says it: `-3 kohm`."""
+    number = (value - float(unit.offset)) / float(unit.scale)
+    return f"{number:.6g}" if unit.text == "1" else f"{number:.6g} {unit.text}"
+
+
 @lru_cache(maxsize=4096)
 def multiply(a: Dimension, b: Dimension, power: Fraction | int = 1) -> Dimension:
     """Multiply a by b^power."""

@@ -64,6 +64,9 @@ class Arithmetic(Context):
                 continue
             self.is_number(value, factor)
             power = -1 if op == "/" else 1
+            if op == "/" and ex.is_const(value.node) and value.node.data == 0.0:
+                text = self.source.text[factor.span.start : factor.span.end]
+                raise self.fail("E324", f"division by '{text}', which is zero", factor.span)
             nodes.append((float(power), value.node))
             if value.dimension is None:
                 dimension = None

@@ -105,7 +105,7 @@ class Calls(Context):
             if remedy is not None and not self.scope.is_broken(e.name):
                 raise self.remedied("E101", f"unknown function '{e.name}'", e.span, remedy)
             near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
-            help_ = f"nearest name in scope: '{near}'" if near else None
+            help_ = f"nearest name in scope: '{near}'" if near else f"fn {e.name}(x: 1) -> 1 = ... declares one"
             if self.scope.is_broken(e.name):
                 raise Failed
             raise self.fail("E101", f"unknown function '{e.name}'", e.span, help=help_)
@@ -141,6 +141,8 @@ class Calls(Context):
     def _not_plain(self, name: str, dimension: Dimension | None, e: syntax.Expr) -> None:
         text = self.source.text[e.span.start : e.span.end]
         help_ = f"{name}({text}/(1 {dim.show(dimension)}))" if len(text) < 60 else None
+        if help_ and dimension == dim.TIME:
+            help_ += ", or the unit of a frequency: 50 Hz"
         raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)
 
     def _vector_call(self, e: syntax.Call) -> Value:

@@ -16,7 +16,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.units import NONE, Dimension
-from sysdyn.dsl.names import habits
+from sysdyn.dsl.names import fitting, habits
 from sysdyn.dsl.names.symbols import (
     Definition,
     InstanceSymbol,
@@ -274,7 +274,8 @@ class Context:
         value = self.scalar(expression)
         if value.dimension is not None and value.dimension != dimension:
             help_ = self.missing(value.dimension, dimension, expression)
-            raise self.fail(code, message.format(dim.show(value.dimension)), expression.span, help=help_)
+            said = message if value.dimension else message.replace("in {}", "{}")
+            raise self.fail(code, said.format(dim.show(value.dimension)), expression.span, help=help_)
         return value.node
 
     def condition(self, expression: syntax.Expr) -> Node:
@@ -312,6 +313,13 @@ class Context:
         """
         if have is None or want is None:
             return None
+        pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
+        bare = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := self._bare(e))]
+        if bare:
+            return bare[0]
+        for e, wanted in zip(within, (want, have), strict=False):
+            if isinstance(e.operand if isinstance(e, syntax.Negative) else e, (syntax.Number, syntax.Quantity)):
+                return fitting.in_unit(e, wanted)
         for factor in (dim.quotient(want, have), dim.quotient(have, want)):
             level: Scope | None = self.scope
             while level is not None:
@@ -319,11 +327,10 @@ class Context:
                     if isinstance(s, ParameterSymbol) and not s.shape and factor and s.dimension == factor:
                         return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
                 level = level.outer
-        pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
-        bare = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := self._bare(e))]
         # a prime is forgotten more often than it is too much
         rates = sorted(filter(None, (self._rate(e, factor) for e, factor in pairs)), key=lambda said: said[-2] == "'")
-        said = [*bare, *rates]
+        others = [fitting.refitted(self.scope, e, factor) for e, factor in pairs if factor]
+        said = [*rates, *filter(None, others)]
         return said[0] if said else None
 
     def _rate(self, expression: syntax.Expr, factor: Dimension) -> str | None:

@@ -47,6 +47,12 @@ RATES = ("dot", "der", "d", "dt", "prime")
 BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
 
 
+def branch_words(domain: Domain) -> tuple[str, ...]:
+    """The members of a branch with their units: `e [V]`, `f [A]`, ..."""
+    units = {"e": domain.effort, "f": domain.flow, "q": domain.displacement, "p": domain.momentum}
+    return (*(f"{letter} [{unit.text}]" for letter, unit in units.items()), "power [W]", "energy [J]")
+
+
 @dataclass(frozen=True, slots=True)
 class Located:
     """A symbol at the end of a path.
@@ -240,7 +246,20 @@ class Members(Names):
                 return self._instance(symbol, base, e)
             case Unsupported():
                 raise Failed
-        raise self.fail("E102", f"'{shown}' has no member '{e.name}'", e.span)
+        kind = "parameter" if isinstance(symbol, ParameterSymbol) else "value"
+        raise self.fail("E102", f"'{shown}' has no member '{e.name}': it is a {kind}", e.span, help=self._beside(e))
+
+    def _beside(self, e: syntax.Member) -> str | None:
+        """The elements that stand beside a name without members: one of them is meant."""
+        inner = e.base.base if isinstance(e.base, syntax.Member) else None
+        outer = None if inner is None else self.located(inner)
+        scope = self.scope
+        if outer is not None and isinstance(outer.symbol, InstanceSymbol):
+            scope = self.entered(outer.symbol, outer, e.span)[0].scope
+        kinds = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
+        names = [n for n in (scope.symbols if scope is not self.scope else scope.names()) if n]
+        found = [n for n in names if isinstance(scope.find(n), kinds)]
+        return f"elements that have members: {', '.join(found[:10])}" if found else None
 
     def _all(self, base: Located, symbol: NodeSymbol | BranchSymbol, e: syntax.Member) -> tuple[syntax.Index, ...]:
         if len(base.indices) != len(symbol.family.shape):
@@ -294,7 +313,7 @@ class Members(Names):
         family, domain = symbol.family, symbol.domain
         at = (*family.prefix, *at)
         if name not in BRANCH:
-            raise self.no_member(self._shown(e.base), e, BRANCH)
+            raise self.no_member(self._shown(e.base), e, BRANCH if nearest(name, BRANCH) else branch_words(domain))
         power = multiply(domain.effort.dimension, domain.flow.dimension)
         if name == "power":
             return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
@@ -399,7 +418,8 @@ class Members(Names):
             raise self.fail("E102", message, e.span, help=f"level {space.elsewhere[e.name]} has it")
         names = [n for n in space.scope.symbols if n]
         near = nearest(e.name, (*names, *BRANCH) if branch is not None else names)
-        help_ = f"nearest: '{near}'" if near else None
+        listed = (*branch_words(branch.domain), *names) if isinstance(branch, BranchSymbol) else names
+        help_ = f"nearest: '{near}'" if near else f"it has {', '.join(listed[:20])}"
         raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
 
     # -- constraints ---------------------------------------------------------------------------------------

@@ -114,8 +114,8 @@ class Names(Context):
         if remedy is not None:
             return self.remedied(code, message.format(name), span, remedy)
         near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
-        help_ = f"nearest name in scope: '{near}'" if near else None
-        return self.fail(code, message.format(name), span, help=help_)
+        help_ = f"nearest name in scope: '{near}'" if near else f"declare it by param {name} = ..., let, coord or node"
+        return self.fail(code, message.format(name), span, help=help_, subject=f"name {name}")
 
     def _moves(self, name: str) -> bool:
         """Whether a name has a rate."""
@@ -233,7 +233,8 @@ class Names(Context):
             f"{symbol.kind} '{symbol.name}' is declared {dim.show(symbol.dimension)} "
             f"but set to {dim.show(value.dimension)}"
         )
-        raise self.fail("E207", message, symbol.expression.span)
+        help_ = self.missing(value.dimension, symbol.dimension, symbol.expression)
+        raise self.fail("E207", message, symbol.expression.span, help=help_)
 
     # -- elements of arrays --------------------------------------------------------------------------------
 

@@ -325,5 +325,7 @@ class Scope:
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """The most similar name, if one is similar at all."""
-    found = difflib.get_close_matches(name[:80], list(dict.fromkeys(n for n in names if len(n) < 100)), 1, 0.6)
+    among = list(dict.fromkeys(n for n in names if len(n) < 100))
+    alike = [n for n in among if n != name and n.lower() == name.lower()]
+    found = alike or difflib.get_close_matches(name[:80], among, 1, 0.6)
     return found[0] if found else None

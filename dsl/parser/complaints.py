@@ -78,6 +78,7 @@ _OTHERS = {
     "module": "component name { ... }",
     "package": "component name { ... }",
     "block": "component name { ... }",
+    **dict.fromkeys(("translation", "rotation", "electrical", "hydraulic", "thermal", "heat"), "node a, b: DOMAIN"),
     "end": "}",
     "algorithm": "when c { a := b }, or let",
     "initial": "init x = 1 m",
@@ -143,8 +144,8 @@ def character(sign: str) -> Complaint:
 
 def first_token(text: str, kind: str, body: str) -> Complaint:
     """A sign where a statement should begin."""
-    if text == "/":
-        return "E113", "a statement cannot begin with '/'", "a comment begins with '#'"
+    if text[0] in "/%!":
+        return "E113", f"'{text}' begins no statement and no comment", "a comment begins with '#'"
     if kind == "<end>":
         return "E113", "the file ends where a statement should begin", None
     if text in ("}", ")", "]"):
@@ -175,7 +176,11 @@ def unknown(word: str, after: str, body: str) -> Complaint:
             (ITEM_WORDS, "at the top of a file"),
         ):
             if word in words:
-                return "E107", f"'{word}' belongs {place}, not {here}", None
+                into = place.replace("in ", "into ", 1).replace("at the", "to the")
+                help_ = (
+                    f"const NAME = ..., or move it {into}" if word == "param" and body == "item" else f"move it {into}"
+                )
+                return "E107", f"'{word}' belongs {place}, not {here}", help_
     if body == "action":
         return "E113", "an action assigns: name := expression", None
     if body == "bundle_member":
@@ -189,13 +194,52 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         )
     if after.startswith("'"):
         return "E113", f"no statement begins with '{word}''", f"dynamic {word}' = ..."
+    if after[:1] in "^*/+-" and after and "=" in after.partition("\n")[0]:
+        return "E113", f"no statement begins with '{word}'; a constraint has a label", f"phi name: {word} ... = ..."
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
-    return "E113", f"no statement begins with '{word}'", _OTHERS.get(word.lower()) or (near[0] if near else None)
+    said = _OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
+    return "E113", f"no statement begins with '{word}'", said or (near[0] if near else None)
 
 
-def expected(accepted: Collection[str], kind: str, text: str, before: str) -> Complaint:
-    """A token that does not fit, with what would; `before` is the token before it."""
-    return "E113", f"expected {_listed(accepted)}, found {quoted(text, kind)}", _hint(kind, text, before, accepted)
+_SHAPES = {
+    "param": "param k = 3 N/m",
+    "const": "const c = 3 m/s",
+    "node": "node a, b: electrical",
+    "port": "port a, b: electrical",
+    "branch": "branch: electrical",
+    "coord": "coord x: translation = 0 m",
+    "cocoord": "cocoord p: translation = 0 N.s",
+    "state": "state s: m = 0 m",
+    "dynamic": "dynamic s' = ...",
+    "let": "let y = ...",
+    "input": "input u: V = 5 V",
+    "output": "output y = ...",
+    "energy": "energy T* = ..., energy V = ...",
+    "content": "content D = ...",
+    "work": "work F on x",
+    "phi": "phi name: left = right",
+    "psi": "psi name: left = right",
+    "gamma": "gamma name: left = right",
+    "init": "init x = 1 m",
+    "law": "law e = R*f",
+    "when": "when x >= 1 m { y := 0 }",
+    "time": "time 0 s to 5 s",
+    "set": "set k = 3 N/m",
+    "trace": "trace x in mm as pos, y every 1 ms",
+    "expect": "expect always: a <= b",
+    "accuracy": "accuracy 1e-6 on x",
+    "scene": "scene name of model { ... }",
+    "from": "from std.electrical import resistor, capacitor",
+    "fn": "fn f(x: m) -> N = ...",
+    "table": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
+}
+"""The shape of a statement, by its first word."""
+
+
+def expected(accepted: Collection[str], kind: str, text: str, before: str, word: str = "") -> Complaint:
+    """A token that does not fit, with what would; `before` is the token before it, `word` begins the statement."""
+    said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
+    return "E113", said, _hint(kind, text, before, accepted) or _SHAPES.get(word)
 
 
 def _listed(accepted: Collection[str]) -> str:
@@ -235,6 +279,8 @@ def _hint(kind: str, text: str, before: str, accepted: Collection[str]) -> str |
     """The text to write for a slip that is easily named."""
     if text == "*" and before == "*":
         return "a power is written a^b"
+    if text == "(" and "on" in accepted:
+        return "a -> b, without parentheses"
     if text == "+" and "<number>" in accepted:
         return "a number has no leading '+'"
     if text == "." and "<number>" in accepted:

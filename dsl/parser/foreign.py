@@ -59,13 +59,15 @@ def around(text: str, start: int, end: int, kind: str) -> Slip | None:
     if sign == "," and before and (behind := _DIGITS.match(text, end)):
         meant = f"{before.group()}.{behind.group()}"
         span = Span(first + before.start(), behind.end())
+        said = f"'{text[span.start : span.end]}': a comma separates; decimals follow a point"
         if len(behind.group()) == 3:
             either = f"{meant}, or {before.group()}{behind.group()}"
-            return Slip(("E113", "a comma separates; decimals follow a point", either))
-        return Slip(("E113", "a comma separates; decimals follow a point", meant), meant, span)
+            return Slip(("E113", said, either))
+        return Slip(("E113", said, meant), meant, span)
     quantity = chained(text, start)
     if quantity is not None and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
-        said = "a unit is written without spaces, its factors are joined by dots"
+        written = text[quantity.start : quantity.end]
+        said = f"'{written}': a unit is written without spaces, its factors are joined by dots"
         return Slip(("E113", said, f"write '{quantity.right}'"), quantity.right, Span(quantity.start, quantity.end))
     return _known_sign(text, Span(start, end), kind, line)
 
@@ -75,9 +77,9 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
     sign = text[span.start : span.end]
     before = _DIGITS_BEFORE.search(line)
     if sign in ("/", "*") and line.endswith("/"):
-        return Slip(("E113", "a remark is no part of a statement", "a comment begins with '#'"))
+        return Slip(("E113", f"'/{sign}': a remark is no part of a statement", "a comment begins with '#'"))
     if sign == "*" and line.endswith("*"):
-        return Slip(("E113", "a power is written with '^'", "a^b"), "^", Span(span.start - 1, span.end))
+        return Slip(("E113", "'**': a power is written with '^'", "a^b"), "^", Span(span.start - 1, span.end))
     if sign == "0" and line.rstrip().endswith("->"):
         return Slip(("E113", "the reference of every domain has a name", "ground"), "ground")
     if kind in ("<name>", "(") and line.endswith(")"):
@@ -85,7 +87,7 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
     if sign == "°" and text[span.end : span.end + 1] == "C":
         return Slip(("E113", "'°C' is no unit of a quantity: its zero is not 0 K", "celsius(20)"))
     if sign == "?":
-        return Slip(("E113", "a choice is written in words", "if c then a else b"))
+        return Slip(("E113", "'?': a choice is written in words", "if c then a else b"))
     if kind == "<name>" and re.search(r"[0-9][ \t]+if[ \t]+$", line):
         return Slip(("E113", "the condition of a choice comes first", "if c then a else b"))
     if sign == "." and before and not text[span.end : span.end + 1].isdigit():

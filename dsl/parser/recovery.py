@@ -78,6 +78,13 @@ class Recovery:
             elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
                 self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
                 kind = "<name>"
+            elif kind == "=" and automaton.accepts(">=") and self.scanner.text[self.scanner.end :][:1] in (">", "<"):
+                scanner = self.scanner
+                meant = f"{scanner.text[scanner.end]}="
+                scanner.end += 1
+                said = f"'={meant[0]}' is no comparison: its sign comes first"
+                self._error(("E113", said, meant), self._token(), meant)
+                kind = meant
             elif kind == "=" and automaton.accepts("=="):
                 self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token(), "==")
                 kind = "=="
@@ -152,11 +159,15 @@ class Recovery:
         elif (slip := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:
             self._error(slip.complaint, self._token(), slip.meant, slip.span)
         elif kind == "<fault>":
-            self._error(complaints.character(text), self._token())
+            first = text in "%!" and not scanner.text[start : scanner.start].strip() and start == scanner.start
+            complaint = complaints.first_token(text, kind, body) if first else complaints.character(text)
+            self._error(complaint, self._token())
         elif scanner.suspect is not None:
             sign = scanner.text[scanner.dangling.start : scanner.dangling.end]
             self._error(("E113", f"the statement ends with '{sign}': something is missing", None), scanner.dangling)
         elif size == len(automaton.states) and kind != "<name>" and kind not in RESERVED:
+            remark = scanner.text[scanner.start : scanner.start + 2]
+            text = remark if remark in ("//", "/*") else text
             self._error(complaints.first_token(text, kind, body), self._token())
         elif kind == "if" and automaton.accepts("("):
             self._error(complaints.conditional(), self._token())
@@ -179,7 +190,7 @@ class Recovery:
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
             before = scanner.text[: scanner.start].rstrip()[-1:]
-            self._error(complaints.expected(accepted, kind, text, before), self._token())
+            self._error(complaints.expected(accepted, kind, text, before, word), self._token())
 
     def _words_here(self, size: int) -> dict[str, int]:
         """The terminals with which a statement may begin here."""

@@ -23,6 +23,7 @@ from sysdyn.dsl.model.network import (
     State,
     Unknown,
 )
+from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.letters import letter, samples, unknowns_of
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
@@ -222,7 +223,8 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
             report.error("E904", f"input '{name}' of the model is not set", parameter.place, help=f"set {name} = ...")
         else:
             help_ = f"set {name} = ... in the scene, or a default"
-            report.error("E406", f"parameter '{name}' has no value", parameter.place, help=help_)
+            subject = f"value {name}"
+            report.error("E406", f"parameter '{name}' has no value", parameter.place, help=help_, subject=subject)
 
 
 def values(model: Elaborator, known: Values, report: Report) -> None:
@@ -231,10 +233,10 @@ def values(model: Elaborator, known: Values, report: Report) -> None:
         node, loops, place, text = r.condition, r.loops, r.place, r.text
         bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
         if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
-            shown = ", ".join(f"{n} = {known.number(n, bound):g}" for n in _parameters(node))
-            report.error("E322", f"require {text} fails: {shown}", place)
+            shown = ", ".join(_valued(n, known.number(n, bound), model) for n in _parameters(node))
+            report.error("E322", f"require {text} fails: {shown}", place, help=f"values for which {text}")
     for node, place in _expressions(model):
-        _divisions(node, place, known, report)
+        _divisions(model, node, place, known, report)
     _sizes(model, known, report)
     _elements(model, known, report)
     _indices(model, known, report)
@@ -244,14 +246,20 @@ def _parameters(node: Node) -> list[Node]:
     return [n for n in ex.topological([node]) if n.op == "param"]
 
 
-def _divisions(node: Node, place: Place, known: Values, report: Report) -> None:
+def _valued(node: Node, value: float, model: Elaborator) -> str:
+    """`R = -3 ohm`: a parameter with its value in its own unit."""
+    unit = model.parts.parameters[node.data].unit if node.data in model.parts.parameters else None
+    return f"{node} = {value:g}" if unit is None else f"{node} = {quantity(value, unit)}"
+
+
+def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
     for inner in ex.topological([node]):
         if inner.op != "mul" or not any(e < 0 for e in inner.data):
             continue
         for exponent, factor in zip(inner.data, inner.args, strict=True):
             if exponent < 0 and _is_constant(factor) and known.number(factor) == 0.0:
                 names = _parameters(factor)
-                shown = ", ".join(f"{n} = {known.number(n):g}" for n in names) or f"{factor} = 0"
+                shown = ", ".join(_valued(n, known.number(n), model) for n in names) or f"{factor} = 0"
                 report.error("E324", f"division by zero with the values bound: {inner}, {shown}", place)
                 return
 
@@ -268,7 +276,8 @@ def _sizes(model: Elaborator, known: Values, report: Report) -> None:
         value = known.number(ex.param(name))
         if value != math.floor(value) or abs(value) > 2**31 - 2:
             message = f"'{name}' is a size or an index, so it must be a whole number: {value:g}"
-            report.error("E805", message, parameter.place)
+            help_ = f"{math.floor(value):g} or {math.ceil(value):g}" if abs(value) < 2**31 else "a smaller number"
+            report.error("E805", message, parameter.place, help=help_, subject="sizes")
 
 
 def _elements(model: Elaborator, known: Values, report: Report) -> None:
@@ -311,9 +320,12 @@ def _indices(model: Elaborator, known: Values, report: Report) -> None:
             continue
         wrong = low if low < first else high if high > last else None
         if wrong is not None:
-            report.error("E805", f"index {wrong:g} of '{use.name}' is outside {first:g}..{last:g}", use.place)
+            span = use.place.span
+            written = " ".join(use.place.source.text[span.start : span.end].split())
+            message = f"index {wrong:g} of '{use.name}' is outside {first:g}..{last:g}: {use.name}[{written}]"
+            report.error("E805", message, use.place, help=f"{use.name} runs over {first:g}..{last:g}")
         elif low != math.floor(low):
-            report.error("E805", f"index {low:g} of '{use.name}' is not a whole number", use.place)
+            report.error("E805", f"index {low:g} of '{use.name}' is not a whole number", use.place, subject="sizes")
 
 
 def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:

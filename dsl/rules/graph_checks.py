@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
@@ -56,7 +57,8 @@ def _lonely(node: NodeFamily, count: float, names: list[str], report: Report) ->
     how = "no element" if not count else "one element only" if node.domain.common == "effort" else "no element"
     near = [n for n in names if n != node.name and n.lower()[:2] == node.name.lower()[:2]]
     help_ = f"near names: {', '.join(near[:3])}; " if near else ""
-    report.error("E409", f"node '{node.name}' touches {how}", node.place, help=f"{help_}ground it if that is meant")
+    help_ += "connect it to an element, or delete it; ground it if that is meant"
+    report.error("E409", f"node '{node.name}' touches {how}", node.place, help=help_)
 
 
 def _mentioned(model: Elaborator) -> frozenset[str]:
@@ -90,7 +92,8 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
             message = (
                 f"loop of {what} sources: {', '.join((*others, branch.name))} fix the {what} between two nodes twice"
             )
-            report.error("E411", message, branch.place, help="an element with a law between them")
+            place = replace(branch.place, element=branch.name)
+            report.error("E411", message, place)
         parent[a] = b
         groups[branch.domain.name, branch.name] = branch
     _cutsets(model, report)

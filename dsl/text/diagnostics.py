@@ -7,9 +7,10 @@ where there is one, the text to write instead (`help`). Rules never raise: they 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from sysdyn.dsl.text.remedies import remedy
 from sysdyn.dsl.text.source import Place, SourceText, Span
 
 __all__ = ["Diagnostic", "Edit", "ModelError", "Place", "Related", "Report", "SourceText", "Span"]
@@ -51,6 +52,8 @@ class Diagnostic:
     """A short text beside the carets, where the message alone does not say what is marked."""
     edit: Edit | None = None
     """The remedy as a change of the text, where there is one without a choice (`check --fix`, SARIF)."""
+    subject: str | None = None
+    """What it is about, where one slip shows in several places: told once, the other places beside it."""
 
     @property
     def severity(self) -> str:
@@ -95,7 +98,9 @@ class Report:
         self._found: dict[Diagnostic, None] = dict.fromkeys(diagnostics)
 
     def add(self, diagnostic: Diagnostic) -> None:
-        """Add one diagnostic; a second equal one changes nothing."""
+        """Add one diagnostic (an error gets the general remedy where it has none); an equal one changes nothing."""
+        if diagnostic.help is None and diagnostic.severity == "error":
+            diagnostic = replace(diagnostic, help=remedy(diagnostic.code))
         self._found.setdefault(diagnostic)
 
     def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
@@ -117,9 +122,10 @@ class Report:
         related: Iterable[Related] = (),
         label: str | None = None,
         edit: Edit | None = None,
+        subject: str | None = None,
     ) -> None:
         """Add a finding; its severity follows from the code's letter."""
-        self.add(Diagnostic(code, message, place, help, tuple(related), label, edit))
+        self.add(Diagnostic(code, message, place, help, tuple(related), label, edit, subject))
 
     warning = error
     note = error
@@ -136,7 +142,7 @@ class Report:
         files: dict[str, int] = {}
         for item in self._found:
             files.setdefault("" if item.place is None else item.place.file, len(files))
-        return tuple(sorted(self._found, key=lambda item: _order(item, files)))
+        return tuple(_told_once(sorted(self._found, key=lambda item: _order(item, files))))
 
     @property
     def failed(self) -> bool:
@@ -147,6 +153,28 @@ class Report:
         """Raise ModelError with everything found if there is an error among it."""
         if self.failed:
             raise ModelError(self.diagnostics)
+
+
+HERE_TOO = "here too"
+"""Beside the other places of one slip."""
+
+
+def _told_once(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Findings, those of one subject in a file told at the first place, with the other places beside it."""
+    told: dict[object, Diagnostic] = {}
+    for k, item in enumerate(found):
+        if item.subject is None or item.place is None:
+            told[k] = item
+            continue
+        key = item.subject, item.place.file
+        first = told.get(key)
+        if first is None:
+            told[key] = item
+            continue
+        known = {r.place for r in first.related} | {first.place}
+        more = [Related(HERE_TOO, item.place), *(r for r in item.related if r.message == HERE_TOO)]
+        told[key] = replace(first, related=(*first.related, *(r for r in more if r.place not in known)))
+    return list(told.values())
 
 
 MOST = 200

@@ -91,6 +91,7 @@ def propagate(
     *,
     largest: bool = False,
     capped: bool = False,
+    group: NDArray[np.int64] | None = None,
 ) -> Floats:
     """Fills zeros of `magnitude` [unknowns] so that their terms balance the others of their rows.
 
@@ -99,11 +100,15 @@ def propagate(
     it is asked only where no other is left.
     Of several rows' proposals the least counts, or the largest; capped: none above the largest of its like that is
     known, for along a chain each overestimates the next, and a run mends what is too small alone.
+    group [entries]: what `of_a_kind` says of the places, where that is known.
     """
     found = magnitude.copy()
+    if not (found == 0.0).any():
+        return found
     places = size > 0.0
-    rows, columns, size = rows[places], columns[places], size[places]
-    _, group = np.unique(rows.astype(np.int64) * (1 + int(alike.max(initial=0))) + alike[columns], return_inverse=True)
+    if group is None:
+        group = of_a_kind(rows, columns, alike)
+    rows, columns, size, group = rows[places], columns[places], size[places], group[places]
     leading = np.zeros(int(group.max(initial=-1)) + 1)
     np.maximum.at(leading, group, size)
     small = size < GROUP * leading[group]
@@ -125,6 +130,14 @@ def propagate(
             best = np.where(known > 0.0, np.minimum(best, known), best)
         found = np.where(missing & np.isfinite(best), best, found)
     return found
+
+
+def of_a_kind(
+    rows: NDArray[np.integer], columns: NDArray[np.integer], alike: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Number of the row and the kind of its unknown, of each place [entries]."""
+    keys = rows.astype(np.int64) * (1 + int(alike.max(initial=0))) + alike[columns]
+    return np.unique(keys, return_inverse=True)[1].astype(np.int64)
 
 
 def _efforts(system: System, found: Floats, row: Floats) -> Floats:

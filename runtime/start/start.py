@@ -435,7 +435,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     system: any index form of the model; near: a state to stay close to, else the guesses.  Raises InconsistentStart.
     """
     system = system if system.form.name == "3" else system.another("3")
-    starter = Starter(system, measuring=True)
+    starter = Starter(system, measuring=True, remember=True)
     guess = np.concatenate([starter.given.guess, np.zeros(starter.moving.size - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         guess[: starter.n] = np.where(np.isin(starter.kinds, (*STATE, "e")), near.y, guess[: starter.n])
@@ -448,7 +448,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     starter.work = Work(EXPLAINED)
     best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
     y, yd = starter.expand(best.x)
-    counted = Starter(system) if starter.missed.size else starter
+    counted = Starter(system, remember=True) if starter.missed.size else starter
     freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)

@@ -9,14 +9,16 @@ what the row misses; these are what moves least, and the coordinates follow.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.model.scales import alike, group_maximum, propagate
+from sysdyn.runtime.model.scales import alike, group_maximum, of_a_kind, propagate
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
@@ -89,6 +91,24 @@ class _Sums:
     place: Places
 
 
+def remembered(
+    ask: Callable[[Starter, float, Floats], NDArray[Any]],
+) -> Callable[[Starter, float, Floats], NDArray[Any]]:
+    """The answer at the point asked last is known: stages that move nothing ask again and again at one point."""
+    name = ask.__name__
+
+    @functools.wraps(ask)
+    def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
+        if not self.remember:
+            return ask(self, t, x)
+        known = self.known.get(name)
+        if known is None or known[0] != t or not np.array_equal(known[1], x):
+            known = self.known[name] = (t, x.copy(), ask(self, t, x))
+        return known[2].copy()
+
+    return answer
+
+
 class Starter:
     """The equations of the start of one model (t0 apart).
 
@@ -96,8 +116,10 @@ class Starter:
     behind those of y and its rates; sums of balances without inertia have their rates.
     """
 
-    def __init__(self, system: System, *, measuring: bool = False) -> None:
+    def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
         self.system = system
+        self.remember = remember  # one search for a start: nothing but t and x changes
+        self.known: dict[str, tuple[float, Floats, NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = system.another("start")
@@ -146,6 +168,11 @@ class Starter:
         self.moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
         self.moving[self.first :] = self._read()
 
+    @functools.cached_property
+    def _of_a_kind(self) -> NDArray[np.int64]:
+        """Number of the row and the kind of its unknown, of each place [entries]."""
+        return of_a_kind(self.rows, self.columns, self._alike)
+
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
         y, yd = x[: self.n].copy(), np.zeros(self.n)
@@ -162,6 +189,7 @@ class Starter:
             rows[self._sums.rows] = self._sums.weights @ rows[self._sums.of]
         return rows
 
+    @remembered
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
         jy, jyd = self.settled.jacobian(t, *self.expand(x))
@@ -303,6 +331,8 @@ class Starter:
 
     def _read(self) -> NDArray[np.str_]:
         """The kind of unknowns that each guess is of; none where it is of several."""
+        if not self.missed.size:
+            return np.zeros(0, dtype=self.moving.dtype)
         found = np.full(self.settled.rows, "", dtype=self.moving.dtype)
         many = np.zeros(self.settled.rows, dtype=bool)
         read = self._structural & (self.columns < self.first)
@@ -329,6 +359,7 @@ class Starter:
                 mask[first : first + size] = inertial[own : own + size]
         return mask
 
+    @remembered
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
 
@@ -353,10 +384,17 @@ class Starter:
         np.maximum.at(largest, self._alike, np.abs(x))
         return np.where(np.abs(x) > NOISE * np.maximum(scale, largest[self._alike]), x, 0.0)
 
-    def scale(self, t: float, x: Floats, *, most: bool = False) -> Floats:
-        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes, or the
-        largest (rates of fast and slow stores 1e12 apart).
-        """
+    @remembered
+    def scale(self, t: float, x: Floats) -> Floats:
+        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes."""
+        return self._scale(t, x, largest=False)
+
+    @remembered
+    def largest(self, t: float, x: Floats) -> Floats:
+        """The same by the largest that a row proposes (rates of fast and slow stores 1e12 apart)."""
+        return self._scale(t, x, largest=True)
+
+    def _scale(self, t: float, x: Floats, *, largest: bool) -> Floats:
         known = np.abs(x)
         nominal = self.system.nominal[: self.n]
         known[: self.n] = np.where(nominal > 0.0, nominal, known[: self.n])
@@ -367,20 +405,20 @@ class Starter:
         values = values - told
         # how fast what follows from the state moves says nothing of its size
         sizes = ~self.groups("dynamics_rate")[self.rows]
+        of = self._of_a_kind
         own = self.rows[sizes], self.columns[sizes], values[sizes]
-        found = propagate(known, *own, free, self._alike, largest=most)
+        found = propagate(known, *own, free, self._alike, group=of[sizes], largest=largest)
         for kind in np.unique(self.kinds):
             members = np.flatnonzero(self.kinds == kind)
-            largest = found[members].max(initial=0.0)
-            found[members] = np.maximum(found[members], 1e-3 * largest)
+            found[members] = np.maximum(found[members], 1e-3 * found[members].max(initial=0.0))
         found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
-        found = propagate(found, self.rows, self.columns, values, free, self._alike, largest=most)
+        found = propagate(found, self.rows, self.columns, values, free, self._alike, group=of, largest=largest)
         # guesses of one unit are measured alike
-        size, largest = np.zeros(self.settled.rows), np.zeros(int(self._family.max(initial=0)) + 1)
+        size, most = np.zeros(self.settled.rows), np.zeros(int(self._family.max(initial=0)) + 1)
         text = self.columns < self.first
         np.add.at(size, self.rows[text], (told * found[self.columns])[text])
-        np.maximum.at(largest, self._family, size[self.missed])
-        found[self.first :] = largest[self._family]
+        np.maximum.at(most, self._family, size[self.missed])
+        found[self.first :] = most[self._family]
         return np.where(found > 1e-280, found, 1.0)
 
 
@@ -391,7 +429,7 @@ def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Ma
     weight[starter.written] = WEIGHT["written"]
     weight[follows] = WEIGHT["following"]
     # unknowns of one kind and unit are moved by one measure, whatever their values
-    scale = starter.scale(t, x, most=starter.generous)
+    scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
     weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
     return weighted(starter, t, guess, rows=rows, free=free, scale=scale, weight=weight)
 

@@ -119,7 +119,7 @@ def _sparse_dependent(found: Reactions) -> Ints:
 
 def nearby(system: System, state: ConsistentState) -> list[Floats]:
     """Y at up to POINTS seeded points near the state, displacements consistent with phi."""
-    starter = Starter(system)
+    starter = Starter(system, remember=True)
     x = np.concatenate([state.y, state.yd[starter.rates]])
     q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
     size = np.where(q, starter.scale(state.t, x), 0.0)
@@ -149,9 +149,13 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     """
     y, yd = state.for_form(system)
     here = _sizes(system, system.jacobian(state.t, y, yd)[0])
-    if not here.size:
+    random = np.random.default_rng(12)
+    anywhere = y + np.maximum(np.abs(y), 1.0) * random.standard_normal(y.size)
+    with np.errstate(all="ignore"):
+        straight = (here > 0.0) & (here == _sizes(system, system.jacobian(state.t, anywhere, yd)[0]))
+    if straight.all():  # rows of J that are the same everywhere vanish nowhere
         return np.zeros(0, dtype=np.int32)
-    starter = Starter(system)
+    starter = Starter(system, remember=True)
     x = np.concatenate([state.y, state.yd[starter.rates]])
     q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
     size = np.where(q, starter.scale(state.t, x), 0.0)

@@ -63,7 +63,16 @@ MANIFEST = {
 UNKNOWN = {"name": str, "kind": str, "unit": str, "differential": bool}
 ROW = {"label": str, "kind": str, "file": str, "line": int}
 PARAMETER = {"name": str, "unit": str, "value": (*NUMBER, list)}
-CHECK = {"files": list}
+CHECK = {"files": list, "edits": list}
+EDIT = {
+    "diagnostic": int,
+    "file": str,
+    "line": int,
+    "column": int,
+    "end_line": int,
+    "end_column": int,
+    "text": str,
+}
 TARGET = {"scene": (str, type(None)), "model": str, "ok": bool}
 FMT = {"changed": list}
 LINEARIZE = {

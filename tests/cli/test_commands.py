@@ -109,7 +109,7 @@ def test_exit_codes(tmp_path, capsys):
     assert run(["simulate", write(tmp_path, BROKEN)]) == 1
     assert run(["simulate", write(tmp_path, FAILING)]) == 1
     assert run(["simulate", write(tmp_path, STUCK), "--max-wall", "20"]) == 3
-    assert "model.sd:2" in capsys.readouterr().err  # the source line of the element
+    assert "model.sd:3" in capsys.readouterr().err  # the dynamic that drives the unknown
     assert run(["simulate", "missing.sd"]) == 5
     assert "missing.sd: No such file or directory" in capsys.readouterr().err
 

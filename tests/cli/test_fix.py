@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from schema import CHECK, EDIT, conforms, envelope
 from sysdyn.cli.main import run
 from sysdyn.cli.run.mending import mended
 from sysdyn.dsl.text import codes
@@ -129,3 +130,31 @@ def test_a_model_with_a_slip_is_not_called_ok(tmp_path, capsys, line):
     assert run(["check", "m.sd", "--json"]) == 1
     (file,) = json.loads(capsys.readouterr().out)["result"]["files"]
     assert [t["ok"] for t in file["targets"]] == [False]
+
+
+def test_edits_of_json_mend_the_text(tmp_path, capsys):
+    """A script that makes the edits of --json, round after round, writes what --fix writes."""
+    path = tmp_path / "m.sd"
+    path.write_text(WRONG)
+    for _ in range(30):
+        run(["check", str(path), "--json"])
+        found = json.loads(capsys.readouterr().out)
+        envelope(found, "check", CHECK)
+        edits = found["result"]["edits"]
+        for edit in edits:
+            conforms(edit, EDIT)
+            told = found["diagnostics"][edit["diagnostic"]]
+            assert told["line"] == edit["line"]
+            assert told["help"]
+        if not edits:
+            break
+        lines = path.read_text().split("\n")
+        edit = edits[0]
+        assert edit["line"] == edit["end_line"]
+        line = lines[edit["line"] - 1]
+        lines[edit["line"] - 1] = line[: edit["column"] - 1] + edit["text"] + line[edit["end_column"] - 1 :]
+        path.write_text("\n".join(lines))
+    mine = path.read_text()
+    path.write_text(WRONG)
+    run(["check", str(path), "--fix", "--quiet"])
+    assert mine == path.read_text()

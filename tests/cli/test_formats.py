@@ -132,7 +132,8 @@ def test_junit_fails_where_there_are_errors(found, project, capsys):
     assert list(suites) == NAMES
     errors = [d for d in found if d["severity"] == "error"]
     assert root.get("failures") == suites[NAMES[0]].get("failures") == str(len(errors))
-    assert [f.get("message").split(": ")[2] for f in root.iter("failure")] == [d["message"] for d in errors]
+    for failure, d in zip(root.iter("failure"), errors, strict=True):
+        assert failure.get("message").endswith(f": {d['message']} ({d['help']})")
     assert all(s.get("failures") == "0" for n, s in suites.items() if n != NAMES[0])
 
 

@@ -157,7 +157,7 @@ def test_a_bare_number_where_a_unit_is_wanted(lines, said):
 
 def test_a_size_is_not_asked_for_a_unit():
     ((_, _, help_),) = findings("param n = 2", "param a[1..n] = [1 N, 2 N]", "energy V = n*x^2")
-    assert help_ is None
+    assert help_ == "a factor in N/m is missing"
 
 
 def test_another_module_has_it():

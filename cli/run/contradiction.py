@@ -1,0 +1,105 @@
+"""What stands in the way of a consistent start, in the author's words (E903, E505, E510, E519).
+
+A parameter that is zero takes an inertia, a stiffness or a ratio away, and with it the freedom to start where the text
+says. Which one it is is tried out: with 1 in the place of the zero the start exists.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.prepare import Prepared, place_at
+from sysdyn.dsl.model.network import Parameter
+from sysdyn.dsl.model.units import quantity
+from sysdyn.dsl.text.diagnostics import ModelError, Place, Related, Report
+from sysdyn.runtime.events.start import eventful_start
+from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.rank import NotFiniteError
+
+MOST = 20
+"""Zeros that are tried out: more are values of a table, not slips."""
+
+
+def place_of(prepared: Prepared, label: RowLabel) -> Place:
+    """Where a row or a value stands in the text."""
+    return place_at(prepared.network, label.file, label.line)
+
+
+def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:
+    """Report why there is no start."""
+    where = place_of(prepared, error.rows[0]) if error.rows else prepared.network.place
+    names = ", ".join(dict.fromkeys(r.label for r in error.rows)) or ", ".join(error.names)
+    related = [Related("this value is fixed", place_of(prepared, c)) for c in error.candidates]
+    if where.source is not prepared.network.place.source and related:  # the law of an element of a library
+        related, where = [*related[1:], Related(f"the law of {names}", where)], related[0].place
+    match error.kind:
+        case "gamma":
+            left = f"the residual cannot fall below {_residual(prepared, error)}"
+            report.error("E519", f"gamma '{names}' has no solution at the start: {left}", where, related=related)
+        case "implicit":
+            report.error("E505", f"the gammas do not determine {', '.join(error.names)} at the start", where)
+        case "nonfinite":
+            message = f"{names} is not a number at the initial values: a root or logarithm out of its range?"
+            report.error("E519", message, where)
+        case _ if zero := _zero(prepared, t0):
+            said = f"with {zero.name} = {quantity(0.0, zero.unit)} there is no start"
+            left = f"{_residual(prepared, error)} is left over in {names}"
+            free = f", or '~' for '=' of {_listed(prepared, error)}" if error.candidates else ""
+            here = [Related("this is left over", where), *related]
+            report.error("E903", f"{said}: {left}", zero.place, help=f"{zero.name} other than zero{free}", related=here)
+        case _ if error.candidates:
+            fixed = _listed(prepared, error)
+            left = f"{names}: residual {_residual(prepared, error)}"
+            message = f"fixed initial values of {fixed} contradict {left}"
+            report.error("E903", message, where, help=f"free one of {fixed}: '~' for '='", related=related)
+        case "fixed":
+            left = _residual(prepared, error)
+            report.error(
+                "E510", f"the constraints contradict each other at the start: residual {left} in {names}", where
+            )
+        case _:
+            message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
+            report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
+
+
+def _listed(prepared: Prepared, error: InconsistentStart) -> str:
+    """The fixed values to free, as the author writes them: `x'`, and `shaft.f` of a node or an element."""
+    elements = {n.name for n in prepared.network.nodes} | {b.name for b in prepared.network.branches}
+    shown = []
+    for c in error.candidates:
+        name = c.label.removesuffix("'")
+        shown.append(f"{name}.f" if name != c.label and re.sub(r"\[.*", "", name) in elements else c.label)
+    return ", ".join(f"'{name}'" for name in dict.fromkeys(shown))
+
+
+def _residual(prepared: Prepared, error: InconsistentStart) -> str:
+    """What is left over, in the unit of the row."""
+    network = prepared.network
+    label = re.sub(r"\[.*", "", error.rows[0].label) if error.rows else ""
+    units = {c.name: c.effort for c in network.coordinates} | {c.name: c.unit for c in network.constraints}
+    unit = units.get(label)
+    return f"{error.residual:.3g}{f' {unit.text}' if unit is not None and unit.text != '1' else ''}"
+
+
+def _zero(prepared: Prepared, t0: float) -> Parameter | None:
+    """The parameter that is zero and without which there is no start: with 1 in its place there is one."""
+    values = prepared.binding.values
+    zeros = [
+        p for p in prepared.network.parameters if np.ndim(values.get(p.name, 1.0)) == 0 and not values.get(p.name, 1)
+    ]
+    for p in zeros[:MOST]:
+        if p.name in prepared.network.discretes or p.whole:
+            continue
+        try:
+            binding = prepared.compiled.bind({p.name: 1.0})
+            system = System(prepared.manifest, prepared.arrays_of(binding), prepared.carrier)
+            with np.errstate(all="ignore"):
+                eventful_start(system, t0, plan(replace(prepared, binding=binding), system))
+        except (InconsistentStart, NotFiniteError, ModelError):
+            continue
+        return p
+    return None
