@@ -11,7 +11,9 @@ import click
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-FORMULATIONS = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "auto"]
+FORMULATIONS = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "co_kane", "auto"]
+TRIED = tuple(name for name in FORMULATIONS if name not in ("co_kane", "auto"))
+"""What `verify` and `trade` run by themselves; co_kane is the lowering of kane behind the mirror of co_lagrangian."""
 INDICES = ["auto", "3", "2", "2v", "1", "0"]
 
 

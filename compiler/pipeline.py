@@ -46,6 +46,7 @@ from sysdyn.compiler.program.emit_numpy import emit_numpy
 from sysdyn.compiler.program.program import Program
 from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import budget
+from sysdyn.dsl.model.expression import is_const
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
@@ -148,7 +149,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
     with _timed("energies", timings):
         model = anchored(energies.energies(network))
         energies.verify_energies(model)
-        model, notes = integrate(model) if integrating else (model, ())
+        model, notes = integrate(model) if integrating and not _keeps_flow(network) else (model, ())
         if traced and not any(o.stored for o in network.observations):
             model, cut = with_coordinates_observed(model, network)
             notes = (*notes, *cut)
@@ -170,6 +171,12 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *found)
     return CompiledModel(family, network, model, form, program, backend, text, said, steps, tuple(timings))
+
+
+def _keeps_flow(network: Network) -> bool:
+    """Whether the scene says keep_flow = true: flow constraints stay as they are written."""
+    options = network.scene.solver_options if network.scene is not None else ()
+    return any(name == "keep_flow" and is_const(node, 1.0) for name, node in options)
 
 
 @contextmanager

@@ -245,6 +245,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         place=Place(elaborator.source, elaborator.model.name.span),
         parameters=tuple(replace(p, whole=p.name in whole) for p in parts.parameters.values()),
         quasis=tuple(elaborator.parts.quasis),
+        speeds=tuple(elaborator.parts.speeds),
         tables=tuple(elaborator.files.tables.values()),
         coordinates=tuple(parts.coordinates),
         unknowns=tuple(parts.unknowns),

@@ -38,6 +38,7 @@ class Letters:
     def __init__(self, form: DescriptorForm, named: Sequence[str]) -> None:
         self._formulation = form.formulation
         self._named = frozenset(named)
+        self._speeds = frozenset(f.owner for f in form.families if form.is_speed(f))
         self._numbers: dict[tuple[str, str], int] = {}
         for kind in ("kappa", "mu"):
             owners = [f.owner for f in form.families if f.kind == kind]
@@ -54,6 +55,9 @@ class Letters:
 
     def _of_coordinate(self, owner: str, kind: str, order: int) -> Letter:
         own = letter(self._formulation, kind)
+        if kind == "f" and owner in self._speeds:
+            path, _, own = owner.rpartition(".")
+            return Letter(path, (own,), order) if path == "u" else self.name(owner, order)
         if kind == "q" and owner in self._named:
             return self.name(owner, order)
         numbered = _NUMBERED.fullmatch(owner)

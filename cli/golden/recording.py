@@ -240,7 +240,7 @@ def _formulations(
     structure: dict[str, Any] = {}
     found = []
     for name, how in runs:
-        wanted = replace(request, formulation=name, method=how)
+        wanted = replace(request, formulation=name, method=how, own=name != base.formulation)
         try:
             one, verdict = _inside(wanted, accuracy, golden, tolerance)
         except Stopped as stopped:

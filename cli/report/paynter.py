@@ -20,6 +20,7 @@ USED = {
     "kane": "qf",
     "co_lagrangian": "pe",
     "co_hamiltonian": "peq",
+    "co_kane": "pe",
 }
 """Of the diagram's four variables, those that the unknowns of a formulation are (language, section 6)."""
 _KINDS = {

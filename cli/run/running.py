@@ -23,6 +23,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import differences, stopped, verdict
 from sysdyn.compiler.binding.instants import instants
 from sysdyn.compiler.binding.pulses import pulses
+from sysdyn.compiler.formulations import repeats
 from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
@@ -74,6 +75,7 @@ class Request:
     timings: bool = True
     no_prune: bool = False
     no_lock: bool = False
+    own: bool = False  # refuse a formulation whose rows are those of another
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +160,10 @@ def ready(request: Request, target: Target, report: Report) -> Prepared | None:
     if network is not None:
         wanted, backend, prune = request.formulation, request.backend, not request.no_prune
         prepared = prepare(network, inner, formulation=wanted, backend=backend, traced=True, prune=prune)
+    if prepared is not None and request.own and repeats(prepared.compiled.form):
+        message = f"formulation {prepared.formulation}: the same rows as Lagrange's, no flow constraint is left out"
+        inner.error("E607", message, prepared.network.place)
+        prepared = None
     report.extend(inner if prepared else targets.unsupported(inner))
     return prepared
 

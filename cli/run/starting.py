@@ -129,7 +129,7 @@ def _structural(
 
 def _without_primal_rows(prepared: Prepared) -> bool:
     """Whether rows are other than the balances of the text's coordinates, with a multiplier a constraint."""
-    return prepared.formulation.startswith("co_") or prepared.formulation == "kane"
+    return prepared.formulation.startswith("co_") or prepared.formulation.endswith("kane")
 
 
 def _inertia(prepared: Prepared, system: System, state: ConsistentState, report: Report) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import FORMULATIONS
+from sysdyn.cli.options import TRIED
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import ACCURACY, Ran, Request, begin, options_of, ready, run_from
 from sysdyn.cli.run.starting import Started
@@ -97,8 +97,8 @@ class Bench:
         unknowns, detail = self._unknowns(first), self._detail(first)
         self.names, self.full = [first[0]], first[1]
         self.levels = _levels(self.carried[first].prepared.network, self.request.levels, first[1])
-        for name in FORMULATIONS if asked in (None, "auto") else []:
-            if name in ("auto", first[0]):
+        for name in TRIED if asked in (None, "auto") else []:
+            if name == first[0]:
                 continue
             if unknowns > LARGE:
                 why = f"the model has {unknowns} unknowns: only the formulation of the scene is measured"
@@ -121,7 +121,8 @@ class Bench:
 
     def _carry(self, what: Carrying, report: Report) -> tuple[str, str] | None:
         """A formulation at a level, at its start; None where it cannot be run."""
-        request = replace(self.request, formulation=what.formulation, levels=what.levels)
+        own = what.formulation not in (None, self.request.formulation)
+        request = replace(self.request, formulation=what.formulation, levels=what.levels, own=own)
         with ex.fresh():
             prepared = ready(request, self.target, report)
             options = options_of(request, self.target, prepared, report, self.began, None) if prepared else None

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import FORMULATIONS
+from sysdyn.cli.options import TRIED
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
@@ -108,7 +108,7 @@ class _Verification:
     ) -> None:
         self.request, self.target, self.report, self.folder, self._progress = request, target, report, folder, progress
         self.began = time.monotonic()
-        self.done, self.planned = 0, 2 * (len(FORMULATIONS) - 1) + 1
+        self.done, self.planned = 0, 2 * len(TRIED) + 1
         self.runs: list[Run] = []
         self.refusals: list[Refusal] = []
         self.twins: list[Twins] = []
@@ -127,8 +127,8 @@ class _Verification:
             self._tell()
             return None
         first = self.runs[0].formulation
-        for name in FORMULATIONS:
-            if name not in ("auto", first):
+        for name in TRIED:
+            if name != first:
                 self._formulation(name)
         self._tell()
         return self._compared(self.finer)
@@ -138,7 +138,7 @@ class _Verification:
         silent = Report()
         with ex.fresh():
             first = ready(self.request, self.target, silent)
-        others = [name for name in FORMULATIONS if first and name not in ("auto", first.formulation)]
+        others = [name for name in TRIED if first and name != first.formulation]
         items = [(self.request, self.folder, name) for name in (None, *others)]
         parts: dict[int, _Part] = {}
         for k, part in each(_part, items, jobs):
@@ -173,7 +173,7 @@ class _Verification:
     def _formulation(self, name: str | None) -> None:
         """Both methods in one formulation; None: that of the request, of the scene, or auto (the reference)."""
         report = Report(self.report if name is None else ())
-        request = self.request if name is None else replace(self.request, formulation=name)
+        request = self.request if name is None else replace(self.request, formulation=name, own=True)
         label = name or "reference"
         before = self.done
         with ex.fresh():

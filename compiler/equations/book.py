@@ -120,7 +120,13 @@ def _of_row(algebra: Algebra, row: Equations, found: Sequence[Piece]) -> Iterato
     for number, (where, fixed) in enumerate(wide):
         terms = gathered(algebra, [(p.over, p.expression) for p in groups.get((where, fixed), [])])
         left, right = sides(row.block, terms) if len(groups) <= 1 else ((), terms)
-        yield Equation(row.block, row.owner, row.place, left, right, where, fixed, number > 0)
+        if row.kind == "kinematic":  # f = S u + s of Kane's form
+            flow = var(row.owner, "f")
+            own = [t for t in terms if t.expression is flow or t.expression is neg(flow)]
+            right = tuple(t if own[0].expression is not flow else t.negated for t in terms if t is not own[0])
+            left = (Summed((), flow),)
+        kind = "kinematic" if row.kind == "kinematic" else row.block
+        yield Equation(kind, row.owner, row.place, left, right, where, fixed, number > 0)
 
 
 def gathered(algebra: Algebra, parts: Sequence[tuple[Nest, Node]], *, whole: bool = False) -> tuple[Summed, ...]:

@@ -142,6 +142,11 @@ class DescriptorForm:
     covers: tuple[tuple[str, tuple[tuple[Nest, Node], ...]], ...] = ()  # families that momenta cover in part
     kinks: tuple[Frozen, ...] = ()
 
+    @staticmethod
+    def is_speed(family: Unknowns) -> bool:
+        """Whether a family is an unknown speed of Kane's form, a flow without a displacement of its own."""
+        return family.kind == "f" and family.name == family.owner
+
     def block(self, name: str) -> Block | None:
         """The block of that name; None where it has no rows."""
         return next((b for b in self.blocks if b.name == name), None)

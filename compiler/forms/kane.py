@@ -9,13 +9,14 @@ number comes first.  A reaction that something reads is kept with Psi_f Psi_f^T 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from sysdyn.compiler.forms.assembly import Assembly
-from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Equations
+from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Equations, Pin, Unknowns
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.lowering import total_rate
+from sysdyn.compiler.forms.speeds import Speeds, definition, kinematics, speeds_of
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.expression import (
@@ -48,13 +49,30 @@ class Projection:
     bound: frozenset[str]
     rows: Mapping[str, Entries]
 
+    def along(self, speeds: Speeds) -> Projection:
+        """The same with partial velocities in the place of the columns of their coordinates."""
+        free = {name: column for name, column in self.free.items() if name not in speeds.rest}
+        bound = self.bound - set(speeds.rest)
+        return Projection({**free, **{u: dict(c) for u, c in speeds.columns.items()}}, bound, self.rows)
+
 
 def kane(model: EnergyModel) -> DescriptorForm:
     """Unknowns q f kappa e s, and mu where a reaction is read.  ModelError E607 where Psi cannot be eliminated."""
     found = projection(model)
     form = lagrangian(model)
     read = _joined(found, _reactions_read(form))
-    return _Projected(form, found, read).form()
+    speeds = speeds_of(model, read)
+    if speeds.speeds:
+        form = lagrangian(_seen(model, speeds))
+    return _Projected(form, found.along(speeds), read, speeds).form()
+
+
+def _seen(model: EnergyModel, speeds: Speeds) -> EnergyModel:
+    """The model with the displacements as unknowns that the partial velocities depend on."""
+    roots = [*speeds.rest.values(), *(v for column in speeds.columns.values() for v in column.values())]
+    names = {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] == "q"}
+    coordinates = tuple(replace(c, tangible=c.tangible or c.name in names) for c in model.coordinates)
+    return replace(model, coordinates=coordinates)
 
 
 def projection(model: EnergyModel) -> Projection:
@@ -65,10 +83,6 @@ def projection(model: EnergyModel) -> Projection:
         if row.name in rows:
             raise _impossible(row, f"psi {row.name} is declared in several pieces")
         rows[row.name] = _entries(row, families)
-    if not rows and not model.quasis:
-        message = "formulation kane: the model has no flow constraint that it could leave out, and no quasi-velocity"
-        where = next((f.place for f in (*model.coordinates, *model.states, *model.unknowns)), None)
-        raise ModelError((Diagnostic("E607", message, where, "formulation lagrangian"),))
     reduced = {name: dict(entries) for name, entries in rows.items()}
     pivots: dict[str, str] = {}
     for _ in rows:
@@ -170,8 +184,10 @@ def _joined(found: Projection, read: frozenset[str]) -> frozenset[str]:
 class _Projected:
     """The Lagrangian form with its balances mixed."""
 
-    def __init__(self, lagrange: DescriptorForm, found: Projection, read: frozenset[str]) -> None:
-        self.lagrange, self.found, self.read = lagrange, found, read
+    def __init__(self, lagrange: DescriptorForm, found: Projection, read: frozenset[str], speeds: Speeds) -> None:
+        self.lagrange, self.found, self.read, self.speeds = lagrange, found, read, speeds
+        self.flows = {var(n, "f"): speeds.flow(n) for n in speeds.rest}
+        self.change = {var(n, "f", order=1): total_rate(speeds.flow(n)) for n in speeds.rest}
         self.assembly = Assembly()
         self.rated = self._rated()
 
@@ -185,8 +201,14 @@ class _Projected:
     def form(self) -> DescriptorForm:
         """The projected form."""
         for row in self.lagrange.rows:
-            if row.block != "dynamics" or row.owner not in self.found.bound:
+            if row.block == "dynamics" and row.owner in self.speeds.rest:
+                unit = next(f.unit for f in self.lagrange.families if (f.owner, f.kind) == (row.owner, "f"))
+                self.assembly.family(replace(row, unit=unit, kind="kinematic"))
+            elif (row.block != "dynamics" or row.owner not in self.found.bound) and not self._left_out(row):
                 self.assembly.family(row)
+        for speed in self.speeds.speeds:
+            unit = f"W/({speed.unit})"
+            self.assembly.family(Equations("dynamics", speed.name, speed.name, "dynamics", unit, speed.place))
         if self.lagrange.block("phi_reaction") is not None:
             for row in self.lagrange.rows:
                 if row.block == "dynamics":
@@ -198,16 +220,38 @@ class _Projected:
         self._copy()
         for label in sorted(self.read):
             self._reaction(label)
-        kept = [k for k, f in enumerate(self.lagrange.families) if f.kind != "mu" or f.owner in self.read]
-        number = {old: new for new, old in enumerate(kept)}
+        for name in self.speeds.rest:
+            zero = kinematics(self.speeds, name)
+            self.assembly.add("dynamics", name, (), (), zero)
+            self.assembly.add("dynamics_rate", name, (), (), total_rate(zero))
+        kept = [f for f in self.lagrange.families if f.kind != "mu" or f.owner in self.read]
+        last = 1 + max(k for k, f in enumerate(kept) if f.kind == "f") if self.speeds.speeds else 0
+        own = [Unknowns(s.name, "f", s.name, s.unit, s.place) for s in self.speeds.speeds]
+        families = [*kept[:last], *own, *kept[last:]]
+        number = {(f.owner, f.kind): k for k, f in enumerate(families)}
+        held = [(p, self.lagrange.families[p.family]) for p in self.lagrange.pins]
+        pins = [replace(p, family=number[f.owner, f.kind]) for p, f in held if (f.owner, f.kind) in number]
         return replace(
             self.lagrange,
             formulation="kane",
-            families=tuple(self.lagrange.families[k] for k in kept),
+            families=tuple(families),
             rows=tuple(self.assembly.rows),
             blocks=self.assembly.blocks(),
-            pins=tuple(replace(p, family=number[p.family]) for p in self.lagrange.pins if p.family in number),
+            pins=(*pins, *self._pins(number)),
+            shapes=(*self.lagrange.shapes, *((s.name, ()) for s in self.speeds.speeds)),
         )
+
+    def _pins(self, number: Mapping[tuple[str, str], int]) -> Iterator[Pin]:
+        """Guesses of speeds by what the text says of displacements and flows."""
+        owners = [(p, self.lagrange.families[p.family]) for p in self.lagrange.pins if not p.at]
+        values = {var(f.owner, f.kind): p.value for p, f in owners}
+        for speed in self.speeds.speeds:
+            value = definition(speed, values)
+            if value is not None and speed.place is not None:
+                yield Pin(number[speed.name, "f"], (), value, False, (), speed.place)
+
+    def _left_out(self, row: Equations) -> bool:
+        return row.block == "psi" and row.owner in self.speeds.left_out
 
     def _copy(self) -> None:
         for block in self.lagrange.blocks:
@@ -216,18 +260,22 @@ class _Projected:
             for kernel in block.kernels:
                 for summand in kernel.rows:
                     row = self.lagrange.rows[summand.row]
+                    value = substitute(summand.expression, self.change) if self.change else summand.expression
+                    if self._left_out(row):
+                        continue
                     if HOME.get(block.name, block.name) != "dynamics":
-                        self.assembly.add(block.name, row.owner, summand.at, kernel.nest, summand.expression)
+                        self.assembly.add(block.name, row.owner, summand.at, kernel.nest, value)
                         continue
                     if block.name == "phi_reaction":
-                        self.assembly.add("phi_normal", row.owner, summand.at, kernel.nest, summand.expression)
-                    self._balance(block.name, row.owner, summand.at, kernel.nest, summand.expression)
+                        self.assembly.add("phi_normal", row.owner, summand.at, kernel.nest, value)
+                    self._balance(block.name, row.owner, summand.at, kernel.nest, value)
 
     def _balance(self, block: str, owner: str, at: tuple[Node, ...], nest: Nest, value: Node) -> None:
         """A summand of the balance of one coordinate, in the mixed balances and the rows of reactions."""
         for name, column in self.found.free.items():
             if owner in column:
                 mixed = mul(_here(column[owner], at), value)
+                mixed = substitute(mixed, self.flows) if name in self.speeds.columns else mixed
                 self.assembly.add(block, name, at, nest, mixed)
                 if name in self.rated and not any(n.op == "var" and n.data[2] for n in variables(mixed)):
                     self.assembly.add("dynamics_rate", name, at, nest, total_rate(mixed))

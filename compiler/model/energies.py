@@ -111,6 +111,7 @@ class EnergyModel:
     labels: Mapping[str, str] = field(default_factory=dict)  # unit of each constraint label
     mirror: Mirror = PRIMAL
     quasis: tuple[str, ...] = ()
+    speeds: tuple[Quantity, ...] = ()
     switched: frozenset[str] = frozenset()  # labels of constraints that hold at times
 
     def function(self, name: str) -> tuple[Term, ...]:
@@ -149,6 +150,7 @@ def energies(network: Network) -> EnergyModel:
         quantities=tuple(_quantities(network)),
         labels={c.name: c.unit.text for c in network.constraints},
         quasis=network.quasis,
+        speeds=tuple(Quantity(o.name, flows(o.expression), False, o.unit.text, o.place) for o in network.speeds),
         switched=frozenset(s.label for s in network.switches),
     )
     touched = tangible(model)

@@ -38,6 +38,7 @@ def rewritten(network: Network, change: Callable[[Node], Node]) -> Network:
         dynamics=tuple(replace(d, expression=change(d.expression)) for d in network.dynamics),
         initials=tuple(replace(i, target=change(i.target), value=change(i.value)) for i in network.initials),
         observations=tuple(replace(o, expression=change(o.expression)) for o in network.observations),
+        speeds=tuple(replace(o, expression=change(o.expression)) for o in network.speeds),
         expectations=tuple(
             replace(
                 e, left=change(e.left), right=change(e.right), within=None if e.within is None else change(e.within)

@@ -89,6 +89,7 @@ def with_linkages(network: Network) -> Network:
             *(Dynamic(constant(b.name, b.at), ex.const(0.0), b.loops, b.place) for b in free.values()),
         ),
         observations=tuple(replace(o, expression=held(o.expression)) for o in network.observations),
+        speeds=tuple(replace(o, expression=held(o.expression)) for o in network.speeds),
         expectations=tuple(
             replace(e, left=held(e.left), right=held(e.right), within=None if e.within is None else held(e.within))
             for e in network.expectations

@@ -61,6 +61,7 @@ def from_stores(network: Network) -> Network:
     return replace(
         network,
         observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
+        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
         expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
     )
 
@@ -93,6 +94,7 @@ def from_masses(network: Network) -> Network:
     return replace(
         network,
         observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
+        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
         expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
         dynamics=tuple(replace(d, expression=read(d.expression)) for d in network.dynamics),
     )
@@ -182,6 +184,7 @@ def _with_position(
         ),
         initials=(*network.initials, *starts),
         observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
+        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
         expectations=tuple(
             replace(e, left=read(e.left), right=read(e.right), within=None if e.within is None else read(e.within))
             for e in network.expectations

@@ -66,6 +66,7 @@ def relabelled(network: Network) -> Network:
         dynamics=tuple(replace(d, expression=_node(d.expression)) for d in network.dynamics),
         initials=tuple(replace(i, target=_node(i.target)) for i in network.initials),
         observations=tuple(replace(o, expression=_node(o.expression)) for o in network.observations),
+        speeds=tuple(replace(o, expression=_node(o.expression)) for o in network.speeds),
         expectations=tuple(
             replace(e, left=_node(e.left), right=_node(e.right), within=None if e.within is None else _node(e.within))
             for e in network.expectations

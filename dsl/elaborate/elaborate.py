@@ -11,8 +11,8 @@ from sysdyn.dsl.elaborate.instances import Instances
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Dynamic, Initial, Loop, State
-from sysdyn.dsl.model.units import si
+from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State
+from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.context import Failed, SeveralError
 from sysdyn.dsl.names.symbols import Definition, Scope, Space, Typed
 from sysdyn.dsl.text.diagnostics import Report
@@ -99,6 +99,10 @@ class Elaborator(Instances):
             target = state if found.first is None else ex.sub(state, found.first)
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
 
+    def _speed(self, symbol: Definition, node: ex.Node, dimension: Dimension) -> None:
+        name = symbol.space.family(symbol.name).name
+        self.parts.speeds.append(Observation(name, node, si(dimension), symbol.name, symbol.place, False))
+
     def _definitions(self) -> None:
         """Resolve every let, output and quasi-velocity once, so that unused ones are checked too."""
         for symbol in list(self.scope.symbols.values()):
@@ -108,5 +112,7 @@ class Elaborator(Instances):
                     if symbol.kind == "quasi" and isinstance(value, Typed):
                         with self.resolver.space(symbol.space):
                             self.virtual(value.node, f"quasi '{symbol.name}'", symbol.span)
+                        if not symbol.at and symbol.dimension is not None:
+                            self._speed(symbol, value.node, symbol.dimension)
                 except Failed:
                     continue

@@ -68,6 +68,7 @@ class Parts:
     expectations: list[Expectation] = field(default_factory=list)
     goldens: list[Golden] = field(default_factory=list)
     quasis: list[str] = field(default_factory=list)
+    speeds: list[Observation] = field(default_factory=list)
     discretes: set[str] = field(default_factory=set)
     events: list[Event] = field(default_factory=list)
     switches: list[Switch] = field(default_factory=list)

@@ -24,12 +24,12 @@ from sysdyn.dsl.tree import syntax
 
 _Said = TypeVar("_Said", syntax.Set, syntax.Trace)
 RESERVED = ("time", "audit", "parameters", "events", "derivatives")
-FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "auto")
+FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "co_kane", "auto")
 SOLVERS = ("auto", "bdf", "radau", "dopri", "energy", "euler")
 REDUNDANCY = ("error", "drop", "minimum_norm")
 FINEST_ACCURACY = 1e-13
 """Relative; what doubles resolve, and the estimate must be seen too."""
-_SOLVER_OPTIONS = ("order", "index", "step", "longest", "keep_implicit")
+_SOLVER_OPTIONS = ("order", "index", "step", "longest", "keep_implicit", "keep_flow")
 
 
 class SceneReader:
@@ -223,12 +223,20 @@ class SceneReader:
                 raise self.resolver.fail(
                     "E405", message, arg.span, help=", ".join(f"{n} = .." for n in _SOLVER_OPTIONS)
                 )
-            if arg.name == "keep_implicit":
-                node = ex.conditional(self.resolver.condition(arg.value), ex.const(1.0), ex.const(0.0))
+            if arg.name in ("keep_implicit", "keep_flow"):
+                node = self._yes(arg.value, arg.name)
             else:
                 node = self._constant(arg.value, dim.TIME if arg.name in ("step", "longest") else NONE, arg.name)
             options.append((arg.name, node))
         self._found["solver_options"] = tuple(options)
+
+    def _yes(self, value: syntax.Expr, what: str) -> ex.Node:
+        """1 for true, 0 for false: said in the text, since it changes which unknowns there are."""
+        node = self.resolver.condition(value)
+        if any(n.op in ("param", "var", "time") for n in ex.topological([node])):
+            message = f"{what} changes which unknowns there are: it does not depend on values"
+            raise self.resolver.fail("E405", message, value.span, help="true or false")
+        return ex.const(1.0 if ex.evaluate([node], dict[ex.Node, float]().__getitem__)[0] else 0.0)
 
     def _choice(self, word: syntax.Word, choices: tuple[str, ...], what: str) -> None:
         if word.name not in choices:

@@ -414,6 +414,7 @@ class Network:
     couplings: tuple[Coupling, ...] = ()
     slopes: tuple[Slope, ...] = ()  # of laws that the compiler has inverted
     quasis: tuple[str, ...] = ()  # families of quasi-velocities
+    speeds: tuple[Observation, ...] = ()  # the scalar ones of the model itself
     discretes: frozenset[str] = frozenset()  # parameters that events assign
     events: tuple[Event, ...] = ()
     switches: tuple[Switch, ...] = ()

@@ -52,7 +52,7 @@ def model(tmp_path):
 
 def test_commands_and_choices(model):
     assert {"simulate", "std", "scene"} & set(offered("s")) == {"simulate", "std"}
-    assert set(offered("simulate", model, "--formulation", "co_")) == {"co_lagrangian", "co_hamiltonian"}
+    assert set(offered("simulate", model, "--formulation", "co_")) == {"co_lagrangian", "co_hamiltonian", "co_kane"}
 
 
 @pytest.mark.parametrize("command", ["simulate", "list", "compile", "verify"])

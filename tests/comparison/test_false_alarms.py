@@ -48,7 +48,7 @@ WALL = "120"
 def scenes():
     """Every scene of models/ as FOLDER/FILE.sd SCENE."""
     found = []
-    for path in sorted(MODELS.glob("*/*.sd")):
+    for path in sorted(p for p in MODELS.glob("*/*.sd") if p.parent.name != "book"):
         document = targets.read(str(path), Report())
         found += [f"{path.parent.name}/{path.name} {name}" for name in document.scenes]
     return found

@@ -24,7 +24,7 @@ def texts() -> dict[str, str]:
     """Every model's text at the sizes of models/ci.toml, by `folder/name`."""
     sizes = tomllib.loads((MODELS / "ci.toml").read_text())
     found = {}
-    for path in sorted(MODELS.rglob("*.sd")):
+    for path in sorted(p for p in MODELS.rglob("*.sd") if p.parent.name != "book"):
         text = path.read_text(encoding="utf-8")
         for name, value in sizes.get(path.parent.name, {}).get(path.stem, {}).items():
             text = re.sub(rf"(param {name} = )[^#\n;]*", rf"\g<1>{value}", text, count=1)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from reduced import ROOT, load
+from sysdyn.cli.main import run as main
 from sysdyn.cli.run.running import Request, run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
@@ -120,20 +121,101 @@ def test_displacement_constraints_keep_their_multipliers(tmp_path):
         assert np.max(np.abs(kane[name].values - wanted)) <= 1e-6 * np.max(np.abs(wanted)), name
 
 
-@pytest.mark.parametrize(
-    ("psi", "says"),
-    [("", "no flow constraint"), ("psi one: x' = sum(i in 1..3: v[i]')", "several elements")],
-)
-def test_what_it_cannot_leave_out_is_refused(tmp_path, psi, says):
+def test_what_it_cannot_leave_out_is_refused(tmp_path):
     path = tmp_path / "model.sd"
-    path.write_text(f"""model m {{
+    path.write_text("""model m {
   coord x: translation = 0 m
   coord v[1..3]: translation
   energy T* = 1/2*1 kg*(x'^2 + sum(i in 1..3: v[i]'^2))
-  {psi}
-}}
+  psi one: x' = sum(i in 1..3: v[i]')
+}
 """)
     report = Report()
     assert run(Request(str(path), formulation="kane", until="1", output=str(tmp_path / "t.h5")), report) is None
     assert [d.code for d in report if d.severity == "error"] == ["E607"]
-    assert says in next(d.message for d in report)
+    assert "several elements" in next(d.message for d in report)
+
+
+@pytest.mark.parametrize("model", ["lead_filter", "two_tank", "electrical_transformer", "fluid_transformer"])
+def test_the_complementary_form_meets_the_reference_values(tmp_path, model):
+    """Balances of flows projected on the efforts that effort constraints leave free."""
+    reference = REFERENCES[model]
+    options = {"accuracy": 1e-6, "at": ",".join(map(repr, reference["t"])), "scene": "reference"}
+    _, trace = simulated(tmp_path, ROOT / "models" / "seed" / f"{model}.sd", "co_kane", **options)
+    places = [int(np.argmin(np.abs(trace.time - t))) for t in reference["t"]]
+    for name, values in reference["values"].items():
+        error = np.max(np.abs(trace[name].values[places] - values)) / np.max(np.abs(values))
+        assert error <= 1e-5, name
+
+
+def test_the_complementary_form_has_no_multiplier_of_an_effort_constraint(tmp_path):
+    """Example 5.3 in momenta: of phi and psi only the momentum constraint keeps its multiplier."""
+    reference = REFERENCES["two_tank"]
+    times = reference["t"]
+    options = {"accuracy": 1e-6, "at": ",".join(map(repr, times)), "scene": "reference"}
+    ran, trace = simulated(tmp_path, ROOT / "models" / "book" / "two_tank.sd", "co_kane", **options)
+    assert [f.kind for f in ran.prepared.compiled.form.families if f.kind in ("kappa", "mu")] == ["kappa"]
+    places = [int(np.argmin(np.abs(trace.time - t))) for t in times]
+    for name, state, factor in (("p2", "pb", 1.0), ("p3", "Q", reference["parameters"]["I1"])):
+        values = factor * np.array([float(v) for v in reference["state_values"][state]])
+        assert np.max(np.abs(trace[name].values[places] - values)) <= 1e-5 * np.max(np.abs(values)), name
+
+
+def test_without_flow_constraint_and_quasi_velocity_the_flows_are_the_speeds(capsys):
+    """Its rows are Lagrange's; `verify` and `trade` do not run one form under two names."""
+    path = str(ROOT / "models" / "seed" / "two_link_arm.sd")
+    texts = []
+    for formulation in ("lagrangian", "kane"):
+        assert main(["equations", path, "--formulation", formulation, "--quiet"]) == 0
+        texts.append(capsys.readouterr().out)
+    assert texts[0] == texts[1]
+    report = Report()
+    request = Request(path, scene="reference", formulation="kane", own=True, until="0.01")
+    assert run(request, report) is None
+    assert [d.code for d in report if d.severity == "error"] == ["E607"]
+
+
+SLED = """
+model sled {
+  param m = 2 kg
+  param J = 0.5 kg.m^2
+  coord x, y: translation = 0 m
+  coord th: rotation = 0
+  quasi v: m/s = cos(th)*x' + sin(th)*y'
+  quasi om: rad/s = th'
+  quasi twice: m/s = 2*v
+  energy T* = 1/2*m*(x'^2 + y'^2) + 1/2*J*th'^2
+  psi edge: sin(th)*x' - cos(th)*y' = 0
+  work 3 N - 0.4 N.s/m*v on quasi(v)
+  work 0.25 N.m on quasi(om)
+  init x' = 1 m/s
+  init th' = 0.5 rad/s
+}
+scene go of sled {
+  time 0 s to 3 s
+  accuracy 1e-8
+  trace v, om, edge.residual as slip every 0.1 s
+}
+"""
+
+
+def test_quasi_velocities_are_the_unknown_speeds(tmp_path, capsys):
+    """m v' = F - b v, J om' = M beside f = S u: Kane's equations, no multiplier, no flow's rate; regular where the edge
+    points along y.
+    """
+    path = tmp_path / "sled.sd"
+    path.write_text(SLED)
+    assert main(["equations", str(path), "--formulation", "kane", "--quiet"]) == 0
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    for wanted in ("f_x = cos(th) v", "f_y = sin(th) v", "f_th = om", "m v' = -0.4 v + 3", "J om' = 1/4"):
+        assert wanted in lines, lines
+    ran, trace = simulated(tmp_path, path, "kane")
+    form = ran.prepared.compiled.form
+    assert [f.name for f in form.families if form.is_speed(f)] == ["v", "om"]
+    assert "mu" not in {f.kind for f in form.families}
+    t = trace.time
+    exact = 7.5 - 6.5 * np.exp(-0.2 * t)
+    assert np.max(np.abs(trace["v"].values - exact)) <= 1e-7 * 7.5
+    assert np.max(np.abs(trace["om"].values - (0.5 + 0.5 * t))) <= 1e-7 * 2
+    assert 0.5 * np.pi < 0.5 * 3 + 0.25 * 9  # the heading has passed pi/2
+    assert np.max(np.abs(trace["slip"].values)) <= 1e-9

@@ -107,6 +107,7 @@ def _statements(network: Network, said: Laws, nodes: tuple[Constraint, ...], rea
         "observations": tuple(
             replace(o, expression=reader.scalar(o.expression, o.place)) for o in network.observations
         ),
+        "speeds": tuple(replace(o, expression=reader.scalar(o.expression, o.place)) for o in network.speeds),
         "expectations": tuple(_expectation(e, reader) for e in network.expectations),
     }
 
