@@ -38,11 +38,25 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
     if co:
         return _complementary(network, wanted, place)
     if wanted in COMPLEMENTARY:
-        found = _obstacle(network, wanted, place) or unreflectable(network)
+        found = _of_efforts(network, wanted) or _obstacle(network, wanted, place) or unreflectable(network)
         return wanted, ((found,) if found else ())
     if wanted == "auto":
         return ("hamiltonian" if any(e.function == "T" for e in network.energies) else "lagrangian"), ()
     return wanted, ()
+
+
+def _of_efforts(network: Network, wanted: str) -> Diagnostic | None:
+    """The first trace or expect of an effort by its class: displacement coordinates alone have these."""
+    asked = [(o.expression, o.place) for o in network.observations] + [
+        (side, x.place) for x in network.expectations for side in (x.left, x.right)
+    ]
+    for root, place in asked:
+        classes = (n for n in variables(root) if n.op == "var" and ":" in n.data[1])
+        for node in sorted(classes, key=lambda n: n.number):
+            member = f"{node.data[0]}.{node.data[1].split(':')[1]}"
+            message = f"{member} is not observable in {wanted}: it acts on a displacement coordinate"
+            return Diagnostic("E905", message, place, "formulation lagrangian, hamiltonian")
+    return None
 
 
 def _complementary(network: Network, wanted: str, place: Place | None) -> tuple[str, tuple[Diagnostic, ...]]:

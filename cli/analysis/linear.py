@@ -23,8 +23,8 @@ from sysdyn.compiler.binding.sensitivity import FIRST, LAST, Sensitivity
 from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
-from sysdyn.runtime.linear.modes import Mode, Transfer, modes, transfer
-from sysdyn.runtime.linear.pencil import motions, parted
+from sysdyn.runtime.linear.modes import Mode, Transfer, modes, transfer, wide_transfer
+from sysdyn.runtime.linear.pencil import motions, surely_parted
 from sysdyn.runtime.linear.tangent import (
     NoLinearisation,
     Outputs,
@@ -137,20 +137,19 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     form = system if index == "3" else system.another(index)
     descriptor = _descriptor(form, found, slopes, out, labels)
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
-    transfers = tuple(
-        transfer(
-            small.a,
-            small.b[:, j],
-            small.c[i],
-            float(small.d[i, j]),
-            (i, j),
-            (float(small.d1[i, j]), float(small.d2[i, j])),
-        )
-        for i, j in pairs
-    )
-    return Linear(
-        state.t, state.y, descriptor, small, modes(small.a), transfers, labels, names, _felt_moves(system, small, found)
-    )
+    transfers = tuple(_transfer(small, i, j) for i, j in pairs)
+    own = modes(small.a, small.decomposed)
+    moves = _felt_moves(system, small, found)
+    return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves)
+
+
+def _transfer(small: Reduced, i: int, j: int) -> Transfer:
+    """Output i by input j."""
+    improper = float(small.d1[i, j]), float(small.d2[i, j])
+    if small.wide is None or small.wide.beside is None:
+        return transfer(small.a, small.b[:, j], small.c[i], float(small.d[i, j]), (i, j), improper)
+    one, other = ((w.a, w.b[:, j], w.c[i], w.d[i, j]) for w in (small.wide, small.wide.beside))
+    return wide_transfer(one, other, (i, j), improper)
 
 
 def _descriptor(
@@ -239,7 +238,7 @@ def _of_pencil(found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Redu
     chosen = np.concatenate([chosen_states(system, spaces[0], spaces[2], known, loose), extra])[: spaces[0].shape[1]]
     names = tuple(form.states[int(k)] for k in chosen)
     matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
-    small = parted(matrices, chosen, spaces, names)
+    small = surely_parted(matrices, chosen, spaces, names)
     return replace(small, places=np.where(small.places < n, small.places, -1))
 
 

@@ -25,7 +25,7 @@ from sysdyn.runtime.trace.trace_store import columns_of
 STATE = ("q", "f", "p", "s")
 LARGEST = 4_000_000
 """Entries of dF/dy of the underlying equation beyond which it is not written: it is full where inertia couples all."""
-AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
+AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +203,7 @@ def _observer(system: System, block: str) -> tuple[Call | None, int]:
 
 
 def _audit_at(system: System) -> Ints:
-    """Places behind y of energy, kinetic, potential, dissipated, supplied, constraints; -1: nothing reads it."""
+    """Places behind y of energy, kinetic, potential, dissipated, supplied, constraints, drift; -1: nothing reads it."""
     found = np.full(len(AUDIT), -1, dtype=np.int32)
     for k in system.description.families_of("audit"):
         name = system.description.families[k].name.removeprefix("audit.")

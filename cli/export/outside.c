@@ -200,7 +200,7 @@ int sd_mass(double t, const double *y, const double *yd, const double *p, double
 
 int sd_outputs(double t, const double *y, const double *yd, const double *p, double *w)
 {
-    enum { KINETIC = 1, POTENTIAL = 2, MEASURES = 6 }; /* the ledger of energy comes first: kinetic, potential, powers */
+    enum { KINETIC = 1, POTENTIAL = 2, MEASURES = 7 }; /* the ledger of energy comes first: kinetic, potential, powers */
     if (refused(p))
         return -1;
 #if OBSERVED

@@ -181,7 +181,7 @@ def sd_outputs(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
     written = tables["written"]
     inside, rates = np.zeros((2, max(tables["system"]["extended"], written)))
     inside[:written], rates[:written] = y[:written], yd[:written]
-    meters = np.full(6, np.nan)
+    meters = np.full(7, np.nan)
     if tables["audit"] is not None:
         found = np.zeros(tables["audited"])
         _observe(m, tables["audit"], t, inside, rates, p, found)

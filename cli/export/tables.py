@@ -123,7 +123,7 @@ class Tables:
     """All of one exported model.
 
     y0, yd0, scale, differential [unknowns of the form]; full_y, full_yd [unknowns of the layout as assembled]; written:
-    unknowns as written, before the multipliers nu; at [families]: where they begin; audit_at [6]: places behind y.
+    unknowns as written, before the multipliers nu; at [families]: where they begin; audit_at [7]: places behind y.
     """
 
     form: str

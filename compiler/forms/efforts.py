@@ -1,10 +1,15 @@
-"""The efforts on each coordinate but the rate of its momentum: what the balance of (3.34) adds up, term by term.
+"""The efforts that act on a coordinate, by class (book, 2.3; Lagrange's principle): their sum is zero.
 
-    -dT*/dq + dT/dq + dV/dq + dD/df     of state functions
-    -E du/dq                            of virtual works
-    Phi_q^T kappa, Psi_f^T mu           of constraints: the multiplier rule
+    inertial      -(d/dt dT*/df - dT*/dq + dT/dq)     with p' for d/dt dT*/df where p is an unknown
+    potential     -dV/dq                              and what laws of stores give that have no V
+    dissipative   -dD/df                              and what laws of dissipators give that have no D
+    source        E du/dq                             virtual work
+    implicit      E du/dq                             virtual work of an implicit unknown
+    constraint    -Phi_q^T kappa - Psi_f^T mu         the multiplier rule
 
-Received: an EnergyModel.  Returned: efforts, each for all iterations of its nest.
+A balance adds them up with the other sign; the rate of the momentum stands beside them (lowering.py).
+Received: an EnergyModel.  Returned: summands of balances; or, for a node `var(coordinate, "x:CLASS", indices)`, the
+effort as an expression.
 """
 
 from __future__ import annotations
@@ -12,15 +17,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sysdyn.compiler.model.energies import EnergyModel, Row
+from sysdyn.compiler.forms.momenta import at_indices
+from sysdyn.compiler.model.energies import EnergyModel, Row, Virtual
 from sysdyn.compiler.model.terms import Nest, local_variables
-from sysdyn.dsl.model.expression import Node, derivative, mul, neg, signals_held, substitute, var
+from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, signals_held, substitute, var, variables
+
+PREFIX = "x:"
+"""Of the kinds of unknown that stand for effort classes."""
+_WORKS = {"stored": "potential", "dissipated": "dissipative", "supplied": "source"}
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """A summand of the balance of the coordinate `on`, for all iterations of the nest; block: where it is added."""
+    """A summand of the balance of the coordinate `on`, for all iterations of the nest: the effort with the other sign.
 
+    name: of its class; block: where the balance adds it.
+    """
+
+    name: str
     block: str  # dynamics phi_reaction psi_reaction
     on: Node
     nest: Nest
@@ -28,32 +42,38 @@ class Effort:
 
 
 def efforts(model: EnergyModel) -> Iterator[Effort]:
-    """Every summand: those of state functions, of works, of constraints."""
-    yield from gradients(model)
-    yield from forces(model)
+    """Every summand but the rates of momenta."""
+    yield from _gradients(model)
+    for work in model.works:
+        for on in local_variables(work.on, model.mirror.coordinate):
+            value = neg(mul(work.effort, derivative(work.on, on)))
+            yield Effort(_class_of(model, work), "dynamics", on, work.loops, value)
     for row in model.rows:
-        yield from reactions(model, row)
+        yield from _reactions(model, row)
 
 
-def gradients(model: EnergyModel) -> Iterator[Effort]:
+def _gradients(model: EnergyModel) -> Iterator[Effort]:
     """-dT*/dq + dT/dq + dV/dq + dD/df."""
     m = model.mirror
-    functions = ((m.coenergy, -1.0, m.coordinate), (m.energy, 1.0, m.coordinate), (m.potential, 1.0, m.coordinate))
-    for name, sign, kind in (*functions, (m.content, 1.0, m.rate)):
-        for term in model.function(name):
-            for node in local_variables(term.expression, kind):
-                slope = derivative(term.expression, node)
-                yield Effort("dynamics", node, term.loops, slope if sign > 0 else neg(slope))
+    functions = (
+        ("inertial", m.coenergy, m.coordinate, -1.0), ("inertial", m.energy, m.coordinate, 1.0),
+        ("potential", m.potential, m.coordinate, 1.0), ("dissipative", m.content, m.rate, 1.0),
+    )  # fmt: skip
+    for name, function, kind, sign in functions:
+        for term in model.function(function):
+            for on in local_variables(term.expression, kind):
+                slope = derivative(term.expression, on)
+                yield Effort(name, "dynamics", on, term.loops, slope if sign > 0.0 else neg(slope))
 
 
-def forces(model: EnergyModel) -> Iterator[Effort]:
-    """-Q_j = -E du/dq_j."""
-    for work in model.works:
-        for node in local_variables(work.on, model.mirror.coordinate):
-            yield Effort("dynamics", node, work.loops, neg(mul(work.effort, derivative(work.on, node))))
+def _class_of(model: EnergyModel, work: Virtual) -> str:
+    unknowns = {u.name for u in model.unknowns}
+    if any(n.data[0] in unknowns for n in local_variables(work.effort, "e")):
+        return "implicit"
+    return _WORKS[work.account]
 
 
-def reactions(model: EnergyModel, row: Row) -> Iterator[Effort]:
+def _reactions(model: EnergyModel, row: Row) -> Iterator[Effort]:
     """Phi_q^T kappa or Psi_f^T mu of one row of constraints; nothing of others.  Signals are held: power is kept."""
     if row.kind not in ("phi", "psi"):
         return
@@ -62,6 +82,25 @@ def reactions(model: EnergyModel, row: Row) -> Iterator[Effort]:
     multiplier = var(row.name, name, *row.at)
     for term in row.terms:
         held, signals = signals_held(term.expression)
-        for node in local_variables(held, kind):
-            value = mul(substitute(derivative(held, node), signals), multiplier)
-            yield Effort(f"{row.kind}_reaction", node, term.loops, value)
+        for on in local_variables(held, kind):
+            value = mul(substitute(derivative(held, on), signals), multiplier)
+            yield Effort("constraint", f"{row.kind}_reaction", on, term.loops, value)
+
+
+# --- by class ---------------------------------------------------------------------------------------------------
+
+
+def acting(root: Node) -> list[Node]:
+    """The efforts of classes that an expression reads."""
+    found = (n for n in variables(root) if n.op == "var" and n.data[1].startswith(PREFIX))
+    return sorted(found, key=lambda n: n.number)
+
+
+def effort(model: EnergyModel, node: Node) -> Node:
+    """The effort of the node's class at its indices."""
+    name, owner, at = node.data[1].removeprefix(PREFIX), node.data[0], node.args
+    found = (e for e in efforts(model) if e.name == name and e.on.data[0] == owner)
+    parts = [neg(at_indices(e.nest, e.on.args, e.value, at)) for e in found]
+    if name == "inertial":
+        parts.append(neg(var(owner, model.mirror.conjugate, *at, order=1)))
+    return add(*parts)

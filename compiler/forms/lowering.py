@@ -78,6 +78,12 @@ def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
     return nest, tuple(counter(k) for k in range(len(nest)))
 
 
+def _drift(model: EnergyModel) -> tuple[str, ...]:
+    """`drift` where something reads it."""
+    read = (n for quantity in model.quantities for n in variables(quantity.expression))
+    return ("drift",) if any(n.op == "var" and n.data[:2] == ("drift", "audit") for n in read) else ()
+
+
 def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     """Coordinates whose balances of efforts are algebraic and have a rate, but for elements that a store moves with.
 
@@ -153,7 +159,7 @@ class _Lowering:
             power = {n: kind == "mu" or n in integrated for n in names}
             units = {n: f"{'W' if power[n] else 'J'}/({m.labels[n]})" for n in names}
             found += [Unknowns(f"{n}.multiplier", kind, n, units[n], places[n]) for n in names]
-        found += [Unknowns(f"audit.{n}", "audit", n, "J", None) for n in AUDIT]
+        found += [Unknowns(f"audit.{n}", "audit", n, "J", None) for n in (*AUDIT, *_drift(m))]
         return found
 
     def declare(self) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
-from sysdyn.compiler.model.terms import Term, local_variables, split, without_nested
+from sysdyn.compiler.model.terms import Nest, Term, local_variables, split, without_nested
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -52,18 +52,18 @@ def momentum(model: EnergyModel, node: Node) -> Node:
     for term in model.function(model.mirror.coenergy):
         for rate in local_variables(term.expression, model.mirror.rate):
             if rate.data[0] == node.data[0]:
-                pieces.append(_at(term, rate, node.args))
+                pieces.append(at_indices(term.loops, rate.args, derivative(term.expression, rate), node.args))
     return add(*pieces)
 
 
-def _at(term: Term, rate: Node, at: tuple[Node, ...]) -> Node:
-    """The slope of a term by `rate`, summed over the iterations in which `rate` stands at the indices `at`."""
-    change = {index(loop.index): index(f"#rm{loop.index}") for loop in term.loops}
-    slope = substitute(derivative(term.expression, rate), change)
-    pairs = [(substitute(own, change), wanted) for own, wanted in zip(rate.args, at, strict=True)]
-    tests = [compare("==", own, wanted) for own, wanted in pairs if own is not wanted]
-    result = conditional(both(*tests), slope, const(0.0)) if tests else slope
-    for loop in reversed(term.loops):
+def at_indices(loops: Nest, own: tuple[Node, ...], value: Node, at: tuple[Node, ...]) -> Node:
+    """A value under a nest, summed over the iterations in which the indices `own` are those of `at`."""
+    change = {index(loop.index): index(f"#rm{loop.index}") for loop in loops}
+    inner = substitute(value, change)
+    pairs = [(substitute(mine, change), wanted) for mine, wanted in zip(own, at, strict=True)]
+    tests = [compare("==", mine, wanted) for mine, wanted in pairs if mine is not wanted]
+    result = conditional(both(*tests), inner, const(0.0)) if tests else inner
+    for loop in reversed(loops):
         first, last = (substitute(bound, change) for bound in (loop.first, loop.last))
         result = reduction("sum", f"#rm{loop.index}", first, last, result)
     return result

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations, Pin, Unknowns
+from sysdyn.compiler.forms.efforts import acting, effort
 from sysdyn.compiler.forms.momenta import resolve
 from sysdyn.compiler.model.energies import EnergyModel, Target
 from sysdyn.compiler.model.terms import counter, local_variables, split, without_nested
-from sysdyn.dsl.model.expression import Node, add, call, sub, substitute, time_derivative, var, variables
+from sysdyn.dsl.model.expression import Node, add, call, const, sub, substitute, time_derivative, var, variables
 
 TURNED = ("kinetic", "potential", "dissipated", "supplied")
 """Members of the audit whose magnitudes make up what went round."""
@@ -32,15 +33,21 @@ def observed(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     """Coordinates whose displacement a trace or an expect reads."""
     found = set()
     for quantity in model.quantities:
-        expression = resolve(model, carriers, quantity.expression)
+        expression = read(model, carriers, quantity.expression)
         found |= {n.data[0] for n in local_variables(expression, model.mirror.coordinate)}
     return frozenset(found)
+
+
+def read(model: EnergyModel, carriers: frozenset[str], root: Node) -> Node:
+    """A quantity with efforts of classes and momenta that are no unknowns replaced by what they are."""
+    classes = {n: effort(model, n) for n in acting(root)}
+    return resolve(model, carriers, substitute(root, classes) if classes else root)
 
 
 def add_observations(assembly: Assembly, model: EnergyModel, carriers: frozenset[str]) -> None:
     """observe, observe_rate where the derivative exists, observe_scale: the sum of the terms' magnitudes."""
     for quantity in model.quantities:
-        expression = resolve(model, carriers, quantity.expression)
+        expression = read(model, carriers, quantity.expression)
         try:
             slope: Node | None = time_derivative(expression)
         except ValueError:
@@ -56,13 +63,14 @@ def add_observations(assembly: Assembly, model: EnergyModel, carriers: frozenset
 
 
 def _scale(expression: Node) -> Node:
-    """The magnitude of a term; that of the audit's balance is what went round."""
-    read = {n: add(*(call("abs", var(k, "audit")) for k in TURNED)) for n in _balances(expression)}
+    """The magnitude of a term; that of the audit's balance is what went round, of norms of scaled rows one."""
+    read = {n: add(*(call("abs", var(k, "audit")) for k in TURNED)) for n in _meters(expression, ("energy",))}
+    read |= {n: const(1.0) for n in _meters(expression, ("constraints", "drift"))}
     return call("abs", substitute(expression, read) if read else expression)
 
 
-def _balances(expression: Node) -> list[Node]:
-    return [n for n in variables(expression) if n.op == "var" and n.data[:2] == ("energy", "audit")]
+def _meters(expression: Node, names: tuple[str, ...]) -> list[Node]:
+    return [n for n in variables(expression) if n.op == "var" and n.data[1] == "audit" and n.data[0] in names]
 
 
 def pins_and_equations(

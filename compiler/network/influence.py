@@ -63,6 +63,8 @@ def _quantity(node: Node, unknowns: set[str]) -> Quantity:
             return "u", name
         case "q" | "f" | "p" | "e":
             return "x", name
+        case _ if kind[0] == "x":
+            return "x", name
     return (kind[0], name) if kind[0] in "nb" else EVERYTHING
 
 

@@ -53,6 +53,9 @@ MEMBERS = {function.member: function for function in STATE_FUNCTIONS.values()}
 LETTERS = {"e": "effort", "f": "flow", "p": "momentum", "q": "displacement"}
 """The variables of the diagram."""
 
+EFFORT_CLASSES = ("inertial", "potential", "dissipative", "source", "implicit", "constraint")
+"""The efforts that act on a displacement coordinate; their sum is zero."""
+
 REFLECTED = {"e": "f", "f": "e", "p": "q", "q": "p"}
 """The reflection that exchanges the families."""
 

@@ -14,7 +14,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Domain
-from sysdyn.dsl.model.paynter import MEMBERS
+from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
 from sysdyn.dsl.names.context import Failed, Part, Quadrature, SeveralError, Use, Value
 from sysdyn.dsl.names.names import Names
@@ -41,7 +41,7 @@ from sysdyn.dsl.names.symbols import (
 from sysdyn.dsl.tree import syntax
 
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
-AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE}
+AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE, "drift": NONE}
 RATES = ("dot", "der", "d", "dt", "prime")
 """Members by which other languages write a rate."""
 BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
@@ -283,10 +283,16 @@ class Members(Names):
         if e.name == rate:
             node = ex.var(family, "p", *at, order=1)
             return self._changed(Typed(node, units[rate].dimension), base.change)
+        if e.name in EFFORT_CLASSES and not co:
+            return self._changed(self._effort(family, "x", at, units["e"].dimension, e), base.change)
         if e.name not in kinds:
-            raise self.no_member(symbol.name, e, ("q", "f", "p", "e"))
+            raise self.no_member(symbol.name, e, ("q", "f", "p", "e", *(() if co else EFFORT_CLASSES)))
         kind, dimension = kinds[e.name]
         return self._changed(Typed(ex.var(family, kind, *at), dimension), base.change)
+
+    def _effort(self, family: str, kind: str, at: tuple[Node, ...], dimension: Dimension, e: syntax.Member) -> Typed:
+        """The effort of a class that acts on a displacement coordinate."""
+        return Typed(ex.var(family, f"{kind}:{e.name}", *at), dimension)
 
     def node_quantity(self, end: End, e: syntax.Member) -> Typed:
         """Member e of a common-effort node, q and f of a common-flow node."""
@@ -301,8 +307,12 @@ class Members(Names):
         kinds = {"q": ("nq", domain.displacement.dimension), "f": ("nf", domain.flow.dimension)}
         kinds["p"] = ("np", domain.momentum.dimension)
         kinds["e"] = ("np", domain.effort.dimension)  # p' = e
+        if e.name in EFFORT_CLASSES:
+            if end.node is None:
+                raise self.fail("E102", f"'{self._shown(e.base)}' stands still: no effort moves it", e.span)
+            return self._effort(end.node.family.name, "n", end.at, domain.effort.dimension, e)
         if e.name not in kinds:
-            raise self.no_member(self._shown(e.base), e, kinds)
+            raise self.no_member(self._shown(e.base), e, (*kinds, *EFFORT_CLASSES))
         kind, dimension = kinds[e.name]
         if end.node is None:
             return Typed(ex.const(0.0), dimension)
@@ -319,9 +329,23 @@ class Members(Names):
             return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
         if name == "energy":
             return Typed(self._absorbed(symbol, at, power, e), multiply(power, dim.TIME))
+        if name == "p" and self.complete and self._summed(symbol):
+            return Typed(self._impulse(symbol, at, e), branch_dimension(domain, "p"))
         if name in MEMBERS:
             return self._state_function(symbol, at, name, power, e)
         return Typed(ex.var(family.name, f"b{name}", *at), branch_dimension(domain, name))
+
+    def _summed(self, symbol: BranchSymbol) -> bool:
+        """Whether a branch has no momentum of its own: all but kinetic stores."""
+        law = self.laws.get(symbol.family.name)
+        return law is not None and law.kind != "kinetic"
+
+    def _impulse(self, symbol: BranchSymbol, at: tuple[Node, ...], e: syntax.Member) -> Node:
+        """The momentum of a branch without a kinetic store, p' = e: the integral of its effort since the start."""
+        family = symbol.family
+        counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
+        node, unit = ex.var(family.name, "be", *counters), symbol.domain.effort.dimension
+        return self.quadrature(f"{family.name}.p", node, family.whole, unit, at, e)
 
     def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
         """The energy that a branch has absorbed since the start: a quadrature."""

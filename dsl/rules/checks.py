@@ -123,19 +123,23 @@ def accelerations(model: Elaborator, report: Report) -> None:
 
 
 def results(model: Elaborator, report: Report) -> None:
-    """E102: what the audit finds feeds traces and expectations only."""
+    """E102: what the audit finds, and efforts by their class, feed traces and expectations only."""
     parts = model.parts
     read = [(n, w.place) for w in parts.works for n in (w.effort, w.on)]
     read += [(c.expression, c.place) for c in parts.constraints] + [(d.expression, d.place) for d in parts.dynamics]
     read += [(n, i.place) for i in parts.initials for n in (i.target, i.value)]
     read += [(b.law, b.place) for b in parts.branches if b.law is not None]
-    read += [(c.ratio, c.place) for c in parts.couplings]
+    read += [(c.ratio, c.place) for c in parts.couplings] + [(e.expression, e.place) for e in parts.energies]
     for node, place in read:
         found = unknowns_of(node, "audit")
         if found:
             name = f"audit.{found[0].data[0]}"
             help_ = "its expression, or a state that integrates the power"
             report.error("E102", f"{name} is a result: no law can read it", place, help=help_)
+        classes = [n for n in unknowns_of(node) if ":" in n.data[1]]
+        if classes:
+            name = f"{classes[0].data[0]}.{classes[0].data[1].partition(':')[2]}"
+            report.error("E102", f"{name} is a result: no law can read it", place, help="the expression of that effort")
 
 
 def smoothness(model: Elaborator, report: Report) -> None:

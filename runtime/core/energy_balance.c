@@ -147,7 +147,9 @@ int sd_energy_balance(sd_energy *energy, double t, double *y, const double *rate
     int cause = sd_underlying_project(energy->underlying, t, y, rate);
     if (cause || !energy->audit)
         return cause;
+    double drift = energy->underlying->drift;
     cause = balance(energy, t, y, rate, target);
+    energy->underlying->drift = drift;
     work(energy, t, energy->base, y, rate);
     for (int32_t k = 2; k < energy->audited; k++)
         gained[k] += energy->work[k];

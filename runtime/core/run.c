@@ -201,9 +201,10 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     double energy = out[0] + out[1] - run->stored + dissipated - supplied;
     double constraints = run->settle ? run->settle->constraints : 0.0;
     double head[SD_ROW_HEAD] = {label, kind, out[0], out[1], dissipated, supplied, energy, constraints};
-    double behind[6] = {energy, out[0], out[1], dissipated, supplied, constraints};
+    double drift = fmax(run->settle ? run->settle->drift : 0.0, run->projected && run->started ? *run->projected : 0.0);
+    double behind[7] = {energy, out[0], out[1], dissipated, supplied, constraints, drift};
     memcpy(row, head, sizeof head);
-    for (int k = 0; k < 6; k++)
+    for (int k = 0; k < 7; k++)
         if (run->audit_at[k] >= 0) {
             run->point[run->audit_at[k]] = behind[k];
             run->point_d[run->audit_at[k]] = 0.0;

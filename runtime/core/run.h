@@ -38,7 +38,8 @@ typedef struct sd_run {
     int32_t audited;                  /* rows of block audit */
     const sd_call *audit;             /* NULL: no audit block */
     const sd_call *observe, *observe_rate, *observe_scale;   /* NULL where missing */
-    const int32_t *audit_at;          /* [6] places of energy, kinetic, potential, dissipated, supplied, constraints */
+    const int32_t *audit_at;          /* [7] places of energy, kinetic, potential, dissipated, supplied, constraints,
+                                         * drift */
     const double *instant;            /* [instants] ascending, within the span */
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
@@ -63,6 +64,7 @@ typedef struct sd_run {
     double t_to;                      /* end of what counts of the last step */
     const double *magnitude;          /* [n] of the unknowns at steps; NULL: not looked at */
     double beyond;                    /* largest |unknown| of a row within a step, in these magnitudes */
+    const double *projected;          /* drift of the last step before the method itself projected it; NULL: it does not */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,

@@ -154,6 +154,7 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, double *
     int fresh = !settle->ready, failed = fresh && factorise(settle, t, y, yd);
     double moved = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     *best = before;
+    settle->drift = settle->constraints;
     memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
         if (moved < SMALL && before <= fmax(EXACT, settle->enough))

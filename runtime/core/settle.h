@@ -37,6 +37,7 @@ typedef struct sd_settle {
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
                                         rate of another; norm of the constraint rows */
     int64_t calls, failures;
+    double drift;                    /* norm of the constraint rows before the last call moved the point */
 } sd_settle;
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);

@@ -157,6 +157,8 @@ static int onto(sd_underlying *u, sd_system *rows, int displacements, double t, 
                 y[k] += u->step[j];
                 size = fmax(size, fabs(u->step[j]) / (u->magnitude[k] + fabs(y[k])));
             }
+        if (m == 0)
+            u->drift = fmax(u->drift, size);
         if (size <= EXACT || (m > 0 && size * size <= EXACT * before))
             return SD_FINE;
         if (m > 0 && size > STAGNANT * before)
@@ -182,6 +184,7 @@ int sd_underlying_project(sd_underlying *u, double t, double *y, const double *y
 {
     int cause = SD_FINE;
     for (int fresh = 0; fresh < 2; fresh++) {
+        u->drift = 0.0;
         if (!u->ready && (cause = factorise(u, t, y, yd)))
             return cause;
         cause = u->position ? onto(u, u->position, 1, t, y) : SD_FINE;

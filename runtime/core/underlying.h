@@ -36,6 +36,7 @@ typedef struct sd_underlying {
     double tolerance;            /* of Newton's iteration, in magnitudes */
     double *jy, *jyd, *values, *r, *step, *rest, *memory;
     int32_t ready, bad_row, bad_column;
+    double drift;                /* how far the last projection moved first, in magnitudes */
 } sd_underlying;
 
 sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear);

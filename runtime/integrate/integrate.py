@@ -25,6 +25,7 @@ from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.integrate.unknown_roles import Roles, roles
 from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model import core_structures as structures
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise, unresolved
@@ -143,10 +144,19 @@ class Integration:
         if request.method == "energy":
             self._audit = self.system.observer("audit")
             method.audit = None if self._audit is None else c.addressof(self._audit)
+        self._project: Settler | None = None
         if self.underlying is None and self.system.form.name in PROJECTED:
             self._project = self._settler("constraints", np.ones(self.system.form.written, dtype=bool))
             method.project = self._project.address
         self.method.start(self.start.t, self.y, self.yd)
+
+    def _projected(self) -> int | None:
+        """Address of what the last step was off the constraints before its method projected it."""
+        if self.underlying is not None:
+            return c.addressof(self.underlying.core.contents) + structures.Underlying.drift.offset
+        if self._project is not None:
+            return c.addressof(self._project.core.contents) + structures.Settle.drift.offset
+        return None
 
     def _driver(self) -> None:
         request, system = self.request, self.system
@@ -173,8 +183,8 @@ class Integration:
             run.least_norm = self._least_norm.address
         for name, call in self._calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
-        self._audit_at = np.full(6, -1, dtype=np.int32)
-        order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
+        self._audit_at = np.full(7, -1, dtype=np.int32)
+        order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
         for k in system.description.families_of("audit"):
             name = system.description.families[k].name.rsplit(".", 1)[-1]
             if name in order:
@@ -192,6 +202,7 @@ class Integration:
         run.sample_steps = int(request.sample_steps)
         if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
+        run.projected = self._projected()
         run.row, run.room = lib.pointer(self._rows), self._rows.shape[0]
 
     def drain(self, sink: Sink) -> None:

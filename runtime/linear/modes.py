@@ -10,10 +10,13 @@ first Markov parameter m that is not zero), the motion that keeps the output at 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.linear import precise
+from sysdyn.runtime.linear.precise import Decomposed
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import count, decomposed
@@ -23,6 +26,8 @@ VANISHING = 1e-11
 """A Markov parameter below this part of its factors' size is zero."""
 FAINT = 1e-24
 """The same beside the largest of its factors: a product of two round-offs."""
+FAR = 1e6
+"""Of the fastest pole: a zero beyond that moves with round-off has no place."""
 APART = 1e3
 """Ratio of the largest to the smallest eigenvalue from which the small ones are taken of the inverse."""
 DEFECTIVE = 1e11
@@ -64,17 +69,24 @@ def balanced(a: Floats) -> tuple[Floats, Floats]:
     return np.asarray(found), np.asarray(scale)
 
 
-def modes(a: Floats) -> tuple[Mode, ...]:
-    """The modes of x' = a x, by rising real part, then imaginary part."""
+def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Mode, ...]:
+    """The modes of x' = a x, by rising real part, then imaginary part; precisely: of a in many digits."""
     if not a.size:
         return ()
+    if precisely is not None:
+        share = np.abs(precisely.right * precisely.left.T)
+        total = share.sum(axis=0)
+        return _sorted(precisely.values, share / np.where(total > 0.0, total, 1.0))
     inner = balanced(a)[0]
     values, right = np.linalg.eig(inner)
     values = _resolved(_sharpened(values, inner), inner)
     share = np.abs(right) ** 2
     if np.linalg.cond(right) < DEFECTIVE:
         share = np.abs(right * np.linalg.inv(right).T)
-    share = share / share.sum(axis=0)
+    return _sorted(values, share / share.sum(axis=0))
+
+
+def _sorted(values: Complexes, share: Floats) -> tuple[Mode, ...]:
     order = sorted(range(values.size), key=lambda k: (round(float(values[k].real), 12), float(values[k].imag)))
     return tuple(_mode(complex(values[k]), share[:, k]) for k in order)
 
@@ -125,6 +137,26 @@ def transfer(
     zeros = _at_origin(inner, b, c, d, zeros)
     poles = np.linalg.eigvals(inner).astype(complex) if inner.size else np.zeros(0, complex)
     poles = _resolved(_sharpened(poles, inner), inner)
+    poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
+    return Transfer(*place, poles, zeros, gain, _static(poles, zeros, gain), improper)
+
+
+def wide_transfer(
+    one: Sequence[precise.Wide], other: Sequence[precise.Wide], place: tuple[int, int], improper: tuple[float, float]
+) -> Transfer:
+    """The same of a, b [states], c [states], d in many digits; other: with the round-off of the rows changed.
+
+    Roots that move with it are at zero where they are small, and at infinity where they are large.
+    """
+    zeros, poles, gain = precise.rational(*one)
+    zeros2, poles2, _ = precise.rational(*other)
+    fastest = float(np.abs(poles).max(initial=0.0))
+    if zeros.size == zeros2.size:
+        loose = precise.apart(zeros, zeros2) > precise.DETERMINED
+        far = loose & (np.abs(zeros) > FAR * fastest)
+        zeros, gain = np.where(loose & ~far, 0.0, zeros)[~far], gain * float(np.prod(-zeros[far]).real)
+    if poles.size == poles2.size:
+        poles = np.where(precise.apart(poles, poles2) > precise.DETERMINED, 0.0, poles)
     poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
     return Transfer(*place, poles, zeros, gain, _static(poles, zeros, gain), improper)
 

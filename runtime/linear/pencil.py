@@ -11,13 +11,20 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced
+from sysdyn.runtime.linear import precise
+from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced, Wide, lost
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import TOLERANCE, count, decomposed, null_space
 
 CLOCKS = (0, 3, 6, 9, 12, -3, -6)
 """Powers of ten of the units of time that are tried, 1/s."""
+WIDEST = 60
+"""Unknowns up to which the pencil is parted in many digits."""
+SHIFT = 0.7391
+"""Of the size of rates: a point that is no eigenvalue."""
+DOUBLINGS, DEEPEST = 2, 4
+"""M^4 is zero on what follows from inputs: no index is higher."""
 Choice = NDArray[np.int64]
 
 
@@ -115,6 +122,84 @@ def parted(
     d2 = c2 @ follow[2] + c2d @ follow[1]
     small = (_clean(part) for part in (turn @ m @ back, turn @ b1, c1 @ back, d0, d1, d2))
     return Reduced(next(small), next(small), next(small), next(small), next(small), next(small), chosen, names)
+
+
+def surely_parted(
+    matrices: tuple[Floats, ...], chosen: Choice, spaces: tuple[Floats, Floats, Floats], names: tuple[str, ...]
+) -> Reduced:
+    """The same; in many digits where eigenvalues in double precision are lost beside each other.
+
+    Raises NoLinearisation where they are lost for good.
+    """
+    small = parted(matrices, chosen, spaces, names)
+    e, a, *rest = matrices
+    other = precise.shaken(e), precise.shaken(a)
+    again = parted((*other, *rest), chosen, spaces, names)
+    values, others = (precise.eigenvalues(part.a) for part in (small, again))
+    if precise.steady(values, others):
+        return small
+    if 0 < chosen.size <= precise.MOST and e.shape[0] <= WIDEST:
+        with precise.digits():
+            found, beside = (_parted_widely(part, chosen) for part in (matrices, (*other, *rest)))
+            if found is not None and beside is not None:
+                seen = precise.settled(precise.decompose(found[0]), precise.decompose(beside[0]).values, lost)
+                a, b, c, d, d1, d2 = (precise.narrow(part) for part in found)
+                wide = Wide(found[0], found[1], found[2], found[3], Wide(beside[0], beside[1], beside[2], beside[3]))
+                return Reduced(a, b, c, d, d1, d2, chosen, names, wide, seen)
+    precise.refuse_lost(values, others, lost)
+    return small
+
+
+def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precise.Wide, ...] | None:
+    """a, b, c, d, d1, d2 in many digits.  With M = (A - s E)^-1 E, N = (A - s E)^-1 B at a point s that is no
+    eigenvalue the motions are the image X of a power of M, what follows from inputs its null space (Drazin's inverse),
+
+        M X = X m,  L X = 1:   z' = (1/m + s) z + 1/m L N u,   M w' = (1 + s M) w + (1 - X L) N u
+
+    where X is 1 in the chosen places.  None where round-off hides how many motions there are.
+    """
+    e, a, b, c, cd, d = (precise.wide(part) for part in matrices)
+    column = 2.0 ** np.round(np.log2(factors(matrices[0], matrices[1])[1]))  # powers of two change no digit
+    e, a, c, cd = (part * column for part in (e, a, c, cd))
+    n, states = e.shape[0], chosen.size
+    shift = SHIFT * _size(matrices)
+    if (both := precise.solved(a - shift * e, np.hstack([e, b]))) is None:
+        return None
+    m, nu = both[:, :n], both[:, n:]
+    power = m
+    for _ in range(DOUBLINGS):
+        power = power @ power
+    random = np.random.default_rng(1)
+    spanned = power @ precise.wide(random.standard_normal((n, states)))
+    seen = precise.wide(random.standard_normal((states, n))) @ power
+    own = precise.wide(np.eye(states))
+    if (turned := precise.solved((spanned * column[:, None])[chosen].T, spanned.T)) is None:
+        return None
+    x = turned.T
+    if (left := precise.solved(seen @ x, seen)) is None:
+        return None
+    if (back := precise.solved(left @ m @ x, np.hstack([own, left @ nu]))) is None:
+        return None
+    own, b1 = back[:, :states] + shift * own, back[:, states:]
+    still = precise.wide(np.eye(n)) - x @ left
+    if np.abs(still @ power).max() > precise.ZERO * np.abs(power).max():
+        return None
+    nilpotent = still @ m
+    inverse = precise.wide(np.eye(n))
+    for _ in range(DEEPEST):
+        inverse = precise.wide(np.eye(n)) - shift * (nilpotent @ inverse)
+    follow = [-(inverse @ still @ nu)]
+    for _ in range(2):
+        follow.append(inverse @ nilpotent @ follow[-1])
+    d0 = d + c @ follow[0] + cd @ x @ b1
+    d1, d2 = (c @ follow[k] + cd @ follow[k - 1] for k in (1, 2))
+    return own, b1, c @ x + cd @ x @ own, d0, d1, d2
+
+
+def _size(matrices: tuple[Floats, ...]) -> float:
+    """A rate among those of a pencil, 1/s."""
+    e, a = (np.abs(part[part != 0.0]) for part in matrices[:2])
+    return float(np.exp(np.log(a).mean() - np.log(e).mean())) if e.size and a.size else 1.0
 
 
 def _clean(matrix: Floats) -> Floats:

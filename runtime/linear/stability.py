@@ -59,7 +59,7 @@ def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, tog
     near = STILL * float(np.abs(values).max(initial=0.0))
     values = values[np.argsort(np.abs(values))]
     values = values[min(together, int((np.abs(values) <= near).sum())) :]
-    found = modes(small.a)
+    found = modes(small.a, small.decomposed)
     if (values.real > near).any():
         return Verdict("unstable", "linearisation", found, energy)
     if (values.real < -near).all():

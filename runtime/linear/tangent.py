@@ -16,12 +16,15 @@ Receives a System, a consistent state, the slopes by inputs and of outputs.  Han
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.linear import precise
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
@@ -66,7 +69,8 @@ class Outputs:
 class Reduced:
     """dx' = a dx + b du, dy = c dx + d du + d1 du' + d2 du''; places [states]: of the states in y, names: theirs.
 
-    A state may be a combination where an input or its rate moves it: see the module.
+    A state may be a combination where an input or its rate moves it: see the module.  wide: the same where double
+    precision loses slow eigenvalues; decomposed: its eigenvalues and eigenvectors.
     """
 
     a: Floats
@@ -77,6 +81,19 @@ class Reduced:
     d2: Floats
     places: NDArray[np.int64]
     names: tuple[str, ...]
+    wide: Wide | None = None
+    decomposed: precise.Decomposed | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Wide:
+    """a, b, c, d of a reduction in many digits; beside: with the round-off of the rows changed."""
+
+    a: precise.Wide
+    b: precise.Wide
+    c: precise.Wide
+    d: precise.Wide
+    beside: Wide | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,8 +226,67 @@ def reduced(
     inputs = len(names)
     right = np.zeros((g.shape[0], chosen.size + ORDERS * inputs))
     right[:, chosen.size :] = -starter.with_sums(np.hstack(by_input))[rows.holds]
-    moved = _moved(g, right, chosen, moves)
-    return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose)
+
+    def made(moved: NDArray[Any], noise: float = NOISE) -> Reduced:
+        return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose, noise)
+
+    small = made(_moved(g, right, chosen, moves))
+    again = precise.shaken(g)
+    values, others = (np.linalg.eigvals(part) for part in (small.a, made(_moved(again, right, chosen, moves)).a))
+    if precise.steady(values[values != 0.0], others[others != 0.0]):
+        return small
+    return _widened(small, made, (g, again, right, chosen, moves))
+
+
+def _widened(
+    small: Reduced,
+    made: Callable[[NDArray[Any], float], Reduced],
+    given: tuple[Floats, Floats, Floats, NDArray[np.int64], Floats],
+) -> Reduced:
+    """The reduction in many digits, where its states are few and the rows determine all; else in double precision,
+    if its eigenvalues can be told from zero.
+    """
+    g, again, right, chosen, moves = given
+    if small.names and len(small.names) <= precise.MOST:
+        with precise.digits():
+            one, other = (_moved_widely(part, right, chosen, moves) for part in (g, again))
+            if one is not None and other is not None:
+                found, beside = (made(part, precise.NOTHING) for part in (one, other))
+                parts = _wide(found, _wide(beside))
+                values = precise.decompose(np.asarray(beside.a, dtype=object)).values
+                seen = precise.settled(precise.decompose(parts.a), values, lost)
+                matrices = (found.a, found.b, found.c, found.d, found.d1, found.d2)
+                a, b, c, d, d1, d2 = map(precise.narrow, matrices)
+                return Reduced(a, b, c, d, d1, d2, found.places, found.names, parts, seen)
+    again_ = made(_moved(again, right, chosen, moves), NOISE)
+    precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(again_.a), lost)
+    return small
+
+
+def _wide(small: Reduced, beside: Wide | None = None) -> Wide:
+    a, b, c, d = (np.asarray(part, dtype=object) for part in (small.a, small.b, small.c, small.d))
+    return Wide(a, b, c, d, beside)
+
+
+def lost(value: complex) -> NoLinearisation:
+    """What is said of an eigenvalue that round-off hides."""
+    return NoLinearisation(f"the eigenvalue near {abs(value):.3g} 1/s is lost in the round-off of the fastest")
+
+
+def _moved_widely(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -> precise.Wide | None:
+    """The variations of `_moved` in many digits; None where the rows leave one open."""
+    rest = np.setdiff1d(np.arange(g.shape[1]), chosen)
+    aim = precise.wide(right)
+    aim[:, : chosen.size] -= precise.wide(g[:, chosen])
+    # powers of two change no digit
+    scale: Floats = np.exp2(np.round(np.log2(moves[rest]))).astype(np.float64)
+    found = precise.wide(np.zeros((g.shape[1], right.shape[1])))
+    solved = precise.eliminated(g[:, rest] * scale, aim)
+    if solved is None:
+        return None
+    found[rest] = precise.wide(scale)[:, None] * solved
+    found[chosen, np.arange(chosen.size)] += 1
+    return found
 
 
 def _moved(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -> Floats:
@@ -278,7 +354,7 @@ def _refuse_undetermined(
 
 
 def _without_rates_of_inputs(
-    moved: Floats,
+    moved: NDArray[Any],
     rates: NDArray[np.int64],
     starter: Starter,
     system: System,
@@ -286,15 +362,16 @@ def _without_rates_of_inputs(
     inputs: tuple[str, ...],
     out: Outputs,
     loose: Mask,
+    noise: float,
 ) -> Reduced:
     """The matrices of variations `moved` [z, states and inputs and their rates]."""
     states, n = chosen.size, starter.n
-    yd = np.zeros((n, moved.shape[1]))
+    yd = np.zeros((n, moved.shape[1]), dtype=moved.dtype)
     yd[starter.rates] = moved[n:]
     yd[system.form.k_q] = moved[system.form.k_f]
     seen = out.by_y @ moved[:n] + out.by_rate @ yd
     size = np.abs(out.by_y) @ np.abs(moved[:n]) + np.abs(out.by_rate) @ np.abs(yd)
-    seen = np.where(np.abs(seen) > NOISE * size, seen, 0.0)
+    seen = np.where(np.abs(seen) > noise * size, seen, 0.0)
     slopes = moved[rates]
     slopes[:, :states][:, loose[chosen]] = 0.0
     cut = [0, states, *(states + k * len(inputs) for k in range(1, ORDERS + 1))]

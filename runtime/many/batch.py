@@ -231,7 +231,7 @@ class Batch:
         made, system = self.passes[k], self.system
         core = made.method.contents
         states = [(c.addressof(core), c.sizeof(core)), (c.addressof(made.run_.contents), c.sizeof(lib.Run))]
-        settlers = [made.settler, *([made._project] if hasattr(made, "_project") else [])]
+        settlers = [made.settler, *([made._project] if made._project is not None else [])]
         zero = [lib.core.sd_linear_pivoted(made.linear)]
         for settler in settlers:
             states += self._settled(settler)

@@ -229,6 +229,7 @@ class Underlying(c.Structure):
         ("tolerance", _D),
         *[(name, _P) for name in ["jy", "jyd", "values", "r", "step", "rest", "memory"]],
         *[(name, _I) for name in ["ready", "bad_row", "bad_column"]],
+        ("drift", _D),
     ]
 
 
@@ -331,6 +332,7 @@ class Settle(c.Structure):
         ("constraints", _D),
         ("calls", _L),
         ("failures", _L),
+        ("drift", _D),
     ]
 
 
@@ -420,6 +422,7 @@ class Run(c.Structure):
         ("t_to", _D),
         ("magnitude", _P),
         ("beyond", _D),
+        ("projected", _P),
     ]
 
 

@@ -99,7 +99,7 @@ def test_a_series_circuit_in_every_formulation(formulation, tmp_path, capsys):
     assert by_output["v"]["static"] == pytest.approx(1.0, rel=CLOSE)
 
 
-@pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.parametrize("formulation", ALL)
 def test_contrasts_of_many_decades(formulation, tmp_path, capsys):
     """Each eigenvalue to 1e-10 of itself, the slow one beside one up to 1e13 times as fast; gain and zeros too."""
     path = write(tmp_path, RLC)

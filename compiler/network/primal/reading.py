@@ -37,13 +37,15 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.network import Loop
-from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
+from sysdyn.dsl.model.paynter import EFFORT_CLASSES, STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 Result = TypeVar("Result")
 FUNCTIONS = frozenset(f"b{name}" for name in STATE_FUNCTIONS)
 """State functions of branches."""
-KINDS = frozenset(("be", "bf", "bq", "bp", "ne", "nf", "nq", "np")) | FUNCTIONS
+CLASSES = frozenset(f"n:{name}" for name in EFFORT_CLASSES)
+"""Efforts by class at common-flow nodes."""
+KINDS = frozenset(("be", "bf", "bq", "bp", "ne", "nf", "nq", "np")) | FUNCTIONS | CLASSES
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +202,8 @@ class Reader:
         inside = (*active, node)
         if kind in ("nq", "nf", "np"):
             return var(name, kind[1], *node.args, order=order)
+        if kind in CLASSES:
+            return var(name, f"x{kind[1:]}", *node.args)
         if kind == "ne":
             return self.book.nodes(self, node, ranges, inside)
         if order:

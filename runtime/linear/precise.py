@@ -1,0 +1,194 @@
+"""Eigenvalues many decades apart: the reduction and its modes in many digits, and a witness that they are needed.
+
+A slow eigenvalue beside a fast one is a difference of large entries of A: the entries of G determine it, A in double
+precision does not.  The witness: the same in double precision with each magnitude of G changed by round-off.  What
+moves with it is sought again, eliminated in DIGITS; what moves even then is zero where it is round-off of the
+largest, else it is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+
+Wide = NDArray[Any]
+"""An array of mpf or mpc."""
+Values = NDArray[np.complex128]
+DIGITS = 120
+NOTHING = 1e-80
+"""A pivot, in DIGITS: what is below is zero."""
+ZERO = 1e-40
+"""An eigenvalue relative to the largest entry, in DIGITS."""
+STEADY = 1e-11
+"""Relative change with the round-off of G up to which eigenvalues in double precision are believed."""
+DETERMINED = 1e-4
+"""The same of eigenvalues in DIGITS: a threefold root moves by the cube root of round-off."""
+LOST, CROWDED = 1e-6, 1e6
+"""Change of an eigenvalue in double precision for which it is refused, where it stands below 1e-4 of the largest."""
+ROUND_OFF = 1e-13
+"""Of the largest: an eigenvalue at zero that round-off may have moved; the n-th root of it where n of them are."""
+CANCELS = 1e-12
+"""Relative distance of a zero to a pole, the round-off of G."""
+MOST = 24
+"""States up to which modes are taken in DIGITS."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decomposed:
+    """Eigenvalues [n], right and left eigenvectors [n, n] (columns, rows)."""
+
+    values: Values
+    right: NDArray[np.complex128]
+    left: NDArray[np.complex128]
+
+
+def digits() -> Any:
+    """The precision in which wide arrays are worked on, as a context."""
+    return mpmath.workdps(DIGITS)
+
+
+def shaken(matrix: Floats, seed: int = 3) -> Floats:
+    """Each magnitude changed by a round-off of its own, integers kept."""
+    size, place = np.unique(np.abs(matrix), return_inverse=True)
+    moved = size * (1.0 + 1e-15 * np.random.default_rng(seed).uniform(-1.0, 1.0, size.size))
+    moved = np.where(size == np.round(size), size, moved)
+    return np.copysign(moved[place].reshape(matrix.shape), matrix)
+
+
+def wide(matrix: Floats) -> Wide:
+    """The same numbers as mpf."""
+    return np.array([mpmath.mpf(float(x)) for x in matrix.ravel()], dtype=object).reshape(matrix.shape)
+
+
+def narrow(matrix: Wide) -> Floats:
+    """Rounded to doubles."""
+    return np.asarray(matrix.astype(np.float64))
+
+
+def eliminated(matrix: Floats, aim: Wide) -> Wide | None:
+    """X [n, k] of consistent equations matrix [m, n] X = aim [m, k]; None where they leave one open."""
+    rows = wide(matrix)
+    size = np.abs(matrix).max(axis=1, initial=0.0)
+    used = size > 0.0
+    return _eliminated(np.hstack([rows, aim])[used] / wide(size[used])[:, None], matrix.shape[1])
+
+
+def _eliminated(full: Wide, n: int) -> Wide | None:
+    """Gauss's elimination of [m, n + k]."""
+    for k in range(n):
+        place = k + int(np.argmax(np.abs(full[k:, k]))) if full.shape[0] > k else k
+        if place >= full.shape[0] or abs(full[place, k]) < NOTHING:
+            return None
+        full[[k, place]] = full[[place, k]]
+        below = np.flatnonzero(full[k + 1 :, k] != 0) + k + 1
+        full[below, k:] -= (full[below, k] / full[k, k])[:, None] * full[k, k:]
+    found = full[:n, n:].copy()
+    for k in range(n - 1, -1, -1):
+        found[k] = (found[k] - full[k, k + 1 : n] @ found[k + 1 :]) / full[k, k] if k + 1 < n else found[k] / full[k, k]
+    return np.asarray(found)
+
+
+def solved(matrix: Wide, aim: Wide) -> Wide | None:
+    """X [n, k] of matrix [n, n] X = aim [n, k]; None where the matrix is singular."""
+    size = [max((abs(x) for x in row), default=0) for row in matrix]
+    if not all(size):
+        return None
+    return _eliminated(np.hstack([matrix, aim]) / np.array(size, dtype=object)[:, None], matrix.shape[1])
+
+
+def decompose(matrix: Wide) -> Decomposed:
+    """Eigenvalues and eigenvectors in DIGITS, those below ZERO of the largest entry zero."""
+    with digits():
+        found, left, right = mpmath.mp.eig(mpmath.matrix(matrix.tolist()), left=True, right=True)
+        largest = max((abs(x) for x in matrix.ravel()), default=mpmath.mpf(0))
+        values = [v if abs(v) > ZERO * largest else mpmath.mpf(0) for v in found]
+        return Decomposed(
+            np.array([complex(v) for v in values]),
+            np.array([complex(x) for x in right]).reshape(right.rows, right.cols),
+            np.array([complex(x) for x in left]).reshape(left.rows, left.cols),
+        )
+
+
+def apart(one: Values, other: Values) -> NDArray[np.float64]:
+    """Relative distance of each value [n] to its partner in another set of as many, nearest first."""
+    left = list(range(other.size))
+    found = np.zeros(one.size)
+    for k in np.argsort(-np.abs(one)):
+        near = min(left, key=lambda j: abs(other[j] - one[k]))
+        left.remove(near)
+        size = max(abs(one[k]), abs(other[near]))
+        found[k] = abs(one[k] - other[near]) / size if size > 0.0 else 0.0
+    return found
+
+
+def steady(values: Values, again: Values) -> bool:
+    """Whether eigenvalues in double precision are not lost beside each other."""
+    return values.size == again.size and bool((apart(values, again) <= STEADY).all()) and bool((values != 0).all())
+
+
+def refuse_lost(values: Values, again: Values, refuse: Callable[[complex], Exception]) -> None:
+    """Raises refuse(value) of an eigenvalue in double precision that moves with round-off and is none."""
+    away = apart(values, again) if values.size == again.size else np.ones(values.size)
+    least = 1e-10 * float(np.abs(values).max(initial=0.0))
+    slow = np.flatnonzero((away > LOST) & (np.abs(values) > least) & (np.abs(values) < CROWDED * least))
+    if slow.size:
+        raise refuse(complex(values[slow[0]]))
+
+
+def settled(found: Decomposed, again: Values, refuse: Callable[[complex], Exception]) -> Decomposed:
+    """The modes, zero where an eigenvalue is round-off of the largest; raises refuse(value) of one that is neither."""
+    moved = np.flatnonzero(apart(found.values, again) > DETERMINED)
+    values = found.values.copy()
+    least = ROUND_OFF ** (1.0 / max(moved.size, 1)) * float(np.abs(values).max(initial=0.0))
+    for k in moved:
+        if not abs(values[k]) <= least:
+            raise refuse(complex(values[k]))
+        values[k] = 0.0
+    return Decomposed(values, found.right, found.left)
+
+
+def eigenvalues(matrix: Floats) -> Values:
+    """In double precision."""
+    return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+
+
+def rational(a: Wide, b: Wide, c: Wide, d: Any) -> tuple[Values, Values, float]:
+    """Zeros, poles and leading coefficient of c (s - a)^-1 b + d, without what cancels (Leverrier and Faddeev)."""
+    with digits():
+        n, above, below, power = b.size, [], [mpmath.mpf(1)], wide(np.eye(b.size))
+        for k in range(1, n + 1):
+            above.append(c @ power @ b)
+            power = a @ power
+            below.append(-sum(power.diagonal()) / k)
+            power = power + below[-1] * wide(np.eye(n))
+        top = [d * x for x in below]
+        top = [top[0], *(x + y for x, y in zip(top[1:], above, strict=True))]
+        largest = max((abs(x) for x in top), default=mpmath.mpf(0))
+        while top and abs(top[0]) <= ZERO * largest:
+            top = top[1:]
+        if not top:
+            return np.zeros(0, complex), np.zeros(0, complex), 0.0
+        zeros, poles = _roots(top), _roots(below)
+        for zero in list(zeros):
+            near = min(poles, key=lambda p: abs(p - zero), default=None)
+            if near is not None and abs(near - zero) <= CANCELS * max(abs(near), abs(zero)):
+                zeros.remove(zero)
+                poles.remove(near)
+        return np.array([complex(z) for z in zeros]), np.array([complex(p) for p in poles]), float(top[0])
+
+
+def _roots(coefficients: list[Any]) -> list[Any]:
+    """Roots of a polynomial, highest power first; zero where its last coefficients are."""
+    largest = max(abs(x) for x in coefficients)
+    last = len(coefficients)
+    while last > 1 and abs(coefficients[last - 1]) <= ZERO**2 * largest:
+        last -= 1
+    none = [mpmath.mpf(0)] * (len(coefficients) - last)
+    kept = coefficients[:last]
+    return none + (list(mpmath.polyroots(kept, maxsteps=400, extraprec=400)) if last > 1 else [])

@@ -1,0 +1,199 @@
+"""Efforts by class of a coordinate, momenta of all branches, drift: traced by name, against closed forms."""
+
+import numpy as np
+import pytest
+from sysdyn import api
+from texts import run_json, write
+
+PRIMAL = ("lagrangian", "hamiltonian")
+
+ROD = """
+model hanging {
+  param m = 1.13 kg
+  param l = 2.34 m
+  coord x: translation = 1 m
+  coord y: translation ~ -2 m
+  energy T* = 1/2*m*(x'^2 + y'^2)
+  energy V = m*g0*y
+  content D = 1/2*(0.3 N.s/m)*x'^2
+  phi rod: sqrt(x^2 + y^2) = l
+  work 2 N*sin(3 rad/s*t) on x
+}
+scene s of hanging {
+  time 0 s to 1 s
+  trace x, y, x', y', rod.multiplier as k every 0.1 s
+  trace x.inertial, x.potential, x.dissipative, x.source, x.implicit, x.constraint
+  trace y.inertial, y.potential, y.constraint
+  accuracy 1e-6
+}
+"""
+
+
+def traced(path, **options):
+    trace = api.simulate(str(path), backend="numpy", **options)
+    return {name: trace[name].values for name in trace.names} | {"t": trace.time}
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_every_effort_class_of_a_pendulum_that_is_pushed(formulation, tmp_path):
+    path = write(tmp_path, ROD)
+    got = traced(path, formulation=formulation, output=str(tmp_path / "o.h5"))
+    x, y, fx = got["x"], got["y"], got["x'"]
+    close = {"rel": 1e-12, "abs": 1e-12}
+    assert got["x.dissipative"] == pytest.approx(-0.3 * fx, **close)
+    assert got["x.source"] == pytest.approx(2 * np.sin(3 * got["t"]), **close)
+    assert got["x.potential"] == pytest.approx(0 * x, **close)
+    assert got["x.implicit"] == pytest.approx(0 * x, **close)
+    assert got["y.potential"] == pytest.approx(0 * x - 1.13 * 9.80665, **close)
+    assert got["x.constraint"] == pytest.approx(-got["k"] * x / 2.34, **close)
+    assert got["y.constraint"] == pytest.approx(-got["k"] * y / 2.34, **close)
+    # Lagrange's principle: the efforts of a coordinate are in balance
+    for c, kinds in (("x", ("potential", "dissipative", "source", "constraint")), ("y", ("potential", "constraint"))):
+        others = sum(got[f"{c}.{kind}"] for kind in kinds)
+        assert np.abs(got[f"{c}.inertial"] + others).max() < 1e-11
+    # inertial: -m times the acceleration, by the slope of the flow on the circle's tangent
+    along = (got["x.inertial"] * y - got["y.inertial"] * x) / 2.34
+    driven = (got["x.source"] + got["x.dissipative"]) * y / 2.34 + 1.13 * 9.80665 * x / 2.34
+    assert along == pytest.approx(-driven, rel=1e-10, abs=1e-10)
+
+
+NETWORK = """
+from std.mechanical import mass, spring, damper, force
+model two {
+  node a, b: translation
+  M1: mass(m = 2 kg) a
+  M2: mass(m = 3 kg) b
+  K: spring(k = 50 N/m) a -> b
+  K3: potential(e = 4 N/m^3*q^3) b
+  B: damper(b = 0.7 N.s/m) a
+  F: force(F = 2 N*sin(3 rad/s*t)) b
+  init a.f = 1 m/s
+}
+scene s of two {
+  time 0 s to 1 s
+  trace a.q as qa, b.q as qb, a.f as fa, b.inertial, b.potential, b.source, a.dissipative, a.potential, a.inertial
+  trace B.p, F.p, K.p every 0.25 s
+  accuracy 1e-8
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_efforts_at_the_nodes_of_a_network(formulation, tmp_path):
+    path = write(tmp_path, NETWORK)
+    got = traced(path, formulation=formulation, output=str(tmp_path / "o.h5"))
+    qa, qb = got["qa"], got["qb"]
+    assert got["a.potential"] == pytest.approx(-50 * (qa - qb), rel=1e-12, abs=1e-13)
+    assert got["b.potential"] == pytest.approx(50 * (qa - qb) - 4 * qb**3, rel=1e-12, abs=1e-13)
+    assert got["a.dissipative"] == pytest.approx(-0.7 * got["fa"], rel=1e-12, abs=1e-13)
+    assert got["b.source"] == pytest.approx(-2 * np.sin(3 * got["t"]), rel=1e-12, abs=1e-13)
+    assert np.abs(got["a.inertial"] + got["a.potential"] + got["a.dissipative"]).max() < 1e-11
+    assert np.abs(got["b.inertial"] + got["b.potential"] + got["b.source"]).max() < 1e-11
+    # p' = e of branches without a kinetic store, from zero
+    assert got["B.p"] == pytest.approx(0.7 * qa, abs=1e-7)
+    assert got["F.p"] == pytest.approx(2 / 3 * (1 - np.cos(3 * got["t"])), abs=1e-7)
+    assert got["K.p"] == pytest.approx(2 * (1 - got["fa"]) - 0.7 * qa, abs=1e-6)
+
+
+def test_efforts_of_an_array_with_an_implicit_effort(tmp_path):
+    text = """
+    model chain {
+      param n = 3
+      coord q[1..n]: translation = 0.1 m
+      energy T* = sum(i in 1..n: 1/2*(2 kg)*q[i]'^2)
+      energy V = sum(i in 1..n-1: 1/2*(7 N/m)*(q[i+1] - q[i])^2)
+      implicit u: N
+      gamma g: u = -3 N/m*q[1]
+      work u on q[1]
+      init q[2]' = 1 m/s
+    }
+    scene s of chain {
+      time 0 s to 1 s
+      trace q[1], q[2], q[3], q[2].potential as v2, q[1].implicit as u1, q[1].source as s1 every 0.5 s
+      trace sum(i in 1..n: q[i].inertial + q[i].potential + q[i].implicit) as total
+    }
+    """
+    got = traced(write(tmp_path, text), output=str(tmp_path / "o.h5"))
+    assert got["v2"] == pytest.approx(-7 * (2 * got["q[2]"] - got["q[1]"] - got["q[3]"]), rel=1e-12, abs=1e-13)
+    assert got["u1"] == pytest.approx(-3 * got["q[1]"], rel=1e-12)
+    assert (got["s1"] == 0).all()
+    assert np.abs(got["total"]).max() < 1e-12
+
+
+def test_the_reaction_of_a_flow_constraint_is_its_effort(tmp_path):
+    text = """
+    model knife {
+      coord x, y: translation = 0 m
+      coord th: rotation = 0.4 rad
+      energy T* = 1/2*(2 kg)*(x'^2 + y'^2) + 1/2*(0.5 kg.m^2)*th'^2
+      psi edge: x'*sin(th) = y'*cos(th)
+      work 1 N on x
+      init x' = 1 m/s
+      init th' = 0.7 rad/s
+    }
+    scene s of knife {
+      time 0 s to 1 s
+      trace th, edge.multiplier as mu, edge.on(x) as on every 0.2 s
+      trace x.constraint as cx, y.constraint as cy, th.constraint as c3
+    }
+    """
+    for formulation in (*PRIMAL, "kane"):
+        got = traced(write(tmp_path, text), formulation=formulation, output=str(tmp_path / "o.h5"))
+        assert got["cx"] == pytest.approx(-np.sin(got["th"]) * got["mu"], rel=1e-12)
+        assert got["cy"] == pytest.approx(np.cos(got["th"]) * got["mu"], rel=1e-12)
+        assert got["on"] == pytest.approx(got["cx"], rel=1e-12)
+        assert (got["c3"] == 0).all()
+
+
+CIRCUIT = """
+model circuit {
+  node a, b: electrical
+  s: effort(e = 5 V) a -> ground
+  r: dissipator(e = 10 ohm*f) a -> b
+  c: potential(q = 1 mF*e) b -> ground
+}
+scene t of circuit {
+  time 0 s to 50 ms
+  trace r.p as p, s.p as sp, r.D as d, r.G as g, r.f as i every 10 ms
+  accuracy 1e-8
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
+def test_the_momentum_content_and_cocontent_of_a_resistor(formulation, tmp_path):
+    got = traced(write(tmp_path, CIRCUIT), formulation=formulation, output=str(tmp_path / "o.h5"))
+    decay = np.exp(-got["t"] / 0.01)
+    assert got["i"] == pytest.approx(0.5 * decay, abs=1e-8)
+    assert got["p"] == pytest.approx(0.05 * (1 - decay), abs=1e-8)
+    assert got["sp"] == pytest.approx(5 * got["t"], abs=1e-8)
+    assert got["d"] == pytest.approx(5 * got["i"] ** 2, rel=1e-12)
+    assert got["g"] == pytest.approx(got["d"], rel=1e-9)
+
+
+def test_the_drift_is_what_a_projection_removes(tmp_path):
+    text = ROD.replace("trace x, y,", "trace audit.drift as drift, audit.constraints as held, x, y,")
+    path = write(tmp_path, text)
+    largest = {}
+    for method, rtol in (("bdf", 1e-3), ("bdf", 1e-6), ("dopri", 1e-3)):
+        index = "1" if method == "bdf" else "auto"
+        got = traced(path, method=method, index=index, rtol=rtol, output=str(tmp_path / "o.h5"))
+        assert got["held"].max() < 1e-8
+        assert got["drift"][0] < 1e-14
+        largest[method, rtol] = got["drift"].max()
+    assert 1e-7 < largest["bdf", 1e-3] < 1e-2
+    assert largest["bdf", 1e-6] < 0.03 * largest["bdf", 1e-3]  # it follows the tolerance
+    assert 0 < largest["dopri", 1e-3] < 1e-2
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "code"),
+    [
+        (ROD.replace("work 2 N*sin(3 rad/s*t) on x", "work x.potential on y"), (), "E102"),
+        (ROD.replace("x.inertial,", "x.inertia,"), (), "E102"),
+        (NETWORK, ("--formulation", "co_lagrangian"), "E905"),
+    ],
+)
+def test_what_no_effort_class_is(text, options, code, tmp_path, capsys):
+    found = run_json(capsys, "simulate", str(write(tmp_path, text)), "--backend", "numpy", *options)[1]
+    assert code in {d["code"] for d in found["diagnostics"]}
