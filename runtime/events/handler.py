@@ -101,6 +101,10 @@ class Handler:
         if self.restart is not None:
             self.restart.settler.core.contents.ready = 0
 
+    def stands(self, which: Sequence[Watched]) -> bool:
+        """Whether kinks alone were crossed since `before`, and every branch is what it was."""
+        return all(w.kink >= 0 for w in which) and bool(np.array_equal(self.before[0], self.p))
+
     # -- what is watched -----------------------------------------------------------------------------------------
 
     def watched(self) -> list[Watched]:

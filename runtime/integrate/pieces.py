@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 UNSEEN = 100.0
 """Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
 PARTS = 8
-"""Steps at least that such a bounce takes; radau and dopri follow a parabola in one."""
+"""Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 
 _DENSE = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p)
 _REFINE = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
@@ -78,6 +78,13 @@ class Pieces:
         if self._landing != before:
             self.aim(self._end)
 
+    def _short(self, t: float, step: float) -> None:
+        """Steps of an eighth of one that misled, until its end is passed."""
+        method = self.run.method.contents
+        method.h_max = max(min(step / PARTS, method.h_max), 16.0 * float(np.spacing(t)))
+        self._landing = min(t + step, self._landing)
+        self.aim(self._end)
+
     # -- where a piece ends --------------------------------------------------------------------------------------
 
     def _point(self, t: float) -> tuple[Floats, Floats]:
@@ -115,7 +122,7 @@ class Pieces:
             point = self.handler.fire(t, *before, which=which)
             if point is not None:
                 self._accept(t, TRACE, sink)
-                self._go_on(t, point, before)
+                self._go_on(t, point, before, misled=end - core.t_from if self.handler.stands(which) else 0.0)
                 return time.process_time() - began
             begin = t
 
@@ -130,10 +137,15 @@ class Pieces:
         self.run.drain(sink)
         self.handler.back(after)
 
-    def _go_on(self, t: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats]) -> None:
+    def _go_on(
+        self, t: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats], *, misled: float = 0.0
+    ) -> None:
+        """From a point behind an event; misled (s): by a step whose dense output crossed what the point does not."""
         core = self.run.run_.contents
         core.start_kind = TRACE
         self._bounce(t)
+        if misled:
+            self._short(t, misled)
         self.run.go_on(t, t, point, before)
         core.start_kind = 0
         self._watch()

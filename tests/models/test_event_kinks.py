@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from reduced import ROOT
 from sysdyn.api import simulate
 
 ACCURACY = 1e-9
@@ -123,3 +124,14 @@ def test_linear_table(method, tmp_path):
 
 def test_twice_differentiable_law_has_no_events(tmp_path):
     assert not run(SMOOTH, tmp_path).events
+
+
+def test_a_long_step_that_crosses_what_the_point_does_not_is_taken_in_parts(tmp_path):
+    """The current's error leaves zero upwards, far below what a first step of order 1 resolves: its line falls."""
+    file = ROOT / "models" / "gallery" / "ev_powertrain.sd"
+    ask = {"scene": "launch", "until": "4 s", "formulation": "lagrangian"}
+    traces = {m: simulate(file, method=m, output=tmp_path / f"{m}.h5", **ask) for m in ("bdf", "radau")}
+    assert traces["bdf"].statistics["steps"] < 400
+    for name in traces["bdf"].names:
+        one, two = (t[name].values[np.searchsorted(t.time, [1.0, 2.0, 4.0])] for t in traces.values())
+        assert np.abs(one - two).max() <= 1e-2 * traces["radau"][name].nominal

@@ -1,5 +1,7 @@
 """Models whose laws are inverted: against closed forms, and against themselves with the laws kept implicit."""
 
+import functools
+
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
@@ -183,6 +185,7 @@ def _spring():
     return {"q": q, "e": np.interp(q / 2, [-3, -1, 1, 3], [-2, -1, 1, 2])}
 
 
+@functools.cache
 def _expected(name):
     t = np.linspace(0.0, 1.5, 31)
     match name:
