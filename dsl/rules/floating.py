@@ -34,7 +34,8 @@ def floating(model: Elaborator, observations: Sequence[Observation], report: Rep
             if read_here and not _of_differences(expression, read_here):
                 first = read_here[0].data[0]
                 message = f"the effort of '{first}' has no reference: nothing joins {_listed(names)} to ground"
-                report.note("N611", message, place, help=f"an element from one of them to ground, or {first}.e less that of another")
+                help_ = f"an element from one of them to ground, or {first}.e less that of another"
+                report.note("N611", message, place, help=help_)
                 break
 
 
