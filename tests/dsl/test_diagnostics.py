@@ -47,8 +47,8 @@ def test_a_report_is_sorted_and_holds_each_finding_once():
     report.error("E901", "nowhere", None)
     assert [(item.code, item.message) for item in report] == [
         ("E101", "early"),
-        ("W301", "early"),
         ("E203", "late"),
+        ("W301", "early"),
         ("E101", "other file"),
         ("E901", "nowhere"),
     ]
