@@ -31,6 +31,8 @@ class Console:
         self.color = color == "always" or (color == "auto" and not plain)
         self.report = Report()
         self.explain = False
+        self.summary = ""
+        """Behind the number of errors: where they are, of several files."""
         self.format: Callable[[Sequence[Diagnostic], Sequence[dict[str, object]]], str] | None = None
         """Another form of the findings (those of texts, those without a place), for standard output."""
         self.result: dict[str, Any] = {}
@@ -87,8 +89,8 @@ class Console:
         for diagnostic in shown:
             print(render(diagnostic, color=self.color), file=sys.stderr)
         errors = sum(d.severity == "error" for d in self.report)
-        if errors > 1:
-            print(f"{errors} errors", file=sys.stderr)
+        if errors > 1 or (errors and self.summary):
+            print(f"{errors} error{'s' * (errors > 1)}{self.summary}", file=sys.stderr)
 
 
 def edited(number: int, edit: Edit) -> dict[str, object]:

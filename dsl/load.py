@@ -26,6 +26,7 @@ from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.rules import checks, graph_checks, laws
+from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
@@ -160,6 +161,7 @@ def _judged(
     checks.values(elaborator, known, report)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
+        floating(elaborator, reader.observations, report)
     found = _result(elaborator, reader, read_scene)
     laws.run(found, known, report)
     return None if report.failed or _incomplete(report) else found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -53,12 +53,12 @@ def command(
     seen = watching.stamps(given)
     while True:  # until it is interrupted
         console.renew()
-        code = _all(console, targets.files(given), refused, strict=strict, fix=fix)
+        code = _all(console, tuple(targets.files(given)), refused, strict=strict, fix=fix)
         console.say(f"exit {code}; waiting for a change of {', '.join(given)}")
         seen = watching.changed(given, watching.stamps(given) if fix else seen)
 
 
-def _all(console: Console, files: Iterable[str], refused: bool, *, strict: bool, fix: bool) -> int:
+def _all(console: Console, files: Sequence[str], refused: bool, *, strict: bool, fix: bool) -> int:
     """Check the files and show what was found; the exit code."""
     results, unread = [], False
     for path in files:
@@ -71,6 +71,8 @@ def _all(console: Console, files: Iterable[str], refused: bool, *, strict: bool,
         except ModelError as error:  # a file that is no text does not hide the others
             console.report.extend(error.diagnostics)
     console.result = {"files": results}
+    wrong = {d.place.file for d in console.report if d.severity == "error" and d.place is not None}
+    console.summary = f" in {len(wrong)} of {len(files)} files" if len(files) > 1 else ""
     warned = any(d.severity == "warning" for d in console.report)
     return console.finish(INPUT_OUTPUT if unread else 1 if strict and warned else 0)
 

@@ -77,9 +77,9 @@ def _summary(ran: Ran) -> str:
     s, t = o.statistics, o.timings
     estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
     estimate = ", estimated error below round-off" if o.below_round_off else estimate
-    form = {"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {}
+    form = {"None": "not known"} | ({"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {})
     method = f"{o.method} ({o.reason})" if o.reason else o.method
-    how = (ran.prepared.formulation, method, f"index {form.get(o.index, o.index)}", ran.prepared.backend)
+    how = (ran.prepared.formulation, method, f"index {form.get(str(o.index), o.index)}", ran.prepared.backend)
     lines = [
         f"{ran.target.name}: {', '.join(how)}",
         f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",

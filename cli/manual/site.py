@@ -41,6 +41,7 @@ def _inline(text: str) -> str:
     """A line of Markdown: code, bold, and links to pages and codes."""
     made = re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text, quote=False).replace("\\|", "|"))
     made = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", made)
+    made = re.sub(r"(?<![\w*])\*([^*<\s][^*<]*)\*(?![\w*])", r"<em>\1</em>", made)
     known = topics.topics()
     made = _PAGE.sub(lambda m: f'page <a href="#{m[1]}">{m[1]}</a>' if m[1] in known else m[0], made)
     return _CODE.sub(lambda m: f'<a href="#{m[1]}">{m[1]}</a>' if m[1] in codes.codes() else m[0], made)

@@ -22,6 +22,8 @@ MOST = 250
 STEP, UNIT = 108.0, 50.0
 """Pixels between layers, and of one unit of a layer's length."""
 BOX = 86.0
+FITS = {"label": 10, "small": 15}
+"""Letters that fit into a box as they are; more are drawn together."""
 WIDE = 1500.0
 """Pixels from which a picture is scrolled, not shrunk."""
 _SIGNS = {
@@ -232,7 +234,8 @@ def _box(study: Study, vertex: Vertex, x: float, y: float) -> str:
     shape = f'x="{x - BOX / 2:.0f}" y="{y - 17:.0f}" width="{BOX:.0f}" height="34" rx="4"'
     body = [f'<rect class="box" {shape} stroke="{vertex.colour}"/>']
     for kind, down, text in (("label", -2, _short(vertex.label, 13)), ("small", 11, _short(vertex.small, 17))):
-        body.append(f'<text class="{kind}" x="{x:.0f}" y="{y + down:.0f}" text-anchor="middle">{text}</text>')
+        fit = f' textLength="{BOX - 8:.0f}" lengthAdjust="spacingAndGlyphs"' if len(text) > FITS[kind] else ""
+        body.append(f'<text class="{kind}" x="{x:.0f}" y="{y + down:.0f}" text-anchor="middle"{fit}>{text}</text>')
     for k, mark in enumerate(vertex.grounds):
         u = x + 26.0 * (k - (len(vertex.grounds) - 1) / 2)
         bars = "".join(f"M{u - w:.0f} {y + 25 + 3 * j:.0f}h{2 * w:.0f}" for j, w in enumerate((7, 4.5, 2)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib.abc
 import importlib.util
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
@@ -40,11 +40,15 @@ class Prepared:
     cpu_compile_s: float
     whole: Network
     left_out: tuple[Removal, ...] = ()
+    layouts: dict[Any, dict[Any, Any]] = field(default_factory=dict, compare=False, repr=False)
+    """What the runtime finds of the structure of index forms, by sizes: other numbers have the same."""
 
     @property
     def arrays(self) -> dict[str, Any]:
         """The binding as the contract's plain arrays."""
-        return self.arrays_of(self.binding)
+        b = self.binding
+        sizes = b.ix.tobytes(), b.shapes, b.row_shapes
+        return {**self.arrays_of(b), "layouts": self.layouts.setdefault(sizes, {})}
 
     @staticmethod
     def arrays_of(b: Binding) -> dict[str, Any]:

@@ -69,6 +69,8 @@ class FileScope:
         for item in file.items:
             if isinstance(item, syntax.Broken):
                 scope.broken |= item.names
+                if "std" in item.names:  # an import that could not be read: what hangs on it is not reported again
+                    scope.broken |= {name for name, module in exported().items() if module in item.names}
         for item in file.items:  # units first: everything else is written in them
             if isinstance(item, (syntax.UnitAlias, syntax.UnitBase)):
                 self._unit(item, scope, file.source)

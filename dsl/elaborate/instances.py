@@ -248,9 +248,11 @@ class Instances(Elements):
                 case _:
                     if len(head.branches) != 1:
                         wants = ", ".join((*head.ports, *(b for b in head.branches if b))) or "no connection"
-                        raise self.resolver.fail(
-                            "E402", f"'{s.decl.name}: {component.name}' is connected by name: {wants}", connection.span
-                        )
+                        said = [self.source_text(c.span) for c in s.connections]
+                        pairs = zip(wants.split(", "), said, strict=False)
+                        listed = ", ".join(f"{name} = {text}" for name, text in pairs)
+                        message = f"'{s.decl.name}: {component.name}' is connected by name: {wants}"
+                        raise self.resolver.fail("E402", message, connection.span, help=listed)
                     self._bind_branch(s, component, head, space, next(iter(head.branches)), connection, bound)
         for name in (*head.ports, *head.branches):
             if name not in bound:

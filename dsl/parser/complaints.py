@@ -239,7 +239,10 @@ _SHAPES = {
 def expected(accepted: Collection[str], kind: str, text: str, before: str, word: str = "") -> Complaint:
     """A token that does not fit, with what would; `before` is the token before it, `word` begins the statement."""
     said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
-    return "E113", said, _hint(kind, text, before, accepted) or _SHAPES.get(word)
+    shape = _SHAPES.get(word)
+    if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
+        shape = f"one name a statement: {_SHAPES.get(word, word + ' on = false')}"
+    return "E113", said, _hint(kind, text, before, accepted) or shape
 
 
 def _listed(accepted: Collection[str]) -> str:

@@ -11,6 +11,7 @@ from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.text.source import Span
 
 _DIGITS_BEFORE = re.compile(r"[0-9]+$")
+_UNIT = re.compile(r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[./][^\W\d]\w*(?:\^-?[0-9]+)?)*")
 _DIGITS = re.compile(r"[0-9]+")
 _SPICE = re.compile(r"(?:[\w.+-]+[ \t]+){2,}[\w.+-]+[ \t]*(?:[#;].*)?$")
 _PARTS = {"R": "resistor(R = 1 kohm)", "C": "capacitor(C = 1 uF)", "L": "inductor(L = 1 mH)", "V": "voltage(v = 5 V)"}
@@ -82,6 +83,18 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
         return Slip(("E113", "'**': a power is written with '^'", "a^b"), "^", Span(span.start - 1, span.end))
     if sign == "0" and line.rstrip().endswith("->"):
         return Slip(("E113", "the reference of every domain has a name", "ground"), "ground")
+    if kind == "<name>" and line.rstrip().endswith((")", "]")) and known(sign) is not None:
+        unit = _UNIT.match(text, span.start)
+        shown = unit.group() if unit else sign
+        if line.rstrip().endswith("]"):
+            said = f"'{shown}' stands behind a list: each of its numbers has its unit"
+            return Slip(("E113", said, f"[1 {shown}, 2 {shown}]"))
+        said = f"'{shown}' stands behind an expression: a unit belongs to a number"
+        return Slip(("E113", said, f"the unit to one of its numbers, as in 2 {shown}*sqrt(2)"))
+    if sign == "*" and line.rstrip().endswith("import"):
+        module = line.split()[1] if len(line.split()) > 1 else "std.electrical"
+        said = "names are imported one by one, never all with '*'"
+        return Slip(("E113", said, f"from {module} import NAME, NAME: sysdyn std lists them"))
     if kind in ("<name>", "(") and line.endswith(")"):
         return Slip(("E113", "a product is written with its sign", f")*{sign}"))
     if sign == "°" and text[span.end : span.end + 1] == "C":

@@ -8,6 +8,8 @@ from sysdyn.dsl.model.paynter import LETTERS, STATE_FUNCTIONS, StateFunction
 from sysdyn.dsl.rules.letters import Diagram, unknowns_of
 from sysdyn.dsl.text.diagnostics import Report
 
+_PLURAL = {"e": "efforts", "f": "flows", "p": "momenta", "q": "displacements"}
+
 
 def state_functions(network: Network, report: Report) -> None:
     """Each energy and content holds its own variable and none that the table keeps from it."""
@@ -50,7 +52,7 @@ def _misplaced(energy: Energy, unknowns: list[Node], diagram: Diagram, report: R
 
 
 def _says(function: StateFunction) -> str:
-    return f"{function.name} is a function of {LETTERS[function.own]}s ({function.own})"
+    return f"{function.name} is a function of {_PLURAL[function.own]} ({function.own})"
 
 
 def _right(function: StateFunction, letter: str) -> str | None:
@@ -58,7 +60,7 @@ def _right(function: StateFunction, letter: str) -> str | None:
     transform = STATE_FUNCTIONS[function.transform]
     found = [transform] if transform.own == letter else [f for f in STATE_FUNCTIONS.values() if f.own == letter]
     word = "content" if found[0].edge == "dissipator" else "energy"
-    return f"'{word} {found[0].name} = ...' is a function of {LETTERS[letter]}s"
+    return f"'{word} {found[0].name} = ...' is a function of {_PLURAL[letter]}"
 
 
 def _own(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> None:

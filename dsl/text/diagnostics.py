@@ -138,7 +138,9 @@ class Report:
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """Everything found, by file, then place, then code; files in the order of their first finding."""
+        """Everything found: by file (in the order of their first finding), errors before warnings before notes, by
+        class (1 names and text, 2 units, ...: what others follow from comes first), then place.
+        """
         files: dict[str, int] = {}
         for item in self._found:
             files.setdefault("" if item.place is None else item.place.file, len(files))
@@ -198,9 +200,10 @@ def shortened(found: Iterable[Diagnostic]) -> list[Diagnostic]:
     return kept
 
 
-def _order(item: Diagnostic, files: dict[str, int]) -> tuple[int, int, int, str, str]:
-    """Sort key: file, span, code, message."""
+def _order(item: Diagnostic, files: dict[str, int]) -> tuple[int, int, str, int, int, str, str]:
+    """Sort key: file, severity, class, span, code, message."""
+    rank = tuple(_SEVERITIES).index(item.code[0]), item.code[1]
     if item.place is None:
-        return files[""], -1, -1, item.code, item.message
+        return files[""], *rank, -1, -1, item.code, item.message
     span = item.place.span
-    return files[item.place.file], span.start, span.end, item.code, item.message
+    return files[item.place.file], *rank, span.start, span.end, item.code, item.message

@@ -146,7 +146,7 @@ class Description:
     initial: tuple[Initial, ...]
     switches: Switches
     branches: tuple[int, ...] = ()
-    layouts: dict[Any, Any] = field(default_factory=dict, compare=False, init=False)
+    layouts: dict[Any, Any] = field(default_factory=dict, compare=False)
     orders: dict[Any, Ints] = field(default_factory=dict, compare=False, init=False)
 
     def families_of(self, kind: str) -> tuple[int, ...]:
@@ -255,18 +255,27 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
     shapes = _shapes(binding["shapes"], [str(item["name"]) for item in families])
     row_shapes = _shapes(binding["row_shapes"], [str(item.get("label")) for item in rows])
     names = {str(item["name"]): k for k, item in enumerate(families)}
+    layouts = binding.get("layouts", {})  # of other bindings of the same sizes
+    if "described" not in layouts:
+        layouts["described"] = (
+            tuple(_family(item, shape) for item, shape in zip(families, shapes, strict=True)),
+            tuple(_row(item, shape) for item, shape in zip(rows, row_shapes, strict=True)),
+            {
+                str(name): tuple(_kernel(kernel) for kernel in block["kernels"])
+                for name, block in structure["blocks"].items()
+            },
+        )
+    own_families, own_rows, blocks = layouts["described"]
     return Description(
-        families=tuple(_family(item, shape) for item, shape in zip(families, shapes, strict=True)),
-        rows=tuple(_row(item, shape) for item, shape in zip(rows, row_shapes, strict=True)),
-        blocks={
-            str(name): tuple(_kernel(kernel) for kernel in block["kernels"])
-            for name, block in structure["blocks"].items()
-        },
+        families=own_families,
+        rows=own_rows,
+        blocks=blocks,
         p=np.array(binding["p"], dtype=np.float64),  # its own: events write there
         ix=np.ascontiguousarray(binding["ix"], dtype=np.int32),
         initial=tuple(_initial(item, names) for item in binding.get("initial", ())),
         switches=Switches(tuple(_switched(item, families, shapes) for item in structure.get("switches", ()))),
         branches=tuple(int(place) for place in structure.get("branches", ())),
+        layouts=layouts,
     )
 
 

@@ -74,7 +74,10 @@ class System:
         self.left_out = left_out
         self.description = description
         self.carrier = carrier
-        self.form: Form = plan(description, index_form)
+        key = "plan", index_form
+        if key not in description.layouts:
+            description.layouts[key] = plan(description, index_form)
+        self.form: Form = description.layouts[key]
         self.failure = Failure()
         self._keep: list[Any] = []
         self._assemble()

@@ -20,6 +20,7 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
@@ -226,8 +227,8 @@ class TraceWriter:
         self._visible = self._hidden = None
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Quantity(NDArrayOperatorsMixin):
     """A traced quantity: an array with its unit, nominal magnitude and derivative (None: not known)."""
 
     name: str
@@ -238,6 +239,21 @@ class Quantity:
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.values, dtype=dtype, copy=True) if copy or dtype is not None else self.values
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        plain = [i.values if isinstance(i, Quantity) else i for i in inputs]
+        return getattr(ufunc, method)(*plain, **options)
+
+    def __getattr__(self, name: str) -> Any:
+        """What arrays have: `shape`, `max()`, ..."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self.values, name)
+
+    def __repr__(self) -> str:
+        finite = self.values[np.isfinite(self.values)]
+        span = f", {finite.min():.6g} to {finite.max():.6g}" if finite.size else ""
+        return f"<{self.name} [{self.units}]: {len(self.values)} values{span}>"
 
     def __len__(self) -> int:
         return len(self.values)
@@ -269,7 +285,7 @@ def _events(group: Any) -> tuple[Happened, ...]:
     return tuple(Happened(float(t), *said) for t, *said in zip(group["time"][()], *texts, strict=True))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Trace:
     """A trace read from a file: trace["q1"], trace.time [s], trace.names, trace.attributes."""
 
@@ -279,6 +295,11 @@ class Trace:
     parameters: dict[str, tuple[float, str]]
     _data: dict[str, Quantity]
     events: tuple[Happened, ...] = ()
+
+    def __repr__(self) -> str:
+        title = self.attributes.get("title", self.path)
+        span = f", {self.time[0]:.6g} s to {self.time[-1]:.6g} s" if len(self.time) else ""
+        return f"<trace of {title}: {', '.join(self.names[:6])}; {len(self.time)} instants{span}>"
 
     @classmethod
     def open(cls, file: str | Path) -> Trace:

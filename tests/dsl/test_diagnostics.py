@@ -47,8 +47,8 @@ def test_a_report_is_sorted_and_holds_each_finding_once():
     report.error("E901", "nowhere", None)
     assert [(item.code, item.message) for item in report] == [
         ("E101", "early"),
-        ("W301", "early"),
         ("E203", "late"),
+        ("W301", "early"),
         ("E101", "other file"),
         ("E901", "nowhere"),
     ]
@@ -74,7 +74,7 @@ def test_an_error_crosses_processes():
 
 EXPECTED = """
 E101-E119 N101 W101 E201-E214 W201 E301-E325 W301 W302 E401-E409 E411-E415 N401 E501-E519 N501 E601-E608 E701-E705
-E801-E808 E901-E912 E920 E921 W920 W921 E930-E934 E941 W941 N601-N604 N608-N609 N905 N922 N923 N941
+E801-E808 E901-E912 E920 E921 W920 W921 E930-E934 E941 W941 N601-N604 N608-N609 N611 N905 N922 N923 N941
 """
 
 

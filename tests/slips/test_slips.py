@@ -46,3 +46,30 @@ def test_a_run_that_stops_speaks_the_same_language(name, tmp_path, capsys):
     assert all(said in found["message"] for said in stop.said), found["message"]
     assert stop.remedy in found["help"], found["help"]
     assert stop.code == "E934" or "last good state at" in found["help"]
+
+
+FLOATING = """from std.electrical import resistor, voltage
+
+model m {
+  node a, b, c: electrical
+  V: voltage(v = 5 V*sin(2*pi*50 Hz*t)) a -> b
+  R1: resistor(R = 1 kohm) a -> c
+  R2: resistor(R = 1 kohm) c -> b
+}
+
+scene s of m {
+  time 0 s to 20 ms
+  trace a.e - b.e as u, R1.f, (c.e - b.e)^2 as square
+}
+"""
+
+
+@pytest.mark.parametrize("read", ["a.e", "a.e - 0.5*b.e", "abs(c.e)", "a.e + b.e - c.e"])
+def test_an_effort_without_reference_is_noted(read):
+    """Where one effort is read by itself; never where differences are, nor once the network is grounded."""
+    text = FLOATING.replace("R1.f,", f"R1.f, {read} as read,")
+    (note,) = [d for d in check(text) if d.code == "N611"]
+    assert text.split("\n")[note.place.start[0] - 1].strip().startswith("trace")
+    assert "no reference" in note.message
+    assert [d for d in check(FLOATING) if d.code == "N611"] == []
+    assert [d for d in check(text.replace("c -> b", "c -> ground")) if d.code == "N611"] == []
