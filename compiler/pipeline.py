@@ -28,6 +28,7 @@ from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
+from sysdyn.compiler.forms.legendre import transformed
 from sysdyn.compiler.forms.steepness import scaled
 from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
@@ -70,12 +71,14 @@ class Timing:
 class CompiledModel:
     """A model in one formulation: every stage's value, the generated text, and how long each stage took.
 
-    family: nodes and branches of the formulation's family; network: the same in coordinates.
+    family: nodes and branches of the formulation's family; network: the same in coordinates; energies: as said;
+    functions: as lowered, with T(p, q) in Hamilton's form.
     """
 
     family: Network
     network: Network
     energies: EnergyModel
+    functions: EnergyModel
     form: DescriptorForm
     program: Program
     backend: str
@@ -156,7 +159,8 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
     with _timed("descriptor", timings):
-        lowered = replace(FORMULATIONS[formulation.removeprefix("co_")](model), formulation=formulation)
+        own = transformed(model, network.parameters) if formulation.endswith("hamiltonian") else model
+        lowered = replace(FORMULATIONS[formulation.removeprefix("co_")](own), formulation=formulation)
         form, branches = frozen(with_book_signs(lowered), network) if traced else (with_book_signs(lowered), ())
         network = replace(network, parameters=(*network.parameters, *branches))
         form = scaled(form)
@@ -167,7 +171,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *found)
-    return CompiledModel(family, network, model, form, program, backend, text, said, steps, tuple(timings))
+    return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
 
 
 def _keeps_flow(network: Network) -> bool:

@@ -49,7 +49,7 @@ def content_of(
         case _:
             more = sum(r.block in WORDS for r in compiled.form.rows) - MOST
             return Content(
-                tuple(functions(algebra, compiled.energies)),
+                tuple(functions(algebra, compiled.functions)),
                 tuple(equations(algebra, compiled.energies, compiled.form, MOST)),
                 more=max(more, 0),
             )

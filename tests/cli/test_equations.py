@@ -40,15 +40,15 @@ m f2' + 2 q2 κ1 = -m g
 κ1 of rod, line 11
 """,
     ("pendulum", "hamiltonian"): """\
-T* = 1/2 m (f1^2 + f2^2)
+ T = p1^2/(2 m) + p2^2/(2 m)
 δW = -m g δq2
 
 q1' = f1
 q2' = f2
 p1' = -2 q1 κ1
 p2' = -m g - 2 q2 κ1
- p1 = m f1
- p2 = m f2
+ f1 = p1/m
+ f2 = p2/m
   0 = q1^2 + q2^2 - l^2
 
 κ1 of rod, line 11
@@ -174,7 +174,7 @@ def test_the_arm_has_the_terms_of_the_book(capsys):
 def test_the_canonical_suspension_has_the_row_of_the_book(capsys):
     """(4.22): the pull of the magnet is p2^2/(2 b0), whatever the gap."""
     found = printed(capsys, "em_suspension", "--form", "canonical", "--formulation", "hamiltonian")
-    assert "p_x' = F0 + F1 sin(w t) - p2^2/(2 b0)" in found
+    assert "p_x' = -p2^2/(2 b0) + F0 + F1 sin(w t)" in found
     assert "H = (b1 + x) p2^2/(2 b0) + p_x^2/(2 M)" in found
 
 
