@@ -145,6 +145,24 @@ def test_equations_are_those_of_the_book(name, formulation, capsys):
     assert _same_terms(found, GOLDEN[name, formulation])
 
 
+BOOK = sorted((ROOT / "tests" / "cli" / "book").glob("*.txt"))
+
+
+def test_thirteen_systems_in_two_formulations():
+    systems = {path.name.split(".")[0] for path in BOOK}
+    assert len(systems) == 13
+    assert len(BOOK) == 26
+
+
+@pytest.mark.parametrize("path", BOOK, ids=lambda p: p.stem)
+def test_the_books_systems_are_printed_as_there(path, capsys):
+    """Texts read by eye against (6.27), (6.40), Examples 3.1 to 3.4, 4.1, 4.2, 5.1 to 5.4, 6.6, 2.37 and 2.4.2."""
+    system, formulation = path.name.split(".")[:2]
+    file = ROOT / "models" / "book" / f"{system}.sd"
+    assert run(["equations", str(file), "--scene", "reference", "--formulation", formulation, "--quiet"]) == 0
+    assert _same_terms(capsys.readouterr().out, path.read_text())
+
+
 def _same_terms(found, expected):
     """Line by line, up to the order of the energy functions' terms."""
     one, other = found.splitlines(), expected.splitlines()

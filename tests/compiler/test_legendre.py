@@ -42,7 +42,8 @@ def test_the_energy_is_that_of_the_catalogue(key, k):
         entry, _, model = lowered(key, k)
         names = names_of(entry, entry["models"][k])
         wanted = convert(entry["models"][k]["energy_after_legendre"], names)
-        parts = [(t.expression, 1.0) for t in model.function("T")] + [(t.expression, -1.0) for t in model.function("T*")]
+        signs = (("T", 1.0), ("T*", -1.0))
+        parts = [(t.expression, sign) for name, sign in signs for t in model.function(name)]
         found = x.add(*(e if sign > 0 else x.neg(e) for e, sign in parts))
         random = np.random.default_rng(k)
         known = {}
