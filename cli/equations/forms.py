@@ -10,7 +10,7 @@ from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.equations.book import WORDS, Equation, Function, Summed, algebra_of, equations, functions
-from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying
+from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying, variation
 from sysdyn.dsl.model.expression import Node, const, param, scale, var
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.tangent import NoLinearisation
@@ -41,7 +41,7 @@ def content_of(
             return Content(matrices=matrices(algebra, compiled.form))
         case "canonical":
             function, found = canonical(algebra, compiled.energies, compiled.form)
-            return Content((function,), tuple(found))
+            return Content((function, variation(algebra, function, compiled.form)), tuple(found))
         case "underlying":
             return Content(equations=tuple(underlying(algebra, compiled.form)))
         case "linear":

@@ -143,12 +143,12 @@ class Sheets:
         """A state function or virtual work."""
         texts = tuple(self._function(writer, function) for writer in self.writers)
         name = REFLECTED[function.name] if self.complementary else function.name
-        name = f"δ{name}" if function.name == "W" else name
+        name = f"δ{name}" if function.efforts else name
         latex = name.replace("δ", "\\delta ").replace("*", "^{*}")
         return Line("function", name, (name, texts[0]), (latex, texts[1]), ("", ""), None)
 
     def _function(self, writer: Writer, function: Function) -> str:
-        if function.name != "W":
+        if not function.efforts:
             return writer.sum_of(function.terms)
         return _added([self._effort(writer, effort) for effort in function.efforts], writer.minus)
 
