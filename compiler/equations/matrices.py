@@ -241,7 +241,7 @@ def _turned(sympy: Any, value: Any) -> Any:
 
 
 def variation(algebra: Algebra, function: Function, form: DescriptorForm) -> Function:
-    """delta H: the conservative efforts dH/dq with the virtual displacements, the flows dH/dp with the virtual momenta.
+    """Delta H: the conservative efforts dH/dq with the virtual displacements, the flows dH/dp with the virtual momenta.
 
     (dH/dq, dH/dp) is normal to the trajectory of a conservative system in its phase space (book, 2.5).
     """

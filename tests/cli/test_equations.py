@@ -206,6 +206,13 @@ def test_matrices_by_name(capsys):
  Z1 = [ 2 f1^2 + 2 f2^2 ]
 
 f = (f1, f2)
+
+degrees of freedom: n - m1 - m2 = 2 - 1 - 0 = 1, where the constraints are independent
+index by structure: 3
+  rate of q1: differentiated once
+  rate of q2: differentiated once
+  displacement constraint rod: differentiated twice
+  all once more for the rates of what has none yet: κ of rod
 """
 
 

@@ -9,6 +9,7 @@ import re
 import pytest
 from book_entries import BOOK, ENTRIES, begin, residual
 from sysdyn.cli.main import run
+from sysdyn.compiler.equations.offsets import offsets
 from sysdyn.dsl.model import expression as ex
 from sysdyn.runtime.structure.structure import structure
 
@@ -27,6 +28,10 @@ def test_unknowns_index_and_residual(entry):
         facts = structure(found.system, found.state)
         assert (counts, facts.index) == (entry.counts, entry.index)
         assert residual(entry, prepared) < 1e-9
+        if entry.index is not None:  # which rows are differentiated how often says the same
+            by_rows = offsets(prepared.compiled.form)
+            assert by_rows is not None
+            assert by_rows.index == entry.index
 
 
 TABLE = re.compile(r"\| `(\w+)` \| `(\w+)` \|((?: \d+ \|){5}) (\d+|none) \| (\S+) \|")
