@@ -6,7 +6,6 @@ displacements (book 5.14), and coordinates of one style serve one family.
 
 from __future__ import annotations
 
-from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.network.reflection import unreflectable
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Network
@@ -14,13 +13,6 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related
 
 PRIMAL = ("lagrangian", "hamiltonian", "kane")
 COMPLEMENTARY = ("co_lagrangian", "co_hamiltonian", "co_kane")
-
-
-def repeats(form: DescriptorForm) -> bool:
-    """Whether a form of Kane is Lagrange's row for row: no flow constraint is left out, no speed is unknown."""
-    if not form.formulation.endswith("kane"):
-        return False
-    return not any(row.block == "psi" for row in form.rows) and not any(form.is_speed(f) for f in form.families)
 
 
 def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tuple[Diagnostic, ...]]:

@@ -28,6 +28,7 @@ from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
+from sysdyn.compiler.forms.legendre import transformed
 from sysdyn.compiler.forms.steepness import scaled
 from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
@@ -71,12 +72,14 @@ class Timing:
 class CompiledModel:
     """A model in one formulation: every stage's value, the generated text, and how long each stage took.
 
-    family: nodes and branches of the formulation's family; network: the same in coordinates.
+    family: nodes and branches of the formulation's family; network: the same in coordinates; energies: as said;
+    functions: as lowered, with T(p, q) in Hamilton's form.
     """
 
     family: Network
     network: Network
     energies: EnergyModel
+    functions: EnergyModel
     form: DescriptorForm
     program: Program
     backend: str
@@ -157,7 +160,8 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
     with _timed("descriptor", timings):
-        lowered = FORMULATIONS[formulation.removeprefix("co_")](model)
+        own = transformed(model, network.parameters) if formulation.endswith("hamiltonian") else model
+        lowered = FORMULATIONS[formulation.removeprefix("co_")](own)
         titles = tuple(replace(r, label=word(formulation, r.label)) if r.block == "audit" else r for r in lowered.rows)
         lowered = replace(lowered, formulation=formulation, rows=titles)
         form, branches = frozen(with_book_signs(lowered), network) if traced else (with_book_signs(lowered), ())
@@ -170,7 +174,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *found)
-    return CompiledModel(family, network, model, form, program, backend, text, said, steps, tuple(timings))
+    return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
 
 
 def _keeps_flow(network: Network) -> bool:

@@ -55,6 +55,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
         "form": form,
         "functions": [line.to_json() for line in sheet.functions],
         "equations": [line.to_json() for line in sheet.equations],
+        "counted": list(sheet.counted),
         "multipliers": [{"symbol": s, "constraint": owner, "line": line} for s, owner, line in sheet.legend if owner],
     }
     console.data(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sysdyn.cli.analysis.asked import begun
@@ -9,8 +10,11 @@ from sysdyn.cli.analysis.linear import inputs_of, linearised
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.targets import Target
-from sysdyn.compiler.equations.book import WORDS, Equation, Function, Summed, algebra_of, equations, functions
-from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying
+from sysdyn.compiler.equations.book import CO_WORDS, WORDS, Equation, Function, Summed, algebra_of, equations, functions
+from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying, variation
+from sysdyn.compiler.equations.offsets import offsets
+from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model.expression import Node, const, param, scale, var
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.tangent import NoLinearisation
@@ -22,12 +26,13 @@ MOST = 400
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What a form consists of; more: row families that were left out."""
+    """What a form consists of; more: row families that were left out; counted: degrees of freedom and index."""
 
     functions: tuple[Function, ...] = ()
     equations: tuple[Equation, ...] = ()
     matrices: tuple[Matrix, ...] = ()
     more: int = 0
+    counted: tuple[str, ...] = ()
 
 
 def content_of(
@@ -38,21 +43,41 @@ def content_of(
     algebra = algebra_of(compiled.form, [p.name for p in compiled.network.parameters if not p.shape])
     match form:
         case "matrices":
-            return Content(matrices=matrices(algebra, compiled.form))
+            return Content(matrices=matrices(algebra, compiled.form), counted=tuple(_counted(compiled.form)))
         case "canonical":
             function, found = canonical(algebra, compiled.energies, compiled.form)
-            return Content((function,), tuple(found))
+            return Content((function, variation(algebra, function, compiled.form)), tuple(found))
         case "underlying":
-            return Content(equations=tuple(underlying(algebra, compiled.form)))
+            found_ = tuple(underlying(algebra, compiled.form))
+            return Content(equations=found_, counted=tuple(_counted(compiled.form)))
         case "linear":
             return _linear(target, prepared, request, report)
         case _:
             more = sum(r.block in WORDS for r in compiled.form.rows) - MOST
             return Content(
-                tuple(functions(algebra, compiled.energies)),
+                tuple(functions(algebra, compiled.functions)),
                 tuple(equations(algebra, compiled.energies, compiled.form, MOST)),
                 more=max(more, 0),
             )
+
+
+def _counted(form: DescriptorForm) -> Iterator[str]:
+    """Degrees of freedom as the book counts them, and which rows are differentiated for the index."""
+    words = WORDS | CO_WORDS if form.formulation.startswith("co_") else WORDS
+    n, m1, m2 = (sum(f.kind == kind for f in form.families) for kind in ("f", "kappa", "mu"))
+    yield f"degrees of freedom: n - m1 - m2 = {n} - {m1} - {m2} = {n - m1 - m2}, where the constraints are independent"
+    found = offsets(form)
+    if found is None:
+        return
+    yield f"index by structure: {found.index}"
+    for kind, owner, times in found.differentiated:
+        often = {1: "once", 2: "twice"}.get(times, f"{times} times")
+        yield f"  {words.get(kind, 'rate of')} {owner}: differentiated {often}"
+    if found.once_more:
+        greek = {"kappa": "κ", "mu": "μ"}
+        kinds = ((owner, letter(form.formulation, kind)) for owner, kind in found.once_more)
+        last = ", ".join(f"{greek.get(kind, kind)} of {owner}" for owner, kind in kinds)
+        yield f"  all once more for the rates of what has none yet: {last}"
 
 
 def _linear(target: Target, prepared: Prepared, request: Request, report: Report) -> Content | None:

@@ -60,6 +60,7 @@ class Sheet:
     equations: tuple[Line, ...]
     legend: tuple[tuple[str, str, int], ...]
     more: int = 0
+    counted: tuple[str, ...] = ()
 
     def to_text(self) -> str:
         """For a terminal."""
@@ -68,6 +69,8 @@ class Sheet:
         if self.legend:
             said = (f"{s} of {owner}, line {line}" if owner else s for s, owner, line in self.legend)
             parts.append("\n".join(said))
+        if self.counted:
+            parts.append("\n".join(self.counted))
         return "\n\n".join(parts)
 
     def to_latex(self) -> str:
@@ -125,7 +128,8 @@ class Sheets:
         """What is printed, in both alphabets."""
         lines = [self._matrix(m) for m in content.matrices] + [self.line(e) for e in content.equations]
         legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
-        return Sheet(tuple(self.named(f) for f in content.functions), tuple(lines), legend, content.more)
+        functions = tuple(self.named(f) for f in content.functions)
+        return Sheet(functions, tuple(lines), legend, content.more, content.counted)
 
     def _matrix(self, matrix: Matrix) -> Line:
         text, latex = ([[self._entry(w, e) for e in row] for row in matrix.rows] for w in self.writers)
@@ -143,12 +147,12 @@ class Sheets:
         """A state function or virtual work."""
         texts = tuple(self._function(writer, function) for writer in self.writers)
         name = REFLECTED[function.name] if self.complementary else function.name
-        name = f"δ{name}" if function.name == "W" else name
+        name = f"δ{name}" if function.efforts else name
         latex = name.replace("δ", "\\delta ").replace("*", "^{*}")
         return Line("function", name, (name, texts[0]), (latex, texts[1]), ("", ""), None)
 
     def _function(self, writer: Writer, function: Function) -> str:
-        if function.name != "W":
+        if not function.efforts:
             return writer.sum_of(function.terms)
         return _added([self._effort(writer, effort) for effort in function.efforts], writer.minus)
 

@@ -49,10 +49,11 @@ def _is_flow(e: Equation) -> bool:
 def functions(found: Iterable[Function], types: Typesetter, *, complementary: bool) -> Iterator[str]:
     """A label and a formula for each state function and for virtual work."""
     for function in found:
-        if function.name == "W":
+        if function.efforts:
             works = [_effort(types, e.over, e.terms, e.on) for e in function.efforts]
-            yield "<span>virtual work</span>"
-            yield f"<div>{math(mo('δ'), mi('W'), mo('='), _plus(works))}</div>"
+            said = "virtual work" if function.name == "W" else "virtual displacements and momenta"
+            yield f"<span>{said}</span>"
+            yield f"<div>{math(mo('δ'), mi(function.name), mo('='), _plus(works))}</div>"
             continue
         shown = REFLECTED[function.name] if complementary else function.name
         yield f"<span>{_SAID[shown]}</span>"

@@ -24,7 +24,7 @@ def section(study: Study) -> str:
 
 def functions(study: Study) -> str:
     """The state functions and virtual work."""
-    found = state_functions(_algebra(study), study.prepared.compiled.energies)
+    found = state_functions(_algebra(study), study.prepared.compiled.functions)
     text = "".join(typeset.functions(found, study.typesetter, complementary=study.complementary))
     return f'<div class="equations">{text}</div>' if text else '<p class="soft">none</p>'
 

@@ -23,7 +23,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import differences, stopped, verdict
 from sysdyn.compiler.binding.instants import instants
 from sysdyn.compiler.binding.pulses import pulses
-from sysdyn.compiler.formulations import repeats
+from sysdyn.compiler.forms.kane import repeats
 from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY

@@ -144,7 +144,9 @@ def sides(block: str, terms: Sequence[Summed]) -> tuple[tuple[Summed, ...], tupl
     if block in ("phi", "psi", "gamma"):
         return (), tuple(terms)
     if block == "momentum":
-        kept = ["p"] if "p" in leading else ["f"]
+        bare = ("var" in (t.expression.op, t.negated.expression.op) for t in terms)
+        alone = any(k == "f" and own for k, own in zip(leading, bare, strict=True))
+        kept = ["f"] if alone and "p" in leading else ["p"] if "p" in leading else ["f"]
     elif "p'" in leading or "s'" in leading:
         kept = ["p'", "s'"]
     else:

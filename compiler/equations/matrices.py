@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.book import Equation, Function, Summed, gathered, sides
+from sysdyn.compiler.equations.book import Effort, Equation, Function, Summed, gathered, sides
 from sysdyn.compiler.equations.joining import joined, length, ordered, shortest
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.energies import EnergyModel
@@ -238,6 +238,17 @@ def _turned(sympy: Any, value: Any) -> Any:
         found = sum(c * square ** (k // 2) * sine ** (k % 2) for (k,), c in polynomial.terms())
         found = sympy.expand(found)
     return found
+
+
+def variation(algebra: Algebra, function: Function, form: DescriptorForm) -> Function:
+    """Delta H: the conservative efforts dH/dq with the virtual displacements, the flows dH/dp with the virtual momenta.
+
+    (dH/dq, dH/dp) is normal to the trajectory of a conservative system in its phase space (book, 2.5).
+    """
+    whole = add(*(t.expression for t in function.terms))
+    on = [n for kind in ("q", "p") for n in unknowns(form, kind)]
+    slopes = ((n, joined(algebra, derivative(whole, n))) for n in on)
+    return Function(function.name, (), tuple(Effort((), terms, n) for n, terms in slopes if terms))
 
 
 def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tuple[Function, list[Equation]]:

@@ -75,6 +75,13 @@ def _seen(model: EnergyModel, speeds: Speeds) -> EnergyModel:
     return replace(model, coordinates=coordinates)
 
 
+def repeats(form: DescriptorForm) -> bool:
+    """Whether a form of Kane is Lagrange's row for row: no flow constraint is left out, no speed is unknown."""
+    if not form.formulation.endswith("kane"):
+        return False
+    return not any(row.block == "psi" for row in form.rows) and not any(form.is_speed(f) for f in form.families)
+
+
 def projection(model: EnergyModel) -> Projection:
     """B of all flow constraints."""
     rows: dict[str, Entries] = {}

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from sysdyn.compiler.forms.minors import determinant, inverse
 from sysdyn.compiler.model.energies import EnergyModel, Quantity
 from sysdyn.compiler.model.terms import local_variables
 from sysdyn.dsl.model.expression import (
@@ -27,7 +28,6 @@ from sysdyn.dsl.model.expression import (
     is_const,
     mul,
     neg,
-    power,
     signals_held,
     sub,
     substitute,
@@ -97,14 +97,14 @@ def speeds_of(model: EnergyModel, kept: frozenset[str]) -> Speeds:
             continue
         order = [name for name in scalars if name in names]
         square = _completed(model, part, order)
-        inverse = _inverse([[line.entries.get(name, const(0.0)) for name in order] for line in square])
+        inverted = inverse([[line.entries.get(name, const(0.0)) for name in order] for line in square])
         for k, line in enumerate(square):
             if line.speed is not None:
                 found.append(line.speed)
-                column = {name: inverse[j][k] for j, name in enumerate(order)}
+                column = {name: inverted[j][k] for j, name in enumerate(order)}
                 columns[line.speed.name] = {n: v for n, v in column.items() if not is_const(v, 0.0)}
         for j, name in enumerate(order):
-            rest[name] = neg(add(*(mul(inverse[j][k], line.rest) for k, line in enumerate(square))))
+            rest[name] = neg(add(*(mul(inverted[j][k], line.rest) for k, line in enumerate(square))))
         left_out |= labels
     declared = {q.name: k for k, q in enumerate(model.speeds)}
     found.sort(key=lambda speed: declared.get(speed.name, len(declared)))
@@ -169,7 +169,7 @@ def _completed(model: EnergyModel, part: Sequence[_Line], order: Sequence[str]) 
 
 def _size(square: Sequence[_Line], order: Sequence[str]) -> tuple[int, int]:
     """The determinant's size: first those that are numbers and parameters."""
-    whole = _determinant([[line.entries.get(name, const(0.0)) for name in order] for line in square])
+    whole = determinant([[line.entries.get(name, const(0.0)) for name in order] for line in square])
     nodes = topological([whole])
     return sum(n.op not in ("const", "param") for n in nodes if not n.args), len(nodes)
 
@@ -196,46 +196,6 @@ def _rank_at(lines: Sequence[_Line], order: Sequence[str], drawn: random.Random)
             rows[k] = [a - factor * b for a, b in zip(rows[k], rows[rank], strict=True)]
         rank += 1
     return rank
-
-
-class _Minors:
-    """The minors of a square matrix, each once."""
-
-    def __init__(self, c: Sequence[Sequence[Node]]) -> None:
-        self.c = c
-        self.known: dict[tuple[tuple[int, ...], tuple[int, ...]], Node] = {((), ()): const(1.0)}
-
-    def __call__(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Node:
-        if (rows, columns) not in self.known:
-            terms = []
-            for place, column in enumerate(columns):
-                entry = self.c[rows[0]][column]
-                if not is_const(entry, 0.0):
-                    rest = self(rows[1:], columns[:place] + columns[place + 1 :])
-                    terms.append(mul(entry, rest) if place % 2 == 0 else neg(mul(entry, rest)))
-            self.known[rows, columns] = add(*terms)
-        return self.known[rows, columns]
-
-
-def _determinant(c: Sequence[Sequence[Node]]) -> Node:
-    every = tuple(range(len(c)))
-    return _Minors(c)(every, every)
-
-
-def _inverse(c: Sequence[Sequence[Node]]) -> list[list[Node]]:
-    """C^-1 by minors over the determinant."""
-    n = len(c)
-    minor = _Minors(c)
-    every = tuple(range(n))
-    over = power(minor(every, every), const(-1.0))
-    found = []
-    for j in range(n):
-        line = []
-        for k in range(n):
-            own = minor(every[:k] + every[k + 1 :], every[:j] + every[j + 1 :])
-            line.append(mul(own if (j + k) % 2 == 0 else neg(own), over))
-        found.append(line)
-    return found
 
 
 def definition(speed: Speed, values: Mapping[Node, Node]) -> Node | None:

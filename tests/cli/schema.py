@@ -109,7 +109,8 @@ REST = {
     "residual": NUMBER,
     "free": list,
 }
-EQUATIONS = {"formulation": str, "form": str, "functions": list, "equations": list, "multipliers": list}
+LINES = ("functions", "equations", "counted", "multipliers")
+EQUATIONS = {"formulation": str, "form": str} | dict.fromkeys(LINES, list)
 EQUATION = {
     "kind": str,
     "label": str,
