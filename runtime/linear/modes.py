@@ -130,10 +130,11 @@ def transfer(
 ) -> Transfer:
     """One output by one input; b, c [states]; place: output, input; improper: slopes by the input's rates."""
     inner, scale = balanced(a)
+    first = _first_markov(inner, b / scale, c * scale)
     inner, b, c = reached(inner, b / scale, c * scale)
     inner, c, b = reached(inner.T, c, b)
     inner = inner.T
-    zeros, gain = _zeros(inner, b, c, d)
+    zeros, gain = _zeros(inner, b, c, d, first)
     zeros = _at_origin(inner, b, c, d, zeros)
     poles = np.linalg.eigvals(inner).astype(complex) if inner.size else np.zeros(0, complex)
     poles = _resolved(_sharpened(poles, inner), inner)
@@ -179,24 +180,35 @@ def reached(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats]:
     return q @ a @ q.T, q @ b, q @ c
 
 
-def _zeros(a: Floats, b: Floats, c: Floats, d: float) -> tuple[Complexes, float]:
-    """Zeros and leading coefficient; none and 0 where nothing passes."""
-    n = b.size
-    if not n:
+def _first_markov(a: Floats, b: Floats, c: Floats) -> tuple[int, float] | None:
+    """r, c a^r b: the first Markov parameter that is not zero; None where nothing passes.
+
+    In the coordinates of the model, where zeros are zeros: those of `reached` mix them with round-off.
+    """
+    row, size = c, np.abs(c)
+    for r in range(b.size):
+        markov = float(row @ b)
+        faint = FAINT * float(np.abs(row).max() * np.abs(b).max())
+        if abs(markov) > max(VANISHING * float(size @ np.abs(b)), faint):
+            return r, markov
+        row, size = row @ a, size @ np.abs(a)
+    return None
+
+
+def _zeros(
+    a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] | None
+) -> tuple[Complexes, float]:
+    """Zeros and leading coefficient; none and 0 where nothing passes; first: of `_first_markov`."""
+    if not b.size:
         return np.zeros(0, complex), d
     if d != 0.0:
         return np.linalg.eigvals(a - np.outer(b, c) / d).astype(complex), d
-    kept, size = [c], np.abs(c)
-    for _ in range(n):
-        markov = float(kept[-1] @ b)
-        faint = FAINT * float(np.abs(kept[-1]).max() * np.abs(b).max())
-        if abs(markov) > max(VANISHING * float(size @ np.abs(b)), faint):
-            break
-        kept.append(kept[-1] @ a)
-        size = size @ np.abs(a)
-    else:
+    if first is None or first[0] >= b.size:
         return np.zeros(0, complex), 0.0
-    return _kept_at_zero(a, b, np.array(kept), markov), markov
+    kept = [c]
+    for _ in range(first[0]):
+        kept.append(kept[-1] @ a)
+    return _kept_at_zero(a, b, np.array(kept), first[1]), first[1]
 
 
 def _kept_at_zero(a: Floats, b: Floats, kept: Floats, markov: float) -> Complexes:
