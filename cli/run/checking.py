@@ -24,6 +24,7 @@ def checked(target: targets.Target, report: Report, refused: bool = False) -> di
 def _started(network: Network, report: Report) -> dict[str, object]:
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
     from sysdyn.cli.run.starting import described, start
+    from sysdyn.compiler.binding.certificate import certificate
 
     prepared = prepare(network, report, backend="numpy")
     if prepared is None:
@@ -34,6 +35,7 @@ def _started(network: Network, report: Report) -> dict[str, object]:
     if started is None:
         return {"ok": False}
     facts = started.facts
+    judged = certificate(prepared.network, prepared.binding)
     return {
         "ok": not report.failed,
         "formulation": prepared.formulation,
@@ -45,4 +47,10 @@ def _started(network: Network, report: Report) -> dict[str, object]:
         "redundant": facts.redundant,
         "index": facts.index,
         "moved": described(started.state),
+        "passivity": {
+            "verdict": judged.verdict,
+            "proven": judged.proven,
+            "elements": [{"name": f.name, "role": f.role, "how": f.how, "said": f.said} for f in judged.findings],
+            "lines": judged.lines(),
+        },
     }
