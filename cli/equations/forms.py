@@ -11,6 +11,7 @@ from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.equations.book import WORDS, Equation, Function, Summed, algebra_of, equations, functions
 from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying
+from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian, written
 from sysdyn.dsl.model.expression import Node, const, param, scale, var
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.tangent import NoLinearisation
@@ -44,6 +45,9 @@ def content_of(
             return Content((function,), tuple(found))
         case "underlying":
             return Content(equations=tuple(underlying(algebra, compiled.form)))
+        case "port_hamiltonian":
+            function, found_ = written(algebra, port_hamiltonian(compiled.energies, compiled.form))
+            return Content((function,), matrices=found_)
         case "linear":
             return _linear(target, prepared, request, report)
         case _:
