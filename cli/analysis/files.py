@@ -22,6 +22,8 @@ def arrays(linear: Linear) -> dict[str, NDArray[Any]]:
     found["eigenvalues"] = np.array([m.eigenvalue for m in linear.modes], dtype=complex)
     shares = [m.participation for m in linear.modes]
     found["participation"] = np.array(shares).reshape(len(shares), len(small.names))
+    found["energies"] = linear.energies
+    found["shapes"] = np.array([m.shape for m in linear.modes], dtype=complex).reshape(len(shares), len(small.names))
     found["point"] = linear.y
     return found
 
@@ -33,6 +35,7 @@ def names(linear: Linear) -> dict[str, tuple[str, ...]]:
         "reduced_states": linear.reduced.names,
         "inputs": linear.inputs,
         "outputs": linear.outputs,
+        "stores": linear.stores,
     }
 
 

@@ -30,7 +30,7 @@ def state_of(
     request: Request, outputs: tuple[str, ...] | None, report: Report, *, rest: bool
 ) -> tuple[Found | None, str | None]:
     """The model at the state asked; else None, the report says why, and what stopped a run or a search."""
-    made = compiled(request, report, outputs)
+    made = compiled(request, report, outputs, stores=True)
     if made is None:
         return None, None
     if rest:

@@ -28,7 +28,7 @@ class Linearised:
     """A model about a state: x' = A x + B u, y = C x + D u of deviations; E, A, B, C, D of the descriptor form.
 
     matrices: all arrays by name, as in the files of the command; states, inputs, outputs: names; modes; transfers;
-    moving: the state is not at rest.
+    moving: the state is not at rest; energies [modes, stores]: shares of each mode's energy by element.
     """
 
     def __init__(self, found: linear_.Linear) -> None:
@@ -39,6 +39,7 @@ class Linearised:
         self.modes: tuple[Mode, ...] = found.modes
         self.transfers: tuple[Transfer, ...] = found.transfers
         self.moving, self.t = found.moving, found.t
+        self.stores, self.energies = found.stores, found.energies
 
     @property
     def eigenvalues(self) -> NDArray[Any]:

@@ -222,8 +222,10 @@ def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
                 "frequency": mode.frequency,
                 "damping": mode.damping,
                 "participation": {n: float(s) for n, s in zip(small.names, mode.participation, strict=True)},
+                "energy": {n: float(s) for n, s in zip(linear.stores, shares_, strict=True)},
+                "shape": {n: _pair(complex(v)) for n, v in zip(small.names, mode.shape, strict=True)},
             }
-            for mode in linear.modes
+            for mode, shares_ in zip(linear.modes, linear.energies, strict=True)
         ],
         "reduced": {
             "A": small.a.tolist(),
@@ -276,18 +278,18 @@ def _table(linear: Any) -> str:
 
 
 def _modes(linear: Any) -> list[list[str]]:
-    rows = [["eigenvalue [1/s]", "damping", "frequency [rad/s]", "participation"]]
-    for mode in linear.modes:
+    rows = [["eigenvalue [1/s]", "damping", "frequency [rad/s]", "participation", "energy in"]]
+    for mode, energies in zip(linear.modes, linear.energies, strict=True):
         damping = "" if mode.damping is None else f"{mode.damping:.4g}"
-        rows.append([_complex(mode.eigenvalue), damping, f"{mode.frequency:.6g}", _shares(linear, mode)])
-    return rows
+        shares = _listed(linear.reduced.names, mode.participation), _listed(linear.stores, energies)
+        rows.append([_complex(mode.eigenvalue), damping, f"{mode.frequency:.6g}", *shares])
+    return rows if linear.stores else [row[:-1] for row in rows]
 
 
-def _shares(linear: Any, mode: Any) -> str:
-    """The states that take part most."""
-    order = sorted(range(len(mode.participation)), key=lambda k: -mode.participation[k])
-    kept = [k for k in order if mode.participation[k] >= 0.05][:4]
-    return ", ".join(f"{linear.reduced.names[k]} {100 * mode.participation[k]:.0f} %" for k in kept)
+def _listed(names: Sequence[str], shares: Sequence[float]) -> str:
+    """Those that take part most."""
+    order = sorted(range(len(names)), key=lambda k: -shares[k])
+    return ", ".join(f"{names[k]} {100 * shares[k]:.0f} %" for k in order[:4] if shares[k] >= 0.05)
 
 
 def _complex(value: complex) -> str:

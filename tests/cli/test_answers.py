@@ -128,6 +128,32 @@ def test_tables_on_the_terminal(tmp_path, capsys):
         assert said in out
 
 
+@pytest.mark.parametrize("formulation", ALL)
+def test_the_energy_of_a_mode_by_the_elements_that_hold_it(formulation, tmp_path, capsys):
+    """Of an RLC oscillation half in the coil; of two capacitors C v^2, as their eigenvectors have it."""
+    for mode in answered(capsys, write(tmp_path, RLC), "--formulation", formulation)["modes"]:
+        if abs(complex(*mode["eigenvalue"])) > 1e-9:
+            assert mode["energy"] == pytest.approx({"l": 0.5, "c": 0.5}, rel=1e-9)
+            assert max(abs(complex(*v)) for v in mode["shape"].values()) == pytest.approx(1.0)
+    text = """
+    model two {
+      node a, b: electrical
+      c1: potential(q = 2 F*e) a -> ground
+      r: dissipator(e = 3 ohm*f) a -> b
+      c2: potential(q = 5 F*e) b -> ground
+      load: dissipator(e = 7 ohm*f) b -> ground
+    }
+    scene s of two { time 0 s to 1 s; trace b.e }
+    """
+    a = np.array([[-1 / 6, 1 / 6], [1 / 15, -1 / 15 - 1 / 35]])
+    own, vectors = np.linalg.eig(a)
+    found = linear(capsys, write(tmp_path, text), "--formulation", formulation)["modes"]
+    for value, v in zip(own, vectors.T, strict=True):
+        mode = min(found, key=lambda m: abs(complex(*m["eigenvalue"]) - value))
+        energy = np.array([2, 5]) * v**2
+        assert [mode["energy"][n] for n in ("c1", "c2")] == pytest.approx(energy / energy.sum(), rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
