@@ -23,6 +23,7 @@ from sysdyn.compiler.binding.sensitivity import FIRST, LAST, Sensitivity
 from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
+from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
 from sysdyn.runtime.linear.pencil import motions, surely_parted
 from sysdyn.runtime.linear.tangent import (
@@ -34,6 +35,7 @@ from sysdyn.runtime.linear.tangent import (
     chosen_states,
     constant,
     integral,
+    lost,
     moving,
     quadratures,
     reduced,
@@ -137,6 +139,10 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     if still and (small is None or _fewer(found, small)):
         small = _of_pencil(found, _descriptor(system, found, slopes, out, labels), loose)
     assert small is not None
+    if small.unsure is not None and still:  # the pencil may know it better
+        small = _surer(small, found, _descriptor(system, found, slopes, out, labels), loose)
+    if small.unsure is not None:
+        precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), lost)
     own = modes(small.a, small.decomposed)
     stores, energies = _energies(found, small, own, names)
     kept = _asked(found, names)
@@ -277,6 +283,15 @@ def _of_pencil(found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Redu
     matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
     small = surely_parted(matrices, chosen, spaces, names)
     return replace(small, places=np.where(small.places < n, small.places, -1))
+
+
+def _surer(small: Reduced, found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Reduced:
+    """The reduction of the pencil, where it is one in many digits with as many states."""
+    try:
+        other = _of_pencil(found, form, loose)
+    except NoLinearisation:
+        return small
+    return other if other.wide is not None and other.places.size == small.places.size else small
 
 
 def _felt_moves(system: System, small: Reduced, found: Found) -> bool:
