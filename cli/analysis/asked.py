@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -41,12 +42,15 @@ class Found:
 
 
 def compiled(
-    request: Request, report: Report, outputs: tuple[str, ...] | None = None, *, stores: bool = False
+    request: Request,
+    report: Report,
+    outputs: tuple[str, ...] | None = None,
+    also: Callable[[Network], tuple[str, ...]] | None = None,
 ) -> tuple[Target, Prepared] | None:
     """The target, compiled whole: what a scene does not need may be unstable all the same.
 
-    outputs: names or expressions in the place of the scene's traces.  stores: contents and conjugates of stores are
-    observed too.  None where the report says why not.
+    outputs: names or expressions in the place of the scene's traces.  also: what of a network is observed
+    beside.  None where the report says why not.
     """
     document = targets.read(request.file, report)
     target = targets.one(document, request.file, request.model, request.scene, report)
@@ -56,10 +60,10 @@ def compiled(
     network = load.network(
         document, target.model, target.scene, inner, request.settings, levels=request.levels, outputs=outputs
     )
-    if network is not None and stores and (asked := contents(network)):
+    if network is not None and also is not None and (asked := also(network)):
         names = [o.name for o in network.observations if o.stored]
-        unasked = frozenset(name for store in asked for name in store[1:] if name not in names)
-        more = (*names, *(name for store in asked for name in store[1:] if name not in names))
+        unasked = frozenset(asked).difference(names)
+        more = (*names, *(name for name in asked if name not in names))
         second = load.network(
             document, target.model, target.scene, Report(), request.settings, levels=request.levels, outputs=more
         )
@@ -81,6 +85,17 @@ def contents(network: Network) -> tuple[tuple[str, str, str], ...]:
     if any(e.function in ("T*", "T", "V", "V*") for e in network.energies):
         return ()
     return tuple((b.name, f"{b.name}.{letters[b.kind][0]}", f"{b.name}.{letters[b.kind][1]}") for b in stores)
+
+
+def of_contents(network: Network) -> tuple[str, ...]:
+    """Contents and conjugates of the stores."""
+    return tuple(name for store in contents(network) for name in store[1:])
+
+
+def of_nodes(network: Network) -> tuple[str, ...]:
+    """Efforts of the common-effort nodes: voltages, pressures, temperatures."""
+    nodes = [n for n in network.nodes if n.domain.common == "effort" and not n.shape]
+    return tuple(f"{n.name}.e" for n in nodes) if len(nodes) <= STORES else ()
 
 
 def begun(target: Target, prepared: Prepared, request: Request, report: Report) -> Found | None:
