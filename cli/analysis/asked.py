@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,11 +18,15 @@ from sysdyn.cli.run.verdict import stopped
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.arrival import arrival
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
+
+STORES = 200
+"""Stores up to which the energy of a mode is shared out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,26 +42,60 @@ class Found:
 
 
 def compiled(
-    request: Request, report: Report, outputs: tuple[str, ...] | None = None
+    request: Request,
+    report: Report,
+    outputs: tuple[str, ...] | None = None,
+    also: Callable[[Network], tuple[str, ...]] | None = None,
 ) -> tuple[Target, Prepared] | None:
     """The target, compiled whole: what a scene does not need may be unstable all the same.
 
-    outputs: names or expressions in the place of the scene's traces.  None where the report says why not.
+    outputs: names or expressions in the place of the scene's traces.  also: what of a network is observed
+    beside.  None where the report says why not.
     """
     document = targets.read(request.file, report)
     target = targets.one(document, request.file, request.model, request.scene, report)
     if target is None:
         return None
-    inner = Report()
+    inner, unasked = Report(), frozenset[str]()
     network = load.network(
         document, target.model, target.scene, inner, request.settings, levels=request.levels, outputs=outputs
     )
-    prepared = None
+    if network is not None and also is not None and (asked := also(network)):
+        names = [o.name for o in network.observations if o.stored]
+        unasked = frozenset(asked).difference(names)
+        more = (*names, *(name for name in asked if name not in names))
+        second = load.network(
+            document, target.model, target.scene, Report(), request.settings, levels=request.levels, outputs=more
+        )
+        network = second or network
+    prepared: Prepared | None = None
     if network is not None:
         network = replace(network, statics=(), expectations=(), goldens=())
         prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend)
     report.extend(inner if prepared else targets.unsupported(inner))
-    return None if prepared is None else (target, prepared)
+    return None if prepared is None else (target, replace(prepared, unasked=unasked))
+
+
+def contents(network: Network) -> tuple[tuple[str, str, str], ...]:
+    """Of each store its name, its content q or p, its conjugate e or f; () where not all are elements of their own."""
+    letters = {"potential": "qe", "kinetic": "pf"}
+    stores = [b for b in network.branches if b.kind in letters and not b.domain.pseudo]
+    if len(stores) > STORES or any(b.at or b.loops for b in stores):
+        return ()
+    if any(e.function in ("T*", "T", "V", "V*") for e in network.energies):
+        return ()
+    return tuple((b.name, f"{b.name}.{letters[b.kind][0]}", f"{b.name}.{letters[b.kind][1]}") for b in stores)
+
+
+def of_contents(network: Network) -> tuple[str, ...]:
+    """Contents and conjugates of the stores."""
+    return tuple(name for store in contents(network) for name in store[1:])
+
+
+def of_nodes(network: Network) -> tuple[str, ...]:
+    """Efforts of the common-effort nodes: voltages, pressures, temperatures."""
+    nodes = [n for n in network.nodes if n.domain.common == "effort" and not n.shape]
+    return tuple(f"{n.name}.e" for n in nodes) if len(nodes) <= STORES else ()
 
 
 def begun(target: Target, prepared: Prepared, request: Request, report: Report) -> Found | None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.analysis.asked import Found
+from sysdyn.cli.analysis.asked import Found, contents
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.targets import Target
@@ -23,16 +23,19 @@ from sysdyn.compiler.binding.sensitivity import FIRST, LAST, Sensitivity
 from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
-from sysdyn.runtime.linear.modes import Mode, Transfer, modes, transfer, wide_transfer
+from sysdyn.runtime.linear import precise
+from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
 from sysdyn.runtime.linear.pencil import motions, surely_parted
 from sysdyn.runtime.linear.tangent import (
     NoLinearisation,
     Outputs,
     Reduced,
+    Wide,
     candidates_of,
     chosen_states,
     constant,
     integral,
+    lost,
     moving,
     quadratures,
     reduced,
@@ -65,7 +68,7 @@ class Descriptor:
 
 @dataclass(frozen=True, slots=True)
 class Linear:
-    """A linearisation at t [s]; quadratures: states that nothing depends on; moving: a state that is not at rest."""
+    """A linearisation at t [s]; moving: a state that is not at rest; energies [modes, stores]: shares of each."""
 
     t: float
     y: Array
@@ -76,6 +79,8 @@ class Linear:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     moving: bool
+    stores: tuple[str, ...]
+    energies: Array
 
 
 def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -> tuple[Input, ...]:
@@ -134,13 +139,51 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     if still and (small is None or _fewer(found, small)):
         small = _of_pencil(found, _descriptor(system, found, slopes, out, labels), loose)
     assert small is not None
+    if small.unsure is not None and still:  # the pencil may know it better
+        small = _surer(small, found, _descriptor(system, found, slopes, out, labels), loose)
+    if small.unsure is not None:
+        precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), lost)
+    own = modes(small.a, small.decomposed)
+    stores, energies = _energies(found, small, own, names)
+    kept = _asked(found, names)
+    names, small, out = tuple(names[k] for k in kept), _rows(small, kept), _seen(out, kept)
     form = system if index == "3" else system.another(index)
     descriptor = _descriptor(form, found, slopes, out, labels)
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
     transfers = tuple(_transfer(small, i, j) for i, j in pairs)
-    own = modes(small.a, small.decomposed)
     moves = _felt_moves(system, small, found)
-    return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves)
+    return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves, stores, energies)
+
+
+def _asked(found: Found, names: Sequence[str]) -> list[int]:
+    """Places of the outputs that were asked for, without what is observed of stores alone."""
+    return [k for k, name in enumerate(names) if name not in found.prepared.unasked]
+
+
+def _rows(small: Reduced, kept: list[int]) -> Reduced:
+    """The reduction with some of its outputs."""
+
+    def part(wide: Wide | None) -> Wide | None:
+        return None if wide is None else Wide(wide.a, wide.b, wide.c[kept], wide.d[kept], part(wide.beside))
+
+    c, d, d1, d2 = (m[kept] for m in (small.c, small.d, small.d1, small.d2))
+    return replace(small, c=c, d=d, d1=d1, d2=d2, wide=part(small.wide))
+
+
+def _seen(out: Outputs, kept: list[int]) -> Outputs:
+    return Outputs(out.by_y[kept], out.by_rate[kept], out.by_input[kept])
+
+
+def _energies(
+    found: Found, small: Reduced, own: Sequence[Mode], names: Sequence[str]
+) -> tuple[tuple[str, ...], Array]:
+    """Names of the stores and their shares of the energy of each mode."""
+    at = {name: k for k, name in enumerate(names)}
+    known = [s for s in contents(found.prepared.network) if s[1] in at and s[2] in at]
+    if not known or not own:
+        return (), np.zeros((len(own), 0))
+    content, conjugate = (small.c[[at[s[k]] for s in known]] for k in (1, 2))
+    return tuple(s[0] for s in known), stored(own, content, conjugate)
 
 
 def _transfer(small: Reduced, i: int, j: int) -> Transfer:
@@ -240,6 +283,15 @@ def _of_pencil(found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Redu
     matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
     small = surely_parted(matrices, chosen, spaces, names)
     return replace(small, places=np.where(small.places < n, small.places, -1))
+
+
+def _surer(small: Reduced, found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Reduced:
+    """The reduction of the pencil, where it is one in many digits with as many states."""
+    try:
+        other = _of_pencil(found, form, loose)
+    except NoLinearisation:
+        return small
+    return other if other.wide is not None and other.places.size == small.places.size else small
 
 
 def _felt_moves(system: System, small: Reduced, found: Found) -> bool:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, compiled
+from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
 from sysdyn.cli.analysis.linear import linearised, loose_of
 from sysdyn.cli.analysis.states import at, resting
 from sysdyn.cli.run.running import Request
@@ -14,6 +14,7 @@ from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.rest import Rest
 from sysdyn.runtime.linear.stability import Verdict, energy_at, verdict
 from sysdyn.runtime.linear.tangent import NoLinearisation
+from sysdyn.runtime.trace.trace_store import columns_of
 
 SHOWN = ("q", "f", "s", "e")
 """Kinds of unknowns that a table shows, flows where they are not zero."""
@@ -23,8 +24,8 @@ MOST = 24
 
 @dataclass(frozen=True, slots=True)
 class Equilibrium:
-    """A state of rest; values: of y by name; outputs: what the scene traces; judged: None where there is no
-    linearisation, for the reason `why`.
+    """A state of rest; values: of y by name; efforts: of the common-effort nodes (an operating point); judged: None
+    where there is no linearisation, for the reason `why`.
     """
 
     rest: Rest
@@ -32,6 +33,7 @@ class Equilibrium:
     kinds: tuple[str, ...]
     judged: Verdict | None
     why: str
+    efforts: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The object of --json."""
@@ -39,6 +41,7 @@ class Equilibrium:
         energy = judged.energy if judged is not None else None
         return {
             "values": self.values,
+            "efforts": self.efforts,
             "stability": judged.stability if judged is not None else None,
             "by": judged.by if judged is not None else None,
             "why": self.why or None,
@@ -60,6 +63,9 @@ class Equilibrium:
         ]
         more = [f"... {len(shown) - MOST} more"] if len(shown) > MOST else []
         lines += [f"   {text}" for text in [*shown[:MOST], *more]]
+        if self.efforts:
+            kept = list(self.efforts.items())[:MOST]
+            lines.append(f"   nodes {', '.join(f'{name} = {value:.9g}' for name, value in kept)}")
         if self.rest.free:
             lines.append(f"   left open: {', '.join(self.rest.free[:6])}")
         if self.judged is not None and self.judged.modes:
@@ -84,11 +90,22 @@ class Equilibrium:
 
 def equilibria(request: Request, tries: int, report: Report) -> tuple[Found, tuple[Equilibrium, ...]] | None:
     """The model and its states of rest; None where the report says why it has none to be asked of."""
-    made = compiled(request, report, ())
+    made = compiled(request, report, (), of_nodes)
     if made is None:
         return None
     found, states = resting(*made, tries)
-    return found, tuple(_judged(found, rest) for rest in states)
+    return found, tuple(replace(_judged(found, rest), efforts=_efforts(at(found, rest))) for rest in states)
+
+
+def _efforts(here: Found) -> dict[str, float]:
+    """Efforts of the nodes at a state, those that are known there."""
+    state = here.state
+    if not here.prepared.unasked:
+        return {}
+    with np.errstate(all="ignore"):
+        values = here.system.observe(state.t, state.y, state.yd)
+    columns = [(c.name.removesuffix(".e"), float(values[c.place])) for c in columns_of(here.system.description)]
+    return {name: value for name, value in columns if np.isfinite(value)}
 
 
 def _judged(found: Found, rest: Rest) -> Equilibrium:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, arrived, begun, compiled
+from sysdyn.cli.analysis.asked import Found, arrived, begun, compiled, of_contents
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import Request
@@ -30,7 +30,7 @@ def state_of(
     request: Request, outputs: tuple[str, ...] | None, report: Report, *, rest: bool
 ) -> tuple[Found | None, str | None]:
     """The model at the state asked; else None, the report says why, and what stopped a run or a search."""
-    made = compiled(request, report, outputs)
+    made = compiled(request, report, outputs, of_contents)
     if made is None:
         return None, None
     if rest:

@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.cli.analysis.resting import Equilibrium
+from sysdyn.cli.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.export.files import manifest_of
 from sysdyn.cli.export.index_parameters import index_parameters
 from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
@@ -41,9 +43,12 @@ from sysdyn.runtime.trace.trace import Trace
 
 __all__ = [
     "Diagnostic",
+    "Equilibrium",
+    "Linearised",
     "Model",
     "ModelError",
     "Module",
+    "NoState",
     "NotMet",
     "SolverFailure",
     "Sweep",
@@ -51,6 +56,8 @@ __all__ = [
     "UsageError",
     "check",
     "compile_model",
+    "equilibria",
+    "linearize",
     "load",
     "simulate",
 ]
@@ -335,6 +342,31 @@ def load(path: str | Path, *, model: str | None = None, scene: str | None = None
     if given.get("formulation") == "auto":
         given["formulation"] = None
     return Model(Loaded(replace(_request(str(path), given), output=None)))
+
+
+def linearize(
+    path: str | Path,
+    *,
+    at: float | str | None = None,
+    equilibrium: bool = False,
+    inputs: Iterable[str] | None = None,
+    outputs: Iterable[str] | None = None,
+    **options: Any,
+) -> Linearised:
+    """The linearisation about the scene's start, an instant [s], or a state of rest; options as of the command.
+
+    Raises ModelError, UsageError, NoState, NoLinearisation.
+    """
+    if at is not None and equilibrium:
+        raise UsageError("at together with equilibrium: an instant of a run, or a state of rest")
+    request = _request(str(path), {**options, "until": at})
+    known = (None if names is None else tuple(names) for names in (inputs, outputs))
+    return linearised_at(request, *known, rest=equilibrium)
+
+
+def equilibria(path: str | Path, *, tries: int = 40, **options: Any) -> tuple[Equilibrium, ...]:
+    """States of rest with their stability, from the guesses and from `tries` points around them; () if none."""
+    return resting(_request(str(path), options), tries)
 
 
 def check(text: str, name: str = "<text>") -> list[Diagnostic]:

@@ -22,6 +22,7 @@ FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
 @click.option("--allow-unsupported", is_flag=True, help="With --strict: texts may be ahead of the compiler.")
 @click.option("--fix", is_flag=True, help="Write the remedies that leave no choice into FILES, and show the changes.")
 @click.option("--watch", is_flag=True, help="Check again whenever a file changes, until interrupted.")
+@click.option("--explain", is_flag=True, help="Say of each model whether it is passive, and by which elements.")
 @click.option("--output-format", type=click.Choice(FORMATS), help="Form of the findings. Default: full.")
 def command(
     console: Console,
@@ -30,6 +31,7 @@ def command(
     allow_unsupported: bool,
     fix: bool,
     watch: bool,
+    explain: bool,
     output_format: str | None,
 ) -> int:
     """Check every model and scene of FILES, the consistent start included; no C compiler is needed.
@@ -38,6 +40,7 @@ def command(
     and sarif go to standard output.
     """
     given, files = files, tuple(targets.files(files))
+    console.explain = explain
     _form(console, output_format, files)
     if allow_unsupported and not strict:
         raise UsageError("--allow-unsupported says what --strict may pass: give both")
@@ -123,9 +126,16 @@ def _file(console: Console, path: str, refused: bool) -> dict[str, object]:
         found.append(summary)
         if summary["ok"]:
             console.say(f"{path}: {target.name}: {_line(summary)}")
+            if console.explain:
+                console.data(f"{path}: {target.name}: " + _passivity(summary))
     if not document.models and not document.scenes and not console.report.failed:
         console.say(f"{path}: no model")
     return {"file": path, "models": list(document.models), "targets": found}
+
+
+def _passivity(summary: dict[str, object]) -> str:
+    found = summary.get("passivity")
+    return "not compiled" if not isinstance(found, dict) else "\n".join(found["lines"])
 
 
 def _line(summary: dict[str, object]) -> str:

@@ -13,6 +13,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.equations.book import CO_WORDS, WORDS, Equation, Function, Summed, algebra_of, equations, functions
 from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying, variation
 from sysdyn.compiler.equations.offsets import offsets
+from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian, written
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model.expression import Node, const, param, scale, var
@@ -50,6 +51,9 @@ def content_of(
         case "underlying":
             found_ = tuple(underlying(algebra, compiled.form))
             return Content(equations=found_, counted=tuple(_counted(compiled.form)))
+        case "port_hamiltonian":
+            function, shown = written(algebra, port_hamiltonian(compiled.energies, compiled.form))
+            return Content((function,), matrices=shown)
         case "linear":
             return _linear(target, prepared, request, report)
         case _:

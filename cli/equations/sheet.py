@@ -133,7 +133,7 @@ class Sheets:
 
     def _matrix(self, matrix: Matrix) -> Line:
         text, latex = ([[self._entry(w, e) for e in row] for row in matrix.rows] for w in self.writers)
-        texts = (matrix.name, _grid(text)), (_NAMES[matrix.name], _array(latex))
+        texts = (matrix.name, _grid(text)), (_NAMES.get(matrix.name, matrix.name), _array(latex))
         return Line("matrix", matrix.name, *texts, ("", ""), None)
 
     def _flows(self) -> str:

@@ -18,6 +18,7 @@ def page(study: Study) -> str:
         ("energies", "Energy functions", equations.functions(study)),
         ("equations", "Equations", equations.section(study)),
         ("unknowns", "Unknowns", paynter.unknowns(study)),
+        ("passivity", "Passivity", run.passivity(study)),
         ("start", "Consistent start", run.start(study)),
         ("traces", "Traces", _traces(study)),
         ("balance", "Energy balance by element", _balance(study)),
@@ -25,7 +26,7 @@ def page(study: Study) -> str:
     ]
     claims = run.expectations(study)
     if claims:
-        sections.insert(8, ("expectations", "Expectations", claims))
+        sections.insert(9, ("expectations", "Expectations", claims))
     links = "".join(f'<a href="#{key}">{escape(name)}</a>' for key, name, _ in sections)
     parts = [f"<h1>{escape(title)}</h1>", f'<p class="soft">{escape(_how(study))}</p>']
     parts += [f'<p class="bad">{escape(finding)}</p>' for finding in study.findings]

@@ -6,11 +6,22 @@ import numpy as np
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.starting import described
+from sysdyn.compiler.binding.certificate import certificate
 from sysdyn.runtime.model.description import element
 
 SHOWN = 60
 """Rows of a table of values."""
 _INDEX = {"2": "2 (stabilised)"}
+
+
+def passivity(study: Study) -> str:
+    """The certificate: who may lose or supply energy, and how that is known."""
+    found = certificate(study.prepared.network, study.prepared.binding)
+    rows = [
+        [study.link(f.place, escape(f.name)), f.role, f.how, escape(f.said)] for f in found.findings
+    ]
+    said = f"<p>{escape(found.lines()[0])}</p>"
+    return said + (table(["element", "role", "known by", ""], rows, left=(0, 1, 2, 3)) if rows else "")
 
 
 def counts(study: Study) -> str:

@@ -32,6 +32,7 @@ def _started(network: Network, report: Report) -> dict[str, object]:
 def _judged(network: Network, report: Report) -> dict[str, object]:
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
     from sysdyn.cli.run.starting import described, start
+    from sysdyn.compiler.binding.certificate import certificate
 
     prepared = prepare(network, report, backend="numpy")
     if prepared is None:
@@ -42,6 +43,7 @@ def _judged(network: Network, report: Report) -> dict[str, object]:
     if started is None:
         return {"ok": False}
     facts = started.facts
+    judged = certificate(prepared.network, prepared.binding)
     return {
         "ok": not report.failed,
         "formulation": prepared.formulation,
@@ -53,4 +55,10 @@ def _judged(network: Network, report: Report) -> dict[str, object]:
         "redundant": facts.redundant,
         "index": facts.index,
         "moved": described(started.state),
+        "passivity": {
+            "verdict": judged.verdict,
+            "proven": judged.proven,
+            "elements": [{"name": f.name, "role": f.role, "how": f.how, "said": f.said} for f in judged.findings],
+            "lines": judged.lines(),
+        },
     }

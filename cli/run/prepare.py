@@ -27,7 +27,8 @@ from sysdyn.runtime.model.carrier import Carrier
 class Prepared:
     """A compiled model with its numbers bound; backend says which carrier it has.
 
-    network: what was compiled; whole: what was written; left_out: the parts that the scene does not need.
+    network: what was compiled; whole: what was written; left_out: the parts that the scene does not need;
+    unasked: quantities observed for an analysis alone.
     """
 
     network: Network
@@ -40,6 +41,7 @@ class Prepared:
     cpu_compile_s: float
     whole: Network
     left_out: tuple[Removal, ...] = ()
+    unasked: frozenset[str] = frozenset()
     layouts: dict[Any, dict[Any, Any]] = field(default_factory=dict, compare=False, repr=False)
     """What the runtime finds of the structure of index forms, by sizes: other numbers have the same."""
 

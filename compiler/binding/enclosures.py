@@ -23,7 +23,8 @@ Outline = Callable[[Array, Array], Bounds]
 _RISING: Mapping[str, Callable[[Array], Array]] = {
     "exp": np.exp, "ln": np.log, "log10": np.log10, "atan": np.arctan, "tanh": np.tanh, "sinh": np.sinh,
     "asinh": np.arcsinh, "acosh": np.arccosh, "asin": np.arcsin, "atanh": np.arctanh, "sign": np.sign,
-    "floor": np.floor, "ceil": np.ceil, "step": lambda x: np.where(x >= 0.0, 1.0, 0.0), "signal": lambda x: x,
+    "setsign": np.sign, "floor": np.floor, "ceil": np.ceil,
+    "step": lambda x: np.where(x >= 0.0, 1.0, 0.0), "signal": lambda x: x,
 }  # fmt: skip
 
 
@@ -169,3 +170,24 @@ def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mappin
                 bounds = _combined(node, [found[a] for a in node.args if a in found], outlines)
             found[node] = _ordered(*bounds)
     return found[root]
+
+
+def enclose_over(root: Node, known: Mapping[Node, tuple[float, float]], fixed: Callable[[Node], float]) -> tuple[
+    float, float
+]:
+    """Bounds of an expression over ranges of its unknowns and of time; those that are not known go from -inf to inf.
+
+    fixed: values of expressions without unknowns.
+    """
+    found: dict[Node, Bounds] = {}
+    for node in topological_unbound([root]):
+        if node in known or node.op in ("var", "time"):
+            low, high = known.get(node, (-np.inf, np.inf))
+        elif not variables(node):
+            low = high = fixed(node)
+        else:
+            with np.errstate(all="ignore"):
+                found[node] = _ordered(*_combined(node, [found[a] for a in node.args if a in found], {}))
+            continue
+        found[node] = np.array([low]), np.array([high])
+    return float(found[root][0][0]), float(found[root][1][0])

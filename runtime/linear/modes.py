@@ -36,12 +36,15 @@ DEFECTIVE = 1e11
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """An eigenvalue (1/s): frequency |s| (rad/s), damping ratio -Re s/|s| (None at zero), participation [states]."""
+    """An eigenvalue (1/s): frequency |s| (rad/s), damping ratio -Re s/|s| (None at zero), participation [states];
+    shape [states]: what moves, the largest one.
+    """
 
     eigenvalue: complex
     frequency: float
     damping: float | None
     participation: Floats
+    shape: Complexes
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,19 +79,19 @@ def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Mode, ...]:
     if precisely is not None:
         share = np.abs(precisely.right * precisely.left.T)
         total = share.sum(axis=0)
-        return _sorted(precisely.values, share / np.where(total > 0.0, total, 1.0))
-    inner = balanced(a)[0]
+        return _sorted(precisely.values, share / np.where(total > 0.0, total, 1.0), precisely.right)
+    inner, scale = balanced(a)
     values, right = np.linalg.eig(inner)
     values = _resolved(_sharpened(values, inner), inner)
     share = np.abs(right) ** 2
     if np.linalg.cond(right) < DEFECTIVE:
         share = np.abs(right * np.linalg.inv(right).T)
-    return _sorted(values, share / share.sum(axis=0))
+    return _sorted(values, share / share.sum(axis=0), scale[:, None] * right)
 
 
-def _sorted(values: Complexes, share: Floats) -> tuple[Mode, ...]:
+def _sorted(values: Complexes, share: Floats, right: Complexes) -> tuple[Mode, ...]:
     order = sorted(range(values.size), key=lambda k: (round(float(values[k].real), 12), float(values[k].imag)))
-    return tuple(_mode(complex(values[k]), share[:, k]) for k in order)
+    return tuple(_mode(complex(values[k]), share[:, k], right[:, k]) for k in order)
 
 
 def _sharpened(values: Complexes, a: Floats) -> Complexes:
@@ -120,9 +123,22 @@ def _resolved(values: Complexes, a: Floats) -> Complexes:
     return np.where(np.abs(values) > least, values, 0.0)
 
 
-def _mode(value: complex, share: Floats) -> Mode:
+def _mode(value: complex, share: Floats, right: Complexes) -> Mode:
     size = abs(value)
-    return Mode(value, size, 0.0 - value.real / size if size > 0.0 else None, share)
+    largest = right[int(np.argmax(np.abs(right)))]
+    shape = np.asarray(right / largest if largest != 0.0 else right, dtype=np.complex128)
+    return Mode(value, size, 0.0 - value.real / size if size > 0.0 else None, share, shape)
+
+
+def stored(modes_: Sequence[Mode], content: Floats, conjugate: Floats) -> Floats:
+    """Shares [modes, stores] of each mode's energy: |Re(content* conjugate)| of q, e or p, f [stores, states], normed.
+
+    Of an oscillation twice the mean over a period, of a decay the energy itself, relative to the whole.
+    """
+    shapes = np.array([m.shape for m in modes_], dtype=complex).reshape(len(modes_), content.shape[1])
+    energy = np.abs(((shapes @ content.T).conj() * (shapes @ conjugate.T)).real)
+    total = energy.sum(axis=1, keepdims=True)
+    return np.asarray(energy / np.where(total > 0.0, total, 1.0))
 
 
 def transfer(
@@ -130,10 +146,11 @@ def transfer(
 ) -> Transfer:
     """One output by one input; b, c [states]; place: output, input; improper: slopes by the input's rates."""
     inner, scale = balanced(a)
+    first = _first_markov(inner, b / scale, c * scale)
     inner, b, c = reached(inner, b / scale, c * scale)
     inner, c, b = reached(inner.T, c, b)
     inner = inner.T
-    zeros, gain = _zeros(inner, b, c, d)
+    zeros, gain = _zeros(inner, b, c, d, first)
     zeros = _at_origin(inner, b, c, d, zeros)
     poles = np.linalg.eigvals(inner).astype(complex) if inner.size else np.zeros(0, complex)
     poles = _resolved(_sharpened(poles, inner), inner)
@@ -179,24 +196,35 @@ def reached(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats]:
     return q @ a @ q.T, q @ b, q @ c
 
 
-def _zeros(a: Floats, b: Floats, c: Floats, d: float) -> tuple[Complexes, float]:
-    """Zeros and leading coefficient; none and 0 where nothing passes."""
-    n = b.size
-    if not n:
+def _first_markov(a: Floats, b: Floats, c: Floats) -> tuple[int, float] | None:
+    """r, c a^r b: the first Markov parameter that is not zero; None where nothing passes.
+
+    In the coordinates of the model, where zeros are zeros: those of `reached` mix them with round-off.
+    """
+    row, size = c, np.abs(c)
+    for r in range(b.size):
+        markov = float(row @ b)
+        faint = FAINT * float(np.abs(row).max() * np.abs(b).max())
+        if abs(markov) > max(VANISHING * float(size @ np.abs(b)), faint):
+            return r, markov
+        row, size = row @ a, size @ np.abs(a)
+    return None
+
+
+def _zeros(
+    a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] | None
+) -> tuple[Complexes, float]:
+    """Zeros and leading coefficient; none and 0 where nothing passes; first: of `_first_markov`."""
+    if not b.size:
         return np.zeros(0, complex), d
     if d != 0.0:
         return np.linalg.eigvals(a - np.outer(b, c) / d).astype(complex), d
-    kept, size = [c], np.abs(c)
-    for _ in range(n):
-        markov = float(kept[-1] @ b)
-        faint = FAINT * float(np.abs(kept[-1]).max() * np.abs(b).max())
-        if abs(markov) > max(VANISHING * float(size @ np.abs(b)), faint):
-            break
-        kept.append(kept[-1] @ a)
-        size = size @ np.abs(a)
-    else:
+    if first is None or first[0] >= b.size:
         return np.zeros(0, complex), 0.0
-    return _kept_at_zero(a, b, np.array(kept), markov), markov
+    kept = [c]
+    for _ in range(first[0]):
+        kept.append(kept[-1] @ a)
+    return _kept_at_zero(a, b, np.array(kept), first[1]), first[1]
 
 
 def _kept_at_zero(a: Floats, b: Floats, kept: Floats, markov: float) -> Complexes:

@@ -105,7 +105,11 @@ def solved(matrix: Wide, aim: Wide) -> Wide | None:
 def decompose(matrix: Wide) -> Decomposed:
     """Eigenvalues and eigenvectors in DIGITS, those below ZERO of the largest entry zero."""
     with digits():
-        found, left, right = mpmath.mp.eig(mpmath.matrix(matrix.tolist()), left=True, right=True)
+        try:
+            found, left, right = mpmath.mp.eig(mpmath.matrix(matrix.tolist()), left=True, right=True)
+        except RuntimeError:  # its iteration gives up on a few matrices; what is lost in doubles is refused later
+            values_, vectors = np.linalg.eig(narrow(matrix))
+            return Decomposed(values_.astype(complex), vectors.astype(complex), np.linalg.pinv(vectors).astype(complex))
         largest = max((abs(x) for x in matrix.ravel()), default=mpmath.mpf(0))
         values = [v if abs(v) > ZERO * largest else mpmath.mpf(0) for v in found]
         return Decomposed(

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -70,7 +70,8 @@ class Reduced:
     """dx' = a dx + b du, dy = c dx + d du + d1 du' + d2 du''; places [states]: of the states in y, names: theirs.
 
     A state may be a combination where an input or its rate moves it: see the module.  wide: the same where double
-    precision loses slow eigenvalues; decomposed: its eigenvalues and eigenvectors.
+    precision loses slow eigenvalues; decomposed: its eigenvalues and eigenvectors.  unsure:
+    a with the round-off of the rows changed, where that moves eigenvalues and they are not known better.
     """
 
     a: Floats
@@ -83,6 +84,7 @@ class Reduced:
     names: tuple[str, ...]
     wide: Wide | None = None
     decomposed: precise.Decomposed | None = None
+    unsure: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,9 +245,7 @@ def _widened(
     made: Callable[[NDArray[Any], float], Reduced],
     given: tuple[Floats, Floats, Floats, NDArray[np.int64], Floats],
 ) -> Reduced:
-    """The reduction in many digits, where its states are few and the rows determine all; else in double precision,
-    if its eigenvalues can be told from zero.
-    """
+    """The reduction in many digits, where its states are few and the rows determine all; else as it is, unsure."""
     g, again, right, chosen, moves = given
     if small.names and len(small.names) <= precise.MOST:
         with precise.digits():
@@ -258,9 +258,7 @@ def _widened(
                 matrices = (found.a, found.b, found.c, found.d, found.d1, found.d2)
                 a, b, c, d, d1, d2 = map(precise.narrow, matrices)
                 return Reduced(a, b, c, d, d1, d2, found.places, found.names, parts, seen)
-    again_ = made(_moved(again, right, chosen, moves), NOISE)
-    precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(again_.a), lost)
-    return small
+    return replace(small, unsure=made(_moved(again, right, chosen, moves), NOISE).a)
 
 
 def _wide(small: Reduced, beside: Wide | None = None) -> Wide:

@@ -82,6 +82,7 @@ def test_the_operating_point_of_a_diode(formulation, tmp_path, capsys):
     (found,) = rests(capsys, write(tmp_path, DIODE), "--formulation", formulation)
     current = lambda v: 1e-12 * (np.exp(v / 0.02585) - 1.0)  # noqa: E731
     v = brentq(lambda v: (5.0 - v) / 220.0 - current(v), 0.0, 1.0, xtol=1e-15)
+    assert found["efforts"] == pytest.approx({"s": 5.0, "a": v}, rel=1e-9)
     slope = 1 / 220 + (current(v) + 1e-12) / 0.02585
     eigenvalues = [complex(*e) for e in found["eigenvalues"] if abs(complex(*e)) > 1.0]
     assert eigenvalues == pytest.approx([-slope / 1e-6], rel=1e-9)
