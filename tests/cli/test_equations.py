@@ -170,7 +170,8 @@ def _same_terms(found, expected):
     for a, b in zip(one, other, strict=True):
         left, right = (re.split(r" (?=[+-] )", line.partition("= ")[2]) for line in (a, b))
         assert a.partition("= ")[0] == b.partition("= ")[0], (a, b)
-        assert sorted(t.removeprefix("+ ") for t in left) == sorted(t.removeprefix("+ ") for t in right), (a, b)
+        terms = [sorted(t.removeprefix("+ ").replace("- ", "-") for t in side) for side in (left, right)]
+        assert terms[0] == terms[1], (a, b)
     return True
 
 
