@@ -90,4 +90,5 @@ def test_arrays_of_parameters_are_read_back(tmp_path):
 
 def test_what_the_module_offers():
     names = {"Diagnostic", "Model", "ModelError", "Module", "NotMet", "SolverFailure", "Sweep", "Trace", "UsageError"}
-    assert set(api.__all__) == names | {"check", "compile_model", "load", "simulate"}
+    names |= {"Equilibrium", "Linearised", "NoState"}
+    assert set(api.__all__) == names | {"check", "compile_model", "equilibria", "linearize", "load", "simulate"}
