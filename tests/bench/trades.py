@@ -2,8 +2,8 @@
 
 For each model of the book and each accuracy: the work of the setting that the search chose over that of the cheapest
 of all combinations at all half-decade tolerances, and what the search's runs cost over what all runs cost (work beside
-the trace's rows).  Last column: errors as `trade` states them over those from `references.json`, least and largest of
-a dozen runs; the traces stand at the instants of the book (a larger error may lie between these).
+the trace's rows).  Then, least and largest of a dozen runs: the error as `trade` states it (the largest of all rows)
+over the largest at the book's instants by `references.json`; and what a run at the finest tolerance says of the latter.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.run.running import Request, run
-from sysdyn.cli.trade.traded import Measured, cheapest
+from sysdyn.cli.trade.traded import cheapest
 from sysdyn.cli.trade.trading import trade
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -45,18 +45,19 @@ def at_instants(name: str, entry: dict[str, Any], folder: Path) -> str:
     return str(path)
 
 
-def true_error(file: str, m: Measured, entry: dict[str, Any], folder: Path) -> float:
-    """Of one setting, by the book's values."""
-    c = m.combination
-    how = {"formulation": c.formulation, "index": c.index, "method": c.method, "rtol": m.tolerance}
+def values(file: str, entry: dict[str, Any], folder: Path, **how: Any) -> tuple[dict[str, Any], dict[str, float]]:
+    """A run at the book's instants, and the magnitudes of what it traces."""
     ran = run(Request(file, scene="reference", output=str(folder / "run.h5"), **how), Report())
     assert ran is not None
     trace, t = ran.outcome.traced, np.array(entry["t"])
     rows = np.searchsorted(trace.time, t + 1e-9 * t[-1], side="right") - 1
-    return max(
-        float(np.abs(trace[v].values[rows] - np.array(entry["values"][v])).max()) / (trace[v].nominal or 1.0)
-        for v in entry["variables"]
-    )
+    names = entry["variables"]
+    return {v: trace[v].values[rows] for v in names}, {v: trace[v].nominal or 1.0 for v in names}
+
+
+def apart(one: dict[str, Any], other: dict[str, Any], nominal: dict[str, float]) -> float:
+    """The largest relative difference."""
+    return max(float(np.abs(one[v] - np.array(other[v])).max()) / nominal[v] for v in one)
 
 
 def rows(name: str, accuracies: list[float], entry: dict[str, Any], folder: Path) -> list[str]:
@@ -68,19 +69,28 @@ def rows(name: str, accuracies: list[float], entry: dict[str, Any], folder: Path
     known = full.reference.uncertainty
     sure = [m for m in full.measured if m.usable and 10.0 * known < (m.error or 0.0) < 0.5]
     some = sure[:: max(len(sure) // SOME, 1)]
-    ratios = [(m.error or 0.0) / true_error(file, m, entry, folder) for m in some]
+    finest, _ = values(file, entry, folder, method="radau", rtol=1e-13)
+    ratios, there = [], []
+    for m in some:
+        c = m.combination
+        how = {"formulation": c.formulation, "index": c.index, "method": c.method, "rtol": m.tolerance}
+        found, nominal = values(file, entry, folder, **how)
+        true = apart(found, entry["values"], nominal)
+        ratios.append((m.error or 0.0) / true)
+        there.append(apart(found, finest, nominal) / true)
     lines = []
     for accuracy in accuracies:
-        found = trade(Request(file, scene="reference", accuracy=accuracy), Report(), folder)
+        tried = trade(Request(file, scene="reference", accuracy=accuracy), Report(), folder)
         best = cheapest(full.measured, accuracy, known)
-        if found is None or found.chosen is None or best is None:
+        if tried is None or tried.chosen is None or best is None:
             lines.append(f"{name:18s} {accuracy:8.0e} nothing chosen")
             continue
-        cost = sum(m.work - m.fixed for m in found.measured) / spent
-        chosen = f"{found.chosen.combination.name} at {found.chosen.tolerance:.0e}"
+        cost = sum(m.work - m.fixed for m in tried.measured) / spent
+        chosen = f"{tried.chosen.combination.name} at {tried.chosen.tolerance:.0e}"
         lines.append(
-            f"{name:18s} {accuracy:8.0e} {len(full.measured):5d} {len(found.measured):5d} "
-            f"{found.chosen.work / best.work:6.2f} {cost:7.3f}  {min(ratios):5.2f} .. {max(ratios):5.2f}  {chosen}"
+            f"{name:18s} {accuracy:8.0e} {len(full.measured):5d} {len(tried.measured):5d} "
+            f"{tried.chosen.work / best.work:6.2f} {cost:7.3f}  {min(ratios):5.2f} .. {max(ratios):5.2f}  "
+            f"{min(there):6.4f} .. {max(there):6.4f}  {chosen}"
         )
     return lines
 
@@ -93,7 +103,7 @@ def main() -> int:
     asked = parser.parse_args()
     shared = Path(os.environ.get("SYSDYN_SHARED", Path(__file__).parents[3] / "shared"))
     book = json.loads((shared / "seed" / "references.json").read_text(encoding="utf-8"))
-    print(f"{'model':18s} accuracy  runs tried   work    cost  stated / true    chosen")
+    print(f"{'model':18s} accuracy  runs tried   work    cost  stated / true  at the instants   chosen")
     for name in asked.models:
         with tempfile.TemporaryDirectory() as folder:
             for line in rows(name, [float(a) for a in asked.accuracy.split(",")], book[name], Path(folder)):
