@@ -109,7 +109,7 @@ def _defaults(given: Sequence[str]) -> dict[str, Any]:
         return {}
     from sysdyn.cli.project.config import configured
 
-    return configured(given)
+    return configured(given, COMMANDS)
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ the first that has one counts. What a scene says (accuracy, formulation, ...) is
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +48,8 @@ SAID = ("accuracy", "formulation", "index", "level", "method", "redundancy", "sc
 """What a scene says, with words of its own or as the scene that is named."""
 
 
-def configured(arguments: Sequence[str]) -> dict[str, Any]:
-    """What the project's file says, as click's map of defaults by command; {} where there is none.
+def configured(arguments: Sequence[str], commands: Iterable[str]) -> dict[str, Any]:
+    """What the project's file says, as click's map of defaults for each of the commands; {} where there is none.
 
     Raises UsageError with file and key where the file says what it cannot.
     """
@@ -65,18 +65,18 @@ def configured(arguments: Sequence[str]) -> dict[str, Any]:
         else:
             name, inner = _read(path, "", key, value)
             everywhere[name] = inner
-    return _map(everywhere, own)
+    return _map(everywhere, own, commands)
 
 
-def _map(everywhere: dict[str, Any], own: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _map(
+    everywhere: dict[str, Any], own: dict[str, dict[str, Any]], commands: Iterable[str]
+) -> dict[str, Any]:
     """Defaults of each command: those for all, then its own."""
-    from sysdyn.cli.main import COMMANDS
-
     general = {name: value for name, value in everywhere.items() if name in ("color", "quiet")}
     runs = {name: value for name, value in everywhere.items() if name in {n for n, _ in _RUN.values()}}
     jobs = {name: value for name, value in everywhere.items() if name == "jobs"}
     found: dict[str, Any] = {}
-    for command in COMMANDS:
+    for command in commands:
         found[command] = general | (runs if command in _RUNS else {}) | (jobs if command in _JOBS else {})
         found[command] |= own.get(command, {})
     inner = general | own.get("golden", {})
