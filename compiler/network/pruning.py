@@ -23,8 +23,8 @@ from typing import Any
 
 from sysdyn.compiler.network.dead_branches import dead_branches
 from sysdyn.compiler.network.influence import EVERYTHING, Link, Quantity, links, quantities, reached, read_by
-from sysdyn.dsl.model.expression import add
-from sysdyn.dsl.model.network import Energy, Network, nodes_read
+from sysdyn.dsl.model.expression import add, variables
+from sysdyn.dsl.model.network import Energy, Network, Observation, nodes_read
 
 KINDS = {"x": "coordinate", "n": "node", "b": "branch", "u": "implicit", "s": "state", "c": "constraint"}
 """What a quantity's letter stands for, in the order in which a listing names them."""
@@ -124,7 +124,19 @@ def _without(network: Network, found: Sequence[Link], gone: frozenset[Quantity])
         initials=said(network.initials),
         couplings=said(network.couplings),
     )
-    return replace(left, read=nodes_read(left))
+    speeds = tuple(o for o in network.speeds if not _read(o) & (_families(network) - _families(left)))
+    return replace(left, read=nodes_read(left), speeds=speeds)
+
+
+def _families(network: Network) -> set[str]:
+    """Names of what holds a value."""
+    families = (network.coordinates, network.unknowns, network.states, network.nodes, network.branches)
+    return {item.name for family in families for item in family}
+
+
+def _read(speed: Observation) -> set[str]:
+    """A quasi-velocity, and what it is written in."""
+    return {speed.name} | {str(n.data[0]) for n in variables(speed.expression) if n.op == "var"}
 
 
 def _energies(found: Sequence[Link], gone: frozenset[Quantity]) -> Iterator[Energy]:

@@ -27,9 +27,19 @@ def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
 def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
     """Diagonal of M at the places of the flows [unknowns]; 0 where there is none.
 
-    jy, jyd [entries]: dF/dy, dF/dyd.  M stands in the rows of dynamics (Lagrange), minus M in those of momentum.
+    jy, jyd [entries]: dF/dy, dF/dyd.  M stands in the rows of dynamics (Lagrange); those of momentum are p - M f, or
+    p/M - f.
     """
-    return np.maximum(_own(system, jyd, "dynamics", "f"), _own(system, jy, "momentum", "f"))
+    found, at = _own(system, jyd, "dynamics", "f"), system.form.at
+    by_flow, by_momentum = _own(system, jy, "momentum", "f"), _own(system, jy, "momentum", "p")
+    families = system.description.families
+    flow = {family.owner: k for k, family in enumerate(families) if family.kind == "f"}
+    for k, family in enumerate(families[: len(at)]):
+        if family.kind == "p" and family.owner in flow:
+            own = slice(at[flow[family.owner]], at[flow[family.owner]] + family.size)
+            one, other = by_flow[own], by_momentum[at[k] : at[k] + family.size]
+            found[own] = np.maximum(found[own], np.divide(one, other, out=np.zeros_like(one), where=other > 0.0))
+    return found
 
 
 def compliance(system: System, jy: Floats, jyd: Floats) -> Floats:

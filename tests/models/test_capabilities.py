@@ -437,7 +437,8 @@ def test_40_complementary_constraints():
 def test_41_duality(capsys):
     """Two tanks: balances of flows in momenta, balances of efforts in displacements; one solution."""
     meets("two_tank")
-    assert "C1 e1' + κ1 = F0 + F0 sin(w t)" in printed(capsys, "two_tank", "co_lagrangian")
+    lines = [line.partition("C1 e1' + κ1 = ")[2] for line in printed(capsys, "two_tank", "co_lagrangian")]
+    assert {"F0", "F0 sin(w t)"} in [set(line.split(" + ")) for line in lines]
     assert "κ1 = q2/C1" in printed(capsys, "two_tank_lagrangian_counterpart", "lagrangian")
 
 

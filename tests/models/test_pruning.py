@@ -320,7 +320,7 @@ def test_every_part_of_a_network_is_known_to_pruning():
     known = (
         "model place parameters tables coordinates unknowns states energies works constraints dynamics initials"
         " observations expectations statics goldens scene elements nodes branches couplings slopes quasis read"
-        " discretes events switches levels"
+        " discretes events switches levels speeds"
     )
     assert set(Network.__dataclass_fields__) == set(known.split())
 
@@ -328,3 +328,30 @@ def test_every_part_of_a_network_is_known_to_pruning():
 @pytest.mark.parametrize("seed", range(6))
 def test_random_models_agree_with_and_without(tmp_path, seed):
     assert compared(seed, tmp_path).worst <= 1.0
+
+
+def test_a_quasi_velocity_of_what_is_not_asked_goes_with_it(tmp_path):
+    """A skate that is traced beside one that is not: its closed form, in Kane's own unknowns."""
+    text = """
+model two {
+  coord x, y: translation
+  coord th: rotation
+  coord X, Y: translation
+  coord TH: rotation
+  energy T* = 1/2*(2 kg)*(x'^2 + y'^2) + 1/2*(1 kg.m^2)*th'^2
+  energy T* = 1/2*(3 kg)*(X'^2 + Y'^2) + 1/2*(1 kg.m^2)*TH'^2
+  psi blade: x'*sin(th) - y'*cos(th) = 0
+  psi other: X'*sin(TH) - Y'*cos(TH) = 0
+  quasi v: m/s = x'*cos(th) + y'*sin(th)
+  quasi V: m/s = X'*cos(TH) + Y'*sin(TH)
+  work 4 N on x
+  init x' = 1 m/s
+  init th' = 0.5 rad/s
+}
+scene one of two { time 0 s to 2 s; trace x, th, v }
+"""
+    kept, whole = (trace_of(tmp_path, text, formulation="kane", no_prune=whole) for whole in (False, True))
+    assert "X" in kept.attributes["pruned"]
+    for name in ("x", "th", "v"):
+        scale = np.abs(whole[name].values).max()
+        assert np.abs(kept[name].values[-1] - whole[name].values[-1]) < 1e-4 * scale

@@ -34,7 +34,7 @@ CHANGES = {
     "raise E(x[0])": [],
 }
 SIGNS = (
-    ("forms/lowering.py", "works", "neg left out", "seed/dc_motor"),
+    ("forms/efforts.py", "efforts", "neg left out", "seed/dc_motor"),
     ("forms/kane.py", "_column", "neg left out", "seed/knife_edge"),
     ("network/reflection.py", "_coupling", "neg left out", "seed/dc_motor"),
 )
