@@ -160,7 +160,9 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
     with _timed("descriptor", timings):
-        own = transformed(model, network.parameters) if formulation.endswith("hamiltonian") else model
+        legendre = formulation.endswith("hamiltonian")
+        own, rests = transformed(model, network.parameters) if legendre else (model, ())
+        network = replace(network, slopes=(*network.slopes, *rests))
         lowered = FORMULATIONS[formulation.removeprefix("co_")](own)
         titles = tuple(replace(r, label=word(formulation, r.label)) if r.block == "audit" else r for r in lowered.rows)
         lowered = replace(lowered, formulation=formulation, rows=titles)

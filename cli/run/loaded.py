@@ -39,6 +39,10 @@ class Compiled:
     """Its module was compared with its text."""
 
 
+def _texts(settings: Settings) -> tuple[tuple[str, str], ...]:
+    return tuple((name, value if isinstance(value, str) else repr(float(value))) for name, value in settings.items())
+
+
 class Loaded:
     """A target of a file: `run` it with other numbers.  ModelError, UsageError where text or options are wrong."""
 
@@ -95,8 +99,15 @@ class Loaded:
         compiled = self._text(texts)
         if not numbers:
             return compiled.prepared, compiled
-        with ex.fresh(compiled.nodes):
-            binding = compiled.prepared.compiled.bind(numbers)
+        try:
+            with ex.fresh(compiled.nodes):
+                binding = compiled.prepared.compiled.bind(numbers)
+        except ModelError as error:
+            scalar = all(isinstance(value, str) or np.ndim(value) == 0 for value in settings.values())
+            if not scalar or {d.code for d in error.diagnostics} != {"E605"}:
+                raise
+            compiled = self._text(_texts(settings))  # a value that asks for another form: a mass that is zero
+            return compiled.prepared, compiled
         return replace(compiled.prepared, binding=binding, cpu_compile_s=0.0), compiled
 
     def run(self, settings: Settings, report: Report, **changes: Any) -> Ran | None:

@@ -32,7 +32,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
-from sysdyn.dsl.model.network import Parameter
+from sysdyn.dsl.model.network import Parameter, Slope
 
 LARGEST = 12
 """Coordinates of a block that is looked at."""
@@ -55,23 +55,36 @@ class _Block:
     terms: tuple[int, ...]
 
 
-def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> EnergyModel:
-    """The model with T(p, q) for the blocks of T* that allow it."""
+def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[EnergyModel, tuple[Slope, ...]]:
+    """The model with T(p, q) for the blocks of T* that allow it; the determinants that must not become zero."""
     m = model.mirror
     terms = model.function(m.coenergy)
     gone: set[int] = set()
     found: list[Term] = []
+    rests: list[Slope] = []
     for block in _blocks(terms, m.rate):
         whole = add(*(terms[k].expression for k in block.terms))
         energy = _energy(whole, block.flows, m.conjugate, _known(parameters))
         if energy is not None:
+            place = terms[block.terms[0]].place
             gone |= set(block.terms)
-            found += [Term(part, (), terms[block.terms[0]].place) for part in energy]
+            found += [Term(part, (), place) for part in energy]
+            rests += [Slope(f.data[0], size, (), False, place) for f, size in _rest_on(whole, block.flows)]
     if not found:
-        return model
+        return model, ()
     kept = tuple(t for k, t in enumerate(terms) if k not in gone)
     functions = {**model.functions, m.coenergy: kept, m.energy: (*model.function(m.energy), *found)}
-    return replace(model, functions=functions)
+    return replace(model, functions=functions), tuple(rests)
+
+
+def _rest_on(whole: Node, flows: Sequence[Node]) -> Iterator[tuple[Node, Node]]:
+    """A flow and what of parameters must not be zero, for M to have an inverse."""
+    inertia = [[derivative(derivative(whole, f), g) for g in flows] for f in flows]
+    apart = all(is_const(e, 0.0) for j, row in enumerate(inertia) for k, e in enumerate(row) if j != k)
+    sizes = [row[k] for k, row in enumerate(inertia)] if apart else [determinant(inertia)]
+    for f, size in zip(flows, sizes, strict=False):
+        if not is_const(size) and not any(n.op in ("var", "time") for n in topological([size])):
+            yield f, size
 
 
 def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_Block]:

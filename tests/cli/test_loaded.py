@@ -130,3 +130,29 @@ def test_check_of_a_text():
     found = check("model m {\n  coord x: translation\n  energy T* = 1/2*y*x'^2\n}\n", "mine.sd")
     assert [d.code for d in found] == ["E101"]
     assert found[0].place.file == "mine.sd"
+
+
+ZERO = """
+model zero {
+  param m = 0.5 kg
+  coord x: translation = 1 m
+  coord y: translation = 0.2 m
+  energy T* = 1/2*(1 kg)*x'^2 + 1/2*m*y'^2
+  energy V = 1/2*(4 N/m)*x^2 + 1/2*(9 N/m)*(y - x)^2
+  content D = 1/2*(1 N.s/m)*y'^2
+  init x' = 0 m/s
+}
+scene s of zero { time 0 s to 2 s; trace x, y every 0.5 s }
+"""
+
+
+def test_a_mass_may_become_zero_in_hamiltons_form_which_divides_by_it(tmp_path):
+    path = tmp_path / "zero.sd"
+    path.write_text(ZERO)
+    ends = {}
+    for formulation in ("lagrangian", "hamiltonian"):
+        model = load(path, formulation=formulation)
+        ends[formulation] = [model.run(set={"m": m})["y"][-1] for m in (0.5, 0.0, 0.5)]
+        assert ends[formulation][0] == ends[formulation][2]
+    assert np.allclose(ends["lagrangian"], ends["hamiltonian"], rtol=0.0, atol=1e-4)
+    assert abs(ends["lagrangian"][0] - ends["lagrangian"][1]) > 1e-3

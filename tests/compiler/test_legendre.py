@@ -21,7 +21,7 @@ def lowered(key, k, changes=()):
     entry = CATALOGUE[key]
     entry = {**entry, "parameters": entry["parameters"] | dict(changes)}
     net = network(entry, entry["models"][k])
-    return entry, net, transformed(energies(net), net.parameters)
+    return entry, net, transformed(energies(net), net.parameters)[0]
 
 
 def test_what_is_transformed():
