@@ -224,7 +224,16 @@ def _simple(sympy: Any, value: Any) -> Any:
     if value.has(sympy.sin, sympy.cos) and value.count_ops() < 300:
         above, below = sympy.fraction(value)
         value = _turned(sympy, sympy.expand(above)) / _turned(sympy, sympy.expand(below))
-    return sympy.factor(sympy.cancel(value)) if value.count_ops() < 600 else value
+    return _cancelled(sympy, value) if value.count_ops() < 600 else value
+
+
+def _cancelled(sympy: Any, value: Any) -> Any:
+    """Without common factors; by sparse polynomials, for in a dozen parameters dense ones take minutes."""
+    try:
+        _, fraction = sympy.polys.fields.sfield(value)
+    except (sympy.polys.polyerrors.BasePolynomialError, NotImplementedError):
+        return value
+    return fraction.as_expr()
 
 
 def _turned(sympy: Any, value: Any) -> Any:
