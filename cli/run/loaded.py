@@ -39,8 +39,9 @@ class Compiled:
     """Its module was compared with its text."""
 
 
-def _texts(settings: Settings) -> tuple[tuple[str, str], ...]:
-    return tuple((name, value if isinstance(value, str) else repr(float(value))) for name, value in settings.items())
+def _text_of(value: Any) -> str:
+    """A value as --set takes it."""
+    return value if isinstance(value, str) else repr(float(value))
 
 
 class Loaded:
@@ -87,7 +88,7 @@ class Loaded:
                 with ex.fresh():
                     number = load.constant(self.target.document, value, parameter.unit.dimension, name, silent)
             if parameter is None or number is None or isinstance(number, str):
-                texts.append((name, value if isinstance(value, str) else repr(float(value))))
+                texts.append((name, _text_of(value)))
             else:
                 key = (plain, *map(int, element[2].split(","))) if element else name
                 numbers[key] = np.asarray(number, dtype=float)
@@ -106,7 +107,8 @@ class Loaded:
             scalar = all(isinstance(value, str) or np.ndim(value) == 0 for value in settings.values())
             if not scalar or {d.code for d in error.diagnostics} != {"E605"}:
                 raise
-            compiled = self._text(_texts(settings))  # a value that asks for another form: a mass that is zero
+            # a value that asks for another form: a mass that is zero
+            compiled = self._text(tuple((name, _text_of(value)) for name, value in settings.items()))
             return compiled.prepared, compiled
         return replace(compiled.prepared, binding=binding, cpu_compile_s=0.0), compiled
 

@@ -13,10 +13,11 @@ Block `ledger` holds what each element stores.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations
+from sysdyn.compiler.forms.efforts import Effort
 from sysdyn.compiler.forms.ledgers import POWERS, STORED, Element, Entry, Ledger, ledgers
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.terms import Term, counter, local_variables
@@ -46,10 +47,10 @@ LEDGER = ("stored", "dissipated", "supplied", "gross")
 power dissipated and supplied."""
 
 
-def add_audit(assembly: Assembly, model: EnergyModel) -> tuple[tuple[str, Shape], ...]:
+def add_audit(assembly: Assembly, model: EnergyModel, acting: Sequence[Effort]) -> tuple[tuple[str, Shape], ...]:
     """Rows kinetic, potential (J), dissipated, supplied (W), those of the ledgers, and what elements store.
 
-    Returns the shapes of the row families of block ledger, by owner.
+    acting: every effort of the balances.  Returns the shapes of the row families of block ledger, by owner.
     """
     for name, unit in GLOBAL:
         assembly.family(Equations("audit", name, name, "audit", unit, None))
@@ -59,7 +60,7 @@ def add_audit(assembly: Assembly, model: EnergyModel) -> tuple[tuple[str, Shape]
         if units[entry.owners[0]] == "J" if entry.owners else True:
             assembly.add("audit", entry.account, (), entry.nest, entry.expression)
     shapes: list[tuple[str, Shape]] = []
-    for number, ledger in enumerate(ledgers(model, entries)):
+    for number, ledger in enumerate(ledgers(model, entries, acting)):
         _add_ledger(assembly, number, ledger, model, shapes)
     return tuple(shapes)
 

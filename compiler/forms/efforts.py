@@ -14,7 +14,7 @@ effort as an expression.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from sysdyn.compiler.forms.momenta import at_indices
@@ -24,6 +24,8 @@ from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, signals
 
 PREFIX = "x:"
 """Of the kinds of unknown that stand for effort classes."""
+Places = Callable[[Node, str], list[Node]]
+"""(expression, kind) -> the variables of the coordinates that are asked for."""
 _WORKS = {"stored": "potential", "dissipated": "dissipative", "supplied": "source"}
 
 
@@ -41,18 +43,22 @@ class Effort:
     value: Node
 
 
-def efforts(model: EnergyModel) -> Iterator[Effort]:
-    """Every summand but the rates of momenta."""
-    yield from _gradients(model)
+def efforts(model: EnergyModel, owner: str | None = None) -> Iterator[Effort]:
+    """Every summand but the rates of momenta; owner: those on one coordinate alone."""
+
+    def on_(root: Node, kind: str) -> list[Node]:
+        return [n for n in local_variables(root, kind) if owner in (None, n.data[0])]
+
+    yield from _gradients(model, on_)
     for work in model.works:
-        for on in local_variables(work.on, model.mirror.coordinate):
+        for on in on_(work.on, model.mirror.coordinate):
             value = neg(mul(work.effort, derivative(work.on, on)))
             yield Effort(_class_of(model, work), "dynamics", on, work.loops, value)
     for row in model.rows:
-        yield from _reactions(model, row)
+        yield from _reactions(model, row, on_)
 
 
-def _gradients(model: EnergyModel) -> Iterator[Effort]:
+def _gradients(model: EnergyModel, on_: Places) -> Iterator[Effort]:
     """-dT*/dq + dT/dq + dV/dq + dD/df."""
     m = model.mirror
     functions = (
@@ -61,7 +67,7 @@ def _gradients(model: EnergyModel) -> Iterator[Effort]:
     )  # fmt: skip
     for name, function, kind, sign in functions:
         for term in model.function(function):
-            for on in local_variables(term.expression, kind):
+            for on in on_(term.expression, kind):
                 slope = derivative(term.expression, on)
                 yield Effort(name, "dynamics", on, term.loops, slope if sign > 0.0 else neg(slope))
 
@@ -73,7 +79,7 @@ def _class_of(model: EnergyModel, work: Virtual) -> str:
     return _WORKS[work.account]
 
 
-def _reactions(model: EnergyModel, row: Row) -> Iterator[Effort]:
+def _reactions(model: EnergyModel, row: Row, on_: Places) -> Iterator[Effort]:
     """Phi_q^T kappa or Psi_f^T mu of one row of constraints; nothing of others.  Signals are held: power is kept."""
     if row.kind not in ("phi", "psi"):
         return
@@ -82,7 +88,7 @@ def _reactions(model: EnergyModel, row: Row) -> Iterator[Effort]:
     multiplier = var(row.name, name, *row.at)
     for term in row.terms:
         held, signals = signals_held(term.expression)
-        for on in local_variables(held, kind):
+        for on in on_(held, kind):
             value = mul(substitute(derivative(held, on), signals), multiplier)
             yield Effort("constraint", f"{row.kind}_reaction", on, term.loops, value)
 
@@ -99,7 +105,7 @@ def acting(root: Node) -> list[Node]:
 def effort(model: EnergyModel, node: Node) -> Node:
     """The effort of the node's class at its indices."""
     name, owner, at = node.data[1].removeprefix(PREFIX), node.data[0], node.args
-    found = (e for e in efforts(model) if e.name == name and e.on.data[0] == owner)
+    found = (e for e in efforts(model, owner) if e.name == name)
     parts = [neg(at_indices(e.nest, e.on.args, e.value, at)) for e in found]
     if name == "inertial":
         parts.append(neg(var(owner, model.mirror.conjugate, *at, order=1)))

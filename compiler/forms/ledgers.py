@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TypeVar
 
-from sysdyn.compiler.forms.efforts import Effort, efforts
+from sysdyn.compiler.forms.efforts import Effort
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, local_variables, summands
 from sysdyn.dsl.model.expression import Node, add, const, derivative, is_const, scale, var, variables
@@ -82,7 +82,7 @@ class Ledger:
         return self.names[0] if found is None else str(found.data[0])
 
 
-def ledgers(model: EnergyModel, entries: Sequence[Entry]) -> tuple[Ledger, ...]:
+def ledgers(model: EnergyModel, entries: Sequence[Entry], acting: Iterable[Effort]) -> tuple[Ledger, ...]:
     """The ledgers of all parts that have stores, dissipators or sources, then the linear invariants of states and of
     momenta.
     """
@@ -100,7 +100,7 @@ def ledgers(model: EnergyModel, entries: Sequence[Entry]) -> tuple[Ledger, ...]:
         Ledger("energy", units[first], tuple(own), tuple(members[first]), _listed(members[first]))
         for first, own in found.items()
     ]
-    return (*parts, *_of_states(model), *_of_momenta(model))
+    return (*parts, *_of_states(model), *_of_momenta(model, acting))
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -176,13 +176,13 @@ def _of_states(model: EnergyModel) -> Iterator[Ledger]:
             yield Ledger("invariant", unit, entries, tuple(combination), _sum(combination))
 
 
-def _of_momenta(model: EnergyModel) -> Iterator[Ledger]:
+def _of_momenta(model: EnergyModel, acting: Iterable[Effort]) -> Iterator[Ledger]:
     """Combinations of momenta of scalar coordinates, of one unit, on which the efforts add up to nothing."""
     scalars = {c.name: c for c in model.coordinates if not c.shape}
     if len(scalars) > MOST:
         return
     found: dict[str, list[Effort]] = {name: [] for name in scalars}
-    for effort in efforts(model):
+    for effort in acting:
         found.setdefault(effort.on.data[0], []).append(effort)
     free = [name for name in scalars if not any(e.nest or e.on.args for e in found[name])]
     for unit in dict.fromkeys(scalars[name].units["p"] for name in free):

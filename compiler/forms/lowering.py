@@ -11,6 +11,8 @@ With u the loop-local unknowns of a term, every gradient is taken once per term 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.audit import add_audit
 from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
@@ -45,10 +47,11 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     form = _Lowering(model, stores, frozenset(carriers))
     form.declare()
     form.kinetic()
-    form.efforts()
+    acting = tuple(efforts(model))
+    form.efforts(acting)
     form.constraints()
     add_observations(form.assembly, model, form.carriers)
-    stored = add_audit(form.assembly, model)
+    stored = add_audit(form.assembly, model, acting)
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
     owners = (*model.coordinates, *model.unknowns, *model.states)
@@ -226,9 +229,9 @@ class _Lowering:
         self.assembly.add("momentum", owner, at, nest, expression)
         self.assembly.add("momentum_rate", owner, at, nest, time_derivative(expression))
 
-    def efforts(self) -> None:
+    def efforts(self, acting: Iterable[Effort]) -> None:
         """Gradients, works and reactions."""
-        for found in efforts(self.model):
+        for found in acting:
             self._effort(found)
 
     def constraints(self) -> None:
