@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import logging
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,6 +10,7 @@ from sysdyn.cli.analysis.answers import Answer, Locus
 from sysdyn.cli.analysis.linear import Linear
 from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.panels import COLOURS
+from sysdyn.cli.page.picture import drawing
 
 Draw = Callable[[Any], None]
 MOST = 8
@@ -25,12 +23,6 @@ def picture(
     title: str, linear: Linear, found: Sequence[Answer], locus: Locus | None, kinds: Sequence[str], kind: str
 ) -> bytes:
     """kinds: of bode, nyquist, step, poles, locus; kind: png or svg."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from sysdyn.cli.page.picture import style
-
     found = found[:MOST]
     panels: list[Draw] = []
     if "bode" in kinds and found:
@@ -45,19 +37,16 @@ def picture(
         panels.append(lambda axis: _locus(axis, locus))
     columns = 1 if len(panels) == 1 else 2
     rows = max(-(-len(panels) // columns), 1)
-    with warnings.catch_warnings(), mpl.rc_context(style(mpl.rcParamsDefault)):
-        warnings.simplefilter("ignore")
-        figure = Figure(figsize=(5.4 * columns + 0.6, 0.5 + 3.3 * rows), layout="constrained")
-        FigureCanvasAgg(figure)
+
+    def draw(figure: Any) -> None:
         axes = list(figure.subplots(rows, columns, squeeze=False).flat)
-        for axis, draw in zip(axes, panels, strict=False):
-            draw(axis)
+        for axis, panel in zip(axes, panels, strict=False):
+            panel(axis)
         for axis in axes[len(panels) :]:
             axis.set_visible(False)
         figure.suptitle(title, fontweight="bold", fontsize=11, x=0.01, ha="left")
-        data = io.BytesIO()
-        figure.savefig(data, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
-    return data.getvalue()
+
+    return drawing((5.4 * columns + 0.6, 0.5 + 3.3 * rows), kind, draw)
 
 
 def page(title: str, svg: bytes, tables: Sequence[tuple[str, Sequence[Sequence[str]]]]) -> bytes:

@@ -14,10 +14,10 @@ from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.reduce.activity import Activities
 from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
+from sysdyn.cli.report.balance import WORDS
 from sysdyn.cli.run.running import Request
 
 KINDS = (".png", ".svg")
-WORDS = {"held": "stored", "out": "dissipated", "in": "supplied", "through": "passed on"}
 BAR = 24
 """Characters of the longest bar."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import logging
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from sysdyn.cli.page.panels import Panel, curve, panels_of, styled, time_unit, unit_text
@@ -39,19 +39,12 @@ STYLE: dict[str, Any] = {
 
 def picture(traces: Sequence[tuple[str, Trace]], names: Sequence[str], kind: str) -> bytes:
     """The picture of the named quantities of (label, trace) pairs; kind is png or svg."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     panels = panels_of([t for _, t in traces], names)
     columns = 1 if len(panels) <= 6 else 2
     rows = -(-len(panels) // columns)
-    with warnings.catch_warnings(), mpl.rc_context(style(mpl.rcParamsDefault)):
-        warnings.simplefilter("ignore")  # names in scripts that the font lacks
-        height = 1.0 + rows * max(1.9 if rows > 1 else 3.2, 2.6 - 0.2 * rows)
-        figure = Figure(figsize=(7.2 * columns if columns == 1 else 11.0, height), layout="constrained")
-        FigureCanvasAgg(figure)
+    height = 1.0 + rows * max(1.9 if rows > 1 else 3.2, 2.6 - 0.2 * rows)
+
+    def draw(figure: Any) -> None:
         axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
         scale, unit = time_unit([t for _, t in traces])
         for position, axis in enumerate(axes.T.flat):
@@ -65,13 +58,31 @@ def picture(traces: Sequence[tuple[str, Trace]], names: Sequence[str], kind: str
             last.tick_params(labelbottom=True)
         _head(axes[0], traces)
         figure.align_ylabels()
+
+    return drawing((7.2 * columns if columns == 1 else 11.0, height), kind, draw)
+
+
+def drawing(size: tuple[float, float], kind: str, draw: Callable[[Any], None]) -> bytes:
+    """The bytes of a figure of a size (inches) that `draw` fills; kind: png or svg.
+
+    Under our settings, not a person's, and without a date: one picture of the same data is always the same bytes.
+    """
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with warnings.catch_warnings(), mpl.rc_context(_style(mpl.rcParamsDefault)):
+        warnings.simplefilter("ignore")  # names in scripts that the font lacks
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasAgg(figure)
+        draw(figure)
         data = io.BytesIO()
-        none = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(data, format=kind, metadata=none)
+        figure.savefig(data, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
     return data.getvalue()
 
 
-def style(defaults: Any) -> Any:
+def _style(defaults: Any) -> Any:
     """Matplotlib's own settings under ours: a person's configuration does not change a picture."""
     return {**defaults, **STYLE, "backend": "agg"}
 

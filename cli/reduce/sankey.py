@@ -7,19 +7,17 @@ component are one stub, and those too thin to be seen are added up.
 
 from __future__ import annotations
 
-import io
-import logging
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from sysdyn.cli.page.picture import drawing
 from sysdyn.cli.reduce.activity import Activities, Activity
+from sysdyn.cli.report.balance import WORDS
 from sysdyn.dsl.text.render import printable
 
 COLOURS = {"held": "#1f5fa8", "out": "#d1495b", "in": "#2f8f6b", "through": "#9aa0a6"}
-WORDS = {"held": "stored", "out": "dissipated", "in": "supplied", "through": "passed on"}
 THIN = 0.01
 """Of the largest bus: what is less is added up."""
 BARS = 16
@@ -30,12 +28,11 @@ GAP, STUB = 0.07, 0.30
 
 @dataclass(frozen=True, slots=True)
 class Stub:
-    """Energy [J] that enters or leaves a bus; role: held, out, in; many: of how many elements."""
+    """Energy [J] that enters or leaves a bus; role: held, out, in."""
 
     label: str
     role: str
     energy: float
-    many: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +47,10 @@ class Pass:
 
 @dataclass(frozen=True, slots=True)
 class Bus:
-    """A domain.  enters, leaves: largest first."""
+    """A domain.  size [J]: what went through it; enters, leaves: largest first."""
 
     name: str
+    size: float
     enters: tuple[Stub, ...]
     leaves: tuple[Stub, ...]
 
@@ -88,7 +86,7 @@ def flows(items: Iterable[Activity]) -> Flows:
     least = THIN * max(size.values(), default=0.0)
     net = {n: _moved(passes, n, into=True) - _moved(passes, n, into=False) for n in enters}
     order = sorted(enters, key=lambda name: (net[name], name))
-    buses = (Bus(n, _stubs(enters[n], least), _stubs(leaves[n], least)) for n in order if size[n] > 0.0)
+    buses = (Bus(n, size[n], _stubs(enters[n], least), _stubs(leaves[n], least)) for n in order if size[n] > 0.0)
     return Flows(tuple(buses), tuple(p for p in passes if p.energy > 0.0))
 
 
@@ -117,7 +115,7 @@ def _passes(label: str, ends: Sequence[tuple[str, float]]) -> Iterable[Pass]:
 
 
 def _stubs(found: Mapping[tuple[str, str], Sequence[float]], least: float) -> tuple[Stub, ...]:
-    stubs = [Stub(label, role, sum(e), len(e)) for (label, role), e in found.items() if sum(e) > 0.0]
+    stubs = [Stub(label, role, sum(e)) for (label, role), e in found.items() if sum(e) > 0.0]
     kept = [s for s in stubs if s.energy >= least]
     for role in dict.fromkeys(s.role for s in stubs):
         thin = [s for s in stubs if s.energy < least and s.role == role]
@@ -133,26 +131,16 @@ def _stubs(found: Mapping[tuple[str, str], Sequence[float]], least: float) -> tu
 
 def picture(found: Activities, name: str, kind: str) -> bytes:
     """PNG or SVG; kind says which."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from sysdyn.cli.page.picture import style
-
     drawn = found.items[:BARS]
     where = flows(found.items)
     high = 1.1 + 0.24 * len(drawn), 3.6
-    with warnings.catch_warnings(), mpl.rc_context(style(mpl.rcParamsDefault)):
-        warnings.simplefilter("ignore")
-        figure = Figure(figsize=(max(8.6, 1.6 + 3.2 * len(where.buses)), sum(high)), layout="constrained")
-        FigureCanvasAgg(figure)
+
+    def draw(figure: Any) -> None:
         bars, below = figure.subplots(2, 1, height_ratios=high)
         _bars(bars, drawn, name)
         _draw(below, where)
-        data = io.BytesIO()
-        none = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(data, format=kind, metadata=none)
-    return data.getvalue()
+
+    return drawing((max(8.6, 1.6 + 3.2 * len(where.buses)), sum(high)), kind, draw)
 
 
 def _bars(axis: Any, drawn: Sequence[Activity], name: str) -> None:
@@ -180,12 +168,7 @@ def _draw(axis: Any, where: Flows) -> None:
     """The buses side by side, their tops at one height."""
     axis.set_axis_off()
     places = {bus.name: k for k, bus in enumerate(where.buses)}
-    totals = {
-        bus.name: max(sum(s.energy for s in bus.enters) + _moved(where.passes, bus.name, into=True),
-                      sum(s.energy for s in bus.leaves) + _moved(where.passes, bus.name, into=False))
-        for bus in where.buses
-    }  # fmt: skip
-    most = max(totals.values(), default=0.0)
+    most = max((bus.size for bus in where.buses), default=0.0)
     if most <= 0.0:
         axis.text(0.5, 0.5, "no energy moves", ha="center", transform=axis.transAxes)
         return
@@ -200,9 +183,9 @@ def _draw(axis: Any, where: Flows) -> None:
         left[p.target] += size
     lowest = 0.0
     for bus in where.buses:
-        x, size = places[bus.name], totals[bus.name] / most
+        x, size = places[bus.name], bus.size / most
         axis.fill([x - 0.02, x + 0.02, x + 0.02, x - 0.02], [0, 0, -size, -size], color="#30343b")
-        axis.text(x, 0.03, f"{bus.name or 'model'}\n{totals[bus.name]:.4g} J", ha="center", va="bottom", fontsize=9)
+        axis.text(x, 0.03, f"{bus.name or 'model'}\n{bus.size:.4g} J", ha="center", va="bottom", fontsize=9)
         low = (
             _stubs_of(axis, bus.enters, x, left[bus.name], most, -1),
             _stubs_of(axis, bus.leaves, x, right[bus.name], most, 1),

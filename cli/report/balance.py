@@ -37,6 +37,8 @@ from sysdyn.runtime.trace.trace import Trace
 MOST = 400
 """Elements and statements whose power is observed."""
 ROLES = {"kinetic": "held", "potential": "held", "dissipator": "out", "effort": "in", "flow": "in", "port": "through"}
+WORDS = {"held": "stored", "out": "dissipated", "in": "supplied", "through": "passed on"}
+"""Of roles, for a reader."""
 _RATES = {"T*": ("f", "nf", "bf"), "D": ("f", "nf", "bf"), "V*": ("f", "ne", "be"), "G": ("f", "ne", "be")}
 _KINDS = ("q", "f", "p", "e")
 REST = 1e-6
@@ -215,17 +217,16 @@ def section(found: Sequence[Share] | None, link: Sequence[str], balance: float) 
     if not found:
         why = "there is no power in it, or its run failed or took long"
         return f'<p class="soft">The energies of the elements were not measured: {why}.</p>'
-    words = {"held": "stored", "out": "dissipated", "in": "supplied", "through": "passed on"}
     rows = []
     for share, label in zip(found, link, strict=True):
-        rows.append([label, *(joules(share.energy) if share.role == c else "" for c in words)])
-    sums = {c: sum(s.energy for s in found if s.role == c) for c in words}
+        rows.append([label, *(joules(share.energy) if share.role == c else "" for c in WORDS)])
+    sums = {c: sum(s.energy for s in found if s.role == c) for c in WORDS}
     rest = sums["held"] + sums["out"] - sums["in"]
     if abs(rest) > max(REST * max(abs(s.energy) for s in found), 10.0 * abs(balance)):
         rows.append(["constraints and statements that move in time", "", "", joules(rest), ""])
         sums["in"] += rest
-    rows.append(["<b>sum</b>", *(f"<b>{joules(sums[c])}</b>" if c != "through" else "" for c in words)])
-    heads = ["element or statement", *(f"{word} [J]" for word in words.values())]
+    rows.append(["<b>sum</b>", *(f"<b>{joules(sums[c])}</b>" if c != "through" else "" for c in WORDS)])
+    heads = ["element or statement", *(f"{word} [J]" for word in WORDS.values())]
     line = f'<p class="soft">Stored + dissipated − supplied over the run: {joules(balance)} J (audit.energy).'
     if any(s.role == "through" for s in found):
         line += " A coupling passes on what its first side absorbs: its sides add up to nothing."

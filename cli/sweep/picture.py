@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import logging
-import warnings
 from typing import Any
 
 import numpy as np
 from sysdyn.cli.page.panels import COLOURS
+from sysdyn.cli.page.picture import drawing
 from sysdyn.cli.sweep.sweeping import Swept
 
 MOST = 4
@@ -17,21 +15,13 @@ MOST = 4
 
 def picture(found: Swept, kind: str) -> bytes:
     """PNG or SVG: a row a traced quantity; runs that are not met in red crosses."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from sysdyn.cli.page.picture import style
-
     names = list(next((k.end for k in found.kept if k.end), {}) or {})[:MOST]
     over = list(found.cases[0])[:MOST]
     bands = any(k.traces for k in found.kept)
     columns = len(over) + bands
-    with warnings.catch_warnings(), mpl.rc_context(style(mpl.rcParamsDefault)):
-        warnings.simplefilter("ignore")
-        size = (2.4 + 3.1 * columns, 1.0 + 2.2 * max(len(names), 1))
-        figure = Figure(figsize=size, layout="constrained")
-        FigureCanvasAgg(figure)
+    size = (2.4 + 3.1 * columns, 1.0 + 2.2 * max(len(names), 1))
+
+    def draw(figure: Any) -> None:
         axes = figure.subplots(max(len(names), 1), columns, squeeze=False, sharex="col")
         for row, name in enumerate(names):
             if bands:
@@ -46,9 +36,8 @@ def picture(found: Swept, kind: str) -> bytes:
         axes[0, 0].set_title(f"{len(found.cases)} runs" + (", median, 80 % and all" if bands else ": at the end"))
         if bands:
             axes[0, 1].set_title("at the end")
-        data = io.BytesIO()
-        figure.savefig(data, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
-    return data.getvalue()
+
+    return drawing(size, kind, draw)
 
 
 def _labelled(found: Swept, name: str) -> str:

@@ -7,17 +7,15 @@ ringed, the accuracy asked as a vertical line.
 from __future__ import annotations
 
 import base64
-import io
 import json
-import logging
 import math
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.panels import COLOURS
+from sysdyn.cli.page.picture import drawing
 from sysdyn.cli.page.plots import SCRIPT, hint
 from sysdyn.cli.trade.traded import Combination, Measured, Traded
 
@@ -48,17 +46,9 @@ def colours(found: Traded) -> dict[str, str]:
 
 def picture(found: Traded, kind: str) -> bytes:
     """PNG or SVG; one trade always the same bytes but for what was measured in seconds (nothing of it is drawn)."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from sysdyn.cli.page.picture import style
-
     colour = colours(found)
-    with warnings.catch_warnings(), mpl.rc_context(style(mpl.rcParamsDefault)):
-        warnings.simplefilter("ignore")
-        figure = Figure(figsize=(8.6, 5.0), layout="constrained")
-        FigureCanvasAgg(figure)
+
+    def draw(figure: Any) -> None:
         axis = figure.subplots()
         for c, line in curves(found).items():
             axis.plot(
@@ -80,10 +70,8 @@ def picture(found: Traded, kind: str) -> bytes:
         axis.set_title(found.name, fontweight="bold", fontsize=11, pad=10)
         axis.set_title(_resolved(found), loc="right", fontsize=8.5, color="#7b828c", pad=10)
         _legend(axis, found, colour)
-        data = io.BytesIO()
-        none = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(data, format=kind, metadata=none)
-    return data.getvalue()
+
+    return drawing((8.6, 5.0), kind, draw)
 
 
 def _resolved(found: Traded) -> str:
