@@ -2,6 +2,8 @@
 
 import inspect
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -35,6 +37,16 @@ def test_every_room_has_a_page_of_files_that_exist(room):
         assert any((place / name).is_file() for place in places), name
     for name in re.findall(r"`([a-z_/]+/)`", text):
         assert (room / name).is_dir(), name
+
+
+def test_nothing_but_the_rooms_stands_at_the_top():
+    """What a command leaves where it is run is not committed with the rest."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("not a clone")
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    rooms = {"dsl", "compiler", "runtime", "cli", "models", "tests", ".ci"}
+    files = {"pyproject.toml", "README.md", "CHANGELOG.md", "LICENSE", ".gitignore", ".pre-commit-hooks.yaml"}
+    assert {path.partition("/")[0] for path in listed.splitlines()} == rooms | files
 
 
 def test_every_room_stands_on_the_page_of_its_house():

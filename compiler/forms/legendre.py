@@ -80,8 +80,7 @@ def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[En
 def _rest_on(whole: Node, flows: Sequence[Node]) -> Iterator[tuple[Node, Node]]:
     """A flow and what of parameters must not be zero, for M to have an inverse."""
     inertia = [[derivative(derivative(whole, f), g) for g in flows] for f in flows]
-    apart = all(is_const(e, 0.0) for j, row in enumerate(inertia) for k, e in enumerate(row) if j != k)
-    sizes = [row[k] for k, row in enumerate(inertia)] if apart else [determinant(inertia)]
+    sizes = [row[k] for k, row in enumerate(inertia)] if _apart(inertia) else [determinant(inertia)]
     for f, size in zip(flows, sizes, strict=False):
         if not is_const(size) and not any(n.op in ("var", "time") for n in topological([size])):
             yield f, size
@@ -143,11 +142,15 @@ def _inverse(inertia: Sequence[Sequence[Node]]) -> list[list[Node]]:
     return [[power(e, const(-1.0)) if j == k else zero for k, e in enumerate(row)] for j, row in enumerate(inertia)]
 
 
+def _apart(inertia: Sequence[Sequence[Node]]) -> bool:
+    """Whether M is diagonal."""
+    return all(is_const(e, 0.0) for j, row in enumerate(inertia) for k, e in enumerate(row) if j != k)
+
+
 def _small(inertia: Sequence[Sequence[Node]]) -> bool:
     """Whether M is diagonal, or small and at rest."""
-    apart = all(is_const(e, 0.0) for j, row in enumerate(inertia) for k, e in enumerate(row) if j != k)
     still = not any(n.op in ("var", "time") for row in inertia for e in row for n in topological([e]))
-    return apart or (still and len(inertia) <= COUPLED)
+    return _apart(inertia) or (still and len(inertia) <= COUPLED)
 
 
 def _regular(inertia: Sequence[Sequence[Node]], known: Values) -> bool:
