@@ -30,8 +30,6 @@ class Journal:
         self.folder = cache.folder() / "trades" / digest
         self.runs: Runs = {}
         self.reference: tuple[Trace, Reference] | None = None
-        with contextlib.suppress(OSError):
-            self.folder.mkdir(parents=True, exist_ok=True)
         for line in self._lines():
             with contextlib.suppress(ValueError, KeyError, TypeError):  # a line that a kill cut short
                 self._read(json.loads(line))
@@ -57,6 +55,7 @@ class Journal:
     def refer(self, trace: Trace, known: Reference) -> None:
         """Keeps the reference; its description last, so that a kill leaves none by halves."""
         with contextlib.suppress(OSError):
+            self.folder.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(trace.path, self.folder / "reference.h5")
             (self.folder / "reference.json").write_text(json.dumps(asdict(known)), encoding="utf-8")
 
