@@ -223,6 +223,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         if (size > run->largest[i])
             run->largest[i] = size;
     }
+    run->t_row = label;
     run->rows++;
     run->rows_written++;
     if (compared)
@@ -249,6 +250,10 @@ int sd_run_drain(sd_run *run)
             return 1;
         int asked = run->next < run->instants && run->instant[run->next] <= t;
         if (asked && run->instant[run->next] < t) {
+            if (run->instant[run->next] < run->t_row + fmin(run->apart, t - run->t_from)) {
+                run->next++;
+                continue;
+            }
             double kind = (double)run->instant_kind[run->next];
             double instant = run->instant[run->next++];
             emit(run, instant, instant, kind, 0);

@@ -43,6 +43,8 @@ typedef struct sd_run {
     const double *instant;            /* [instants] ascending, within the span */
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
+    double apart;                     /* of a draft: instants nearer than this to the row before, and in its step, are
+                                         passed over; 0: none is */
     const double *start_rate;         /* [unknowns] yd at the (re)start, also of what the stepper does not differentiate */
     double *row;                      /* [room][SD_ROW_HEAD + 2 observed] */
     int32_t room;
@@ -50,7 +52,7 @@ typedef struct sd_run {
     int32_t rows, next, pending, started, fresh;   /* fresh: at a point started from, no step yet */
     double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
     double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
-    double t_from;
+    double t_from, t_row;                          /* t_row: instant of the last row */
     double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
                                                         * sample; integrals over the step; of a row */
     double *point, *point_d, *aux, *aux_d, *values, *largest, *slope, *memory; /* largest [observed]: of observe_scale;

@@ -199,7 +199,7 @@ class Integration:
         run.start_rate = lib.pointer(self._start_rate)
         run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
-        run.sample_steps = int(request.sample_steps)
+        run.sample_steps, run.apart = int(request.sample_steps), request.apart
         if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
         run.projected = self._projected()

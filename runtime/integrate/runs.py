@@ -14,7 +14,7 @@ import numpy as np
 from sysdyn.runtime.events.kinks import LIVE
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import Sampled
-from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, drafted, joined, known
+from sysdyn.runtime.integrate.common_instants import MOST, Thinned, beside, common, drafted, joined, known
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
@@ -107,6 +107,8 @@ class Runs:
         self.controlled = False
         self.forecast: float | None = None
         self.common = known(self.instants, options)
+        """Instants [s] at which runs are compared; while it is open, those from which a draft takes its own."""
+        self.open = options.every is not None
         self.compared_at: Floats | None = None
 
     def take(self, way: Way) -> None:
@@ -116,10 +118,10 @@ class Runs:
 
     def request(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Request:
         """One integration's request; longest: step, as part of the span."""
-        options = self.options
+        options, draft = self.options, self.controlled and self.done is None
         instants, kinds = self.instants, self.kinds
         if self.controlled and self.common is not None:
-            instants, kinds = (drafted if self.done is None else joined)(instants, kinds, self.common)
+            instants, kinds = (drafted if draft else joined)(instants, kinds, self.common)
         left = None if options.max_wall is None else options.max_wall - (time.monotonic() - self.began)
         return Request(
             t_end=options.t_end,
@@ -136,7 +138,8 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stiff_steps=HELD if options.method == "auto" else STIFF,
-            settled_to=ROUGH * rtol if self.controlled and self.done is None else 0.0,
+            settled_to=ROUGH * rtol if draft else 0.0,
+            apart=(options.t_end - options.t_start) / MOST if draft and self.open else 0.0,
             events=options.events or None,
             begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
@@ -299,6 +302,8 @@ class Runs:
         self.controlled = True
         finished = self.run(tolerance, None, longest)
         rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self._width))
+        if self.open:
+            self.common, self.open = rows[:, 0], False
         instants, there = self.common, None
         if self.options.every is None:
             self.common = common(self.thinned.time, self.options)

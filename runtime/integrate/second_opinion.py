@@ -30,7 +30,8 @@ def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
         options = replace(runs.options, output=Path(folder) / "second.h5", watch=None)
         second = Runs(runs.start, options, way)
-        second.columns, second.common, second.jumps, second.begin = runs.columns, runs.common, runs.jumps, runs.begin
+        second.columns, second.common, second.open = runs.columns, runs.common, False
+        second.jumps, second.begin = runs.jumps, runs.begin
         try:
             apart, over = difference(runs.samplings[-1], second.sampled(tolerance, LONGEST), target)
         except SolverFailure as failure:
