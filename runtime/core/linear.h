@@ -1,7 +1,7 @@
 /* Linear systems G x = b on one fixed pattern, factorised again and again with new values.
  *
- * Dense LU with partial pivoting up to SD_DENSE unknowns; above, sparse LU: the column order is given, rows are
- * chosen by threshold partial pivoting (Gilbert & Peierls 1988), later matrices are refactorised on the found
+ * Dense LU with partial pivoting of the smallest (numerics/ordering.py); else sparse LU: the column order is given,
+ * rows are chosen by threshold partial pivoting (Gilbert & Peierls 1988), later matrices are refactorised on the found
  * pattern and pivots while these stay healthy and pivoted anew when not.
  * G is scaled: columns by the caller (magnitudes of the unknowns), rows by their largest scaled entry, so that
  * nano-farads and mega-pascals live in one matrix.
@@ -12,8 +12,6 @@
 #include "number.h"
 
 #include <stdint.h>
-
-#define SD_DENSE 50 /* measured: below, the dense loops win over indirect ones */
 
 typedef struct sd_sparse sd_sparse;
 

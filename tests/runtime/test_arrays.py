@@ -72,6 +72,7 @@ def test_names_labels_and_kinds():
 
 def test_sparse_and_dense_give_the_same(library, monkeypatch):
     system = System(MANIFEST, chain.binding(8), library, "2")
+    monkeypatch.setattr(ordering, "DENSE", 1000)
     dense, _, integration = end(system, rtol=1e-8)
     assert integration.linear.contents.dense
     monkeypatch.setattr(ordering, "DENSE", 0)
