@@ -1,4 +1,4 @@
-"""Column orders for the sparse factorisation: our own for small matrices, SciPy's SuperLU, imported only then, for others.
+"""Column orders for the sparse factorisation: our own for small matrices, for others that of SciPy's SuperLU.
 
 Small matrices get the least degree of A^T A with rows merged as they are eliminated (George & Ng, SIAM J. Sci. Stat.
 Comput. 8, 1987): what partial pivoting may fill is known from the pattern.
@@ -22,8 +22,8 @@ SMALL = 200
 def column_order(pattern: Pattern, values: Floats, *, leaving: bool = False) -> Ints | None:
     """Elimination order [unknowns] of a square matrix, None where it is small enough for the dense LU.
 
-    leaving: columns may be left without a pivot; values [entries] of a typical matrix.  Where they are singular, seeded random values on the same pattern serve:
-    the order depends on the pattern.
+    leaving: columns may be left without a pivot; values [entries] of a typical matrix.  Where they are singular, seeded
+    random values on the same pattern serve: the order depends on the pattern.
     """
     if pattern.unknowns <= (LEAVING if leaving else DENSE):
         return None
@@ -31,7 +31,7 @@ def column_order(pattern: Pattern, values: Floats, *, leaving: bool = False) -> 
 
 
 def least_degree(pattern: Pattern) -> Ints:
-    """The columns [unknowns], each that whose elimination fills least at most; sets of columns are bits of an integer."""
+    """The columns [unknowns], each that whose elimination can fill least; sets of columns are bits of integers."""
     n, columns = pattern.unknowns, pattern.columns_of()
     rows: dict[int, int] = {}
     for row, column in zip(pattern.row.tolist(), columns.tolist(), strict=True):
