@@ -7,7 +7,7 @@
 #include <string.h>
 #include <time.h>
 
-#define MOST 48          /* instants of comparison, at most twice that (integrate/common_instants.py) */
+#define MOST 24          /* instants of comparison, at most twice that (integrate/common_instants.py) */
 #define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
 #define SAFETY 2.5
 #define STRETCH 1.5

@@ -166,6 +166,31 @@ static void emit_compared(sd_run *run, double *row)
     memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
 }
 
+/* The point moved onto the equations; where only runs are compared by it, roughly. */
+static void settle_row(sd_run *run, double t, int32_t kind)
+{
+    double enough = run->settle->enough;
+    if (kind == SD_COMPARED)
+        run->settle->enough = fmax(enough, run->rough);
+    sd_settle_point(run->settle, t, run->point, run->point_d);
+    run->settle->enough = enough;
+}
+
+/* derivatives at the ends of the last steps as exact as the rows within the last one want them */
+static void refine(sd_run *run)
+{
+    int32_t kinds = 0;
+    for (int32_t k = run->next; k < run->instants && run->instant[k] < run->t_to; k++)
+        kinds |= run->instant_kind[k];
+    if (!kinds)
+        return;
+    double enough = run->settle->enough;
+    if (kinds == SD_COMPARED)
+        run->settle->enough = fmax(enough, run->rough);
+    run->stepper->refine(run->stepper->self, run->settle);
+    run->settle->enough = enough;
+}
+
 /* one output row at an instant of the last step, written as of `label`; two where it is compared too */
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
@@ -188,7 +213,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d, run->slope);
     }
     if (run->settle)
-        sd_settle_point(run->settle, t, run->point, run->point_d);
+        settle_row(run, t, (int32_t)kind);
     if (run->least_norm)
         sd_least_norm_apply(run->least_norm, t, run->point, run->point_d);
     if (run->magnitude && !at_step)
@@ -242,9 +267,8 @@ static double kind_here(const sd_run *run, int asked)
 int sd_run_drain(sd_run *run)
 {
     double t = run->t_to;
-    if (run->pending && run->settle && run->stepper->refine && run->next < run->instants &&
-        run->instant[run->next] < t)
-        run->stepper->refine(run->stepper->self, run->settle);
+    if (run->pending && run->settle && run->stepper->refine)
+        refine(run);
     while (run->pending) {
         if (run->rows + 1 >= run->room)
             return 1;

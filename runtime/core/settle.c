@@ -171,7 +171,7 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, double *
         }
         if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < (fresh ? CLOSE : FINE) && moved < SMALL))
             break;
-        if (now > CONTRACTS * before && now > EXACT) {
+        if (now > CONTRACTS * before && now > fmax(EXACT, settle->enough)) {
             failed = factorise(settle, t, y, yd);
             fresh = 1;
         }

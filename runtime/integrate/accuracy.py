@@ -47,29 +47,36 @@ ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 
 
+FEW_STEPS = 40
+"""Of a draft in which little happens."""
+
+
 @dataclass(frozen=True, slots=True)
 class Law:
     """How the global error of a method follows its tolerance, as measured (tests/bench/price.py).
 
     gain, power: most runs' estimates stay below gain * tolerance^power; credit: largest power with which the finer
-    run's error is believed to be smaller; finest: the smallest tolerance that makes sense.
+    run's error is believed to be smaller; finest: the smallest tolerance that makes sense; growth: power of the steps
+    that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors.
     """
 
     gain: float
     power: float
     credit: float
     finest: float
+    growth: float = 0.0
 
-    def tolerance(self, wanted: float) -> float:
-        """The tolerance that should do for an accuracy."""
-        return float(np.clip((wanted / self.gain) ** (1.0 / self.power), self.finest, COARSEST))
+    def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
+        """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
+        gain = self.gain * (max(steps, FEW_STEPS) / FEW_STEPS) ** self.growth
+        return float(np.clip((wanted / gain) ** (1.0 / self.power), self.finest, COARSEST))
 
 
 LAWS = {
     # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
     # its error test works with a tenth of the power 2/3 of the tolerance (core/radau.h); on stiff models its order is 3
-    "radau": Law(4.0, 0.85, 0.6, 1e-17),
+    "radau": Law(4.0, 0.85, 0.6, 1e-17, 1.5),
     "dopri": Law(40.0, 1.0, 0.9, 2e-14),
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
@@ -268,6 +275,8 @@ def control(
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, tolerance, law.finest)
     estimate, longest = _Estimate(law, target), LONGEST
+    if first is None and wanted < 1.0:
+        tolerance = law.tolerance(wanted, last.steps)
     tolerance = max(min(tolerance, RATIO * last.tolerance), law.finest)
     number = 1
     while number < RUNS:

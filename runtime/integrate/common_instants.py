@@ -13,7 +13,7 @@ from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
 
-MOST = 48
+MOST = 24
 """Instants at which runs are compared, at most twice that."""
 GRID = 600
 """Rows of a trace with an interval that are compared at most: between steps errors differ from row to row."""

@@ -74,7 +74,7 @@ class Integration:
         self._light = light(system, jy, jyd)
         self._linear(jy, jyd)
         self.settler = self._settler("settled", self.roles.state[: system.form.written])
-        self.settler.core.contents.enough = request.settled_to
+        self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         stops = None if request.fixed_step else request.stops
         self.segments = segments(start.t, request.t_end, stops)
         self._stepper()
@@ -200,6 +200,7 @@ class Integration:
         run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps, run.apart = int(request.sample_steps), request.apart
+        run.rough = request.settled_to
         if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
         run.projected = self._projected()

@@ -32,7 +32,8 @@ class Request:
     [s]: longest step, None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the
     integration restarts (segments.py); least_norm: rows hold the least multipliers of redundant constraints;
     stiff_steps: dopri and energy give up
-    where stability holds it to more steps than these; settled_to: scaled residual of rows that will do, 0: round-off;
+    where stability holds it to more steps than these; settled_to: scaled residual that will do for rows
+    by which runs are compared and nothing else, of a draft for all, 0: round-off;
     apart [s]: instants nearer to the last row, and within a step of it, are passed over.
     """
 
@@ -56,6 +57,7 @@ class Request:
     begin: tuple[Floats, NDArray[np.bool_]] | None = None
     stiff_steps: float = 1e5
     settled_to: float = 0.0
+    draft: bool = False
     apart: float = 0.0
 
 

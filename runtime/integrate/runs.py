@@ -33,8 +33,8 @@ HELD = 100
 STIFF = 1e5
 """Steps that a stiff dopri which was asked for still takes."""
 
-ROUGH = 1e-3
-"""Of the tolerance: scaled residual of a draft's rows."""
+ROUGH = 1e-2
+"""Of the tolerance: scaled residual of rows by which runs are compared."""
 FORETOLD = 0.01
 """Of the span: when a forecast is made."""
 BEHIND = 1.5
@@ -138,7 +138,8 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stiff_steps=HELD if options.method == "auto" else STIFF,
-            settled_to=ROUGH * rtol if draft else 0.0,
+            settled_to=ROUGH * rtol if self.controlled else 0.0,
+            draft=draft,
             apart=(options.t_end - options.t_start) / MOST if draft and self.open else 0.0,
             events=options.events or None,
             begin=self.begin,

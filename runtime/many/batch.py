@@ -200,7 +200,8 @@ class Batch:
             instants=instants,
             instant_kinds=kinds,
             h_max=min(longest * (options.t_end - options.t_start), options.longest or np.inf),
-            settled_to=0.0 if number else ROUGH * tolerance,
+            settled_to=ROUGH * tolerance,
+            draft=not number,
             max_wall=None,
         )
         made = Integration(self.system, self.start, request)
