@@ -185,7 +185,8 @@ component pmos {
 model m {
   node vdd, a, b, c: electrical
   supply: voltage(v = 3.3 V) vdd -> ground
-  gate: pulse(lo = 0 V, hi = 3.3 V, rise = 100 ps, fall = 100 ps, width = 4 ns, period = 10 ns, delay = 1 ns) a -> ground
+  gate: pulse(lo = 0 V, hi = 3.3 V, rise = 100 ps, fall = 100 ps, width = 4 ns, period = 10 ns,
+      delay = 1 ns) a -> ground
   N: nmos() d = b, g = a, s = ground
   P: pmos() d = b, g = a, s = vdd
   C: capacitor(C = 50 fF) b -> ground
