@@ -82,7 +82,7 @@ class Handler:
         self.p = system.description.p
         self.restart: Restart | None = None
         self.observer = Observer(system, rtol)
-        self.contacts = Contacts(plan.contacts, system, self.observer, self.p)
+        self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
         self.kinks = Kinks(plan.kinks, self.observer, self.p)
         self.side = np.ones(len(plan.relations))
@@ -130,7 +130,7 @@ class Handler:
                 found += [Watched(k, -1, r.row, s) for s in ((int(side),) if side else (1, -1))]
         for k, c in enumerate(self.plan.contacts):
             sticks = bool(self.contacts.active[k])
-            if self.contacts.barred[k]:
+            if self.contacts.barred[k] or k in self.contacts.frozen:
                 continue
             if c.kind == "friction":
                 rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)

@@ -111,7 +111,7 @@ class Modes:
         contacts, kinks = (lib.Contact * max(len(plan.contacts), 1))(), (lib.Kink * max(len(plan.kinks), 1))()
         for k, one in enumerate(plan.contacts):
             rows = one.value, one.rate, one.multiplier, one.bound, one.guard, one.sense
-            contacts[k] = lib.Contact(KINDS[one.kind], *rows)
+            contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
         for k, kink in enumerate(plan.kinks):
             kinks[k] = lib.Kink(kink.branch, kink.value, kink.rate, kink.above, kink.below)
         systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))

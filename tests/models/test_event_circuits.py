@@ -36,7 +36,10 @@ scene s of m {{
 """
 
 
-@pytest.mark.parametrize(("phases", "formulation"), [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian")])
+BRIDGES = [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian"), (5, "lagrangian")]
+
+
+@pytest.mark.parametrize(("phases", "formulation"), BRIDGES)
 def test_a_bridge_commutates_and_does_nothing_else(phases, formulation, tmp_path):
     trace = run(bridge(phases), tmp_path, formulation)
     waves = [10.0 * np.sin(W * trace.time + PHASE - 2.0 * np.pi * k / phases) for k in range(phases)]
