@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.binding.binding import places_of
-from sysdyn.compiler.forms.descriptor import Frozen
+from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm, Frozen
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Event, Switch
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
@@ -66,7 +66,8 @@ class _Planner:
         limits = dict(network.scene.limits) if network.scene else {}
         limit = round(self.prepared.binding.evaluate(limits["events"])) if "events" in limits else None
         kinks = tuple(self._kink(k) for k in self.prepared.compiled.form.kinks)
-        return Plan(tuple(self.relations), whens, sampled, contacts, kinks, limit, rest)
+        plain = _plain(self.prepared.compiled.form)
+        return Plan(tuple(self.relations), whens, sampled, contacts, kinks, limit, rest, plain)
 
     def _kink(self, k: Frozen) -> Kink:
         rate = -1 if k.rate is None else self.row[k.rate]
@@ -133,6 +134,22 @@ class _Planner:
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
             tuple(self.row[name] for name in s.aim), tuple(self.parameter(n) for n in s.direction),
         )  # fmt: skip
+
+
+def _plain(form: DescriptorForm) -> frozenset[int]:
+    """Row families that are sums of unknowns and nothing else, but for the constants of integrated constraints."""
+    found, offsets = set(range(len(form.rows))), {o.name for o in form.offsets}
+    for block in form.blocks:
+        if block.name in WITHOUT_ENTRIES or block.name.endswith("_rate"):
+            continue
+        for kernel in block.kernels:
+            found -= {s.row for s in kernel.rows if not _sum_of_unknowns(s.expression, offsets)}
+    return frozenset(found)
+
+
+def _sum_of_unknowns(node: Node, offsets: set[str]) -> bool:
+    terms = node.args if node.op == "sum" and node.data[0] == 0.0 else (node,)
+    return all(term.op == "var" or (term.op == "param" and term.data in offsets) for term in terms)
 
 
 def _rows(system: System) -> list[RowFamily]:

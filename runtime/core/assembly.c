@@ -1,10 +1,14 @@
 /* Residual and Jacobian of a system: see assembly.h. */
 #include "assembly.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #define FAINT 1e-9 /* of the magnitude of an unknown that happens to be zero */
+/* of the terms of a row, as the magnitudes of its unknowns make them: round-off of round-off.  A law that is zero (a
+ * transistor that is off) leaves a row whose only term is its residual */
+#define NOTHING (DBL_EPSILON * DBL_EPSILON)
 
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r)
 {
@@ -62,14 +66,16 @@ static void steep_terms(sd_system *system, double t, const double *y, const doub
 }
 
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
-                       const double *g, const double *scale, double *s)
+                       const double *g, const double *scale, int all, double *s)
 {
     steep_terms(system, t, y, rate, s);
-    for (int32_t i = 0; i < system->rows && g; i++)
-        s[i] = -s[i]; /* what is known already is not added to */
-    for (int32_t j = 0; j < system->unknowns && g; j++)
+    for (int32_t i = 0; i < system->rows; i++)
+        s[i] = -s[i]; /* what is known already is not added to, but for what is nothing */
+    for (int32_t j = 0; j < system->unknowns; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
-            if (!(s[system->row[e]] < 0.0))
+            if (s[system->row[e]] < 0.0)
+                s[system->row[e]] -= NOTHING * fabs(g[e]) * scale[j];
+            else if (all)
                 s[system->row[e]] += fabs(g[e]) * (fabs(y[j]) + FAINT * scale[j]);
     for (int32_t i = 0; i < system->rows; i++)
         s[i] = fabs(s[i]);

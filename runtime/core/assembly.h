@@ -52,10 +52,10 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
 void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd);
 /* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one
  * holds.  rate [unknowns]: magnitudes of the derivatives, as the method makes them of values; s [rows]: work.
- * g [entries], scale [unknowns]: with them the other rows are judged too, by the terms |g y| of the linear model, scale
- * the magnitudes of y; NULL: they are not. */
+ * g [entries], scale [unknowns]: slopes, magnitudes of y; all: the other rows are judged too, by the terms |g y| of the
+ * linear model. */
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
-                       const double *g, const double *scale, double *s);
+                       const double *g, const double *scale, int all, double *s);
 /* The first steep row whose residual r at (t, y) is more than the magnitudes of the unknowns, and their changes in a step
  * h, make of it, the entries jy and jyd being those of a point nearby; -1 where there is none.  rate, s: as above. */
 int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r,

@@ -187,8 +187,8 @@ static int rows_hold(sd_bdf *bdf, double t)
     for (int32_t i = 0; i < bdf->n; i++)
         bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->magnitude[i]);
     double limit = fmin(1.0, fmax(FINEST_ROW, LAX * bdf->rtol));
-    const double *g = bdf->linear->rank < bdf->n ? bdf->g : NULL;
-    return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, g, bdf->scale, bdf->terms) < 0;
+    int all = bdf->linear->rank < bdf->n;
+    return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, all, bdf->terms) < 0;
 }
 
 /* Newton's iteration from the prediction with the present factors */

@@ -279,7 +279,7 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
             radau->rate[i] = (fabs(radau->y[i]) + radau->magnitude[i]) / radau->h;
         }
         if (sd_first_unmet(radau->system, radau->t + c[s] * radau->h, radau->y, radau->rate, radau->d[s], limit,
-                           judged ? radau->g : NULL, radau->scale, radau->terms) >= 0)
+                           radau->g, radau->scale, judged, radau->terms) >= 0)
             return 0;
     }
     return 1;

@@ -8,7 +8,6 @@
 #include <time.h>
 
 #define POLL 4  /* steps between two looks at the clock */
-#define PARTS 4 /* of a step, at whose ends what is watched is looked at */
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited)
@@ -364,8 +363,8 @@ void sd_run_observe(sd_run *run, double t, double *values)
 static int changes(sd_run *run, double from)
 {
     const sd_stepper *stepper = run->stepper;
-    for (int part = 1; part <= PARTS && run->watches; part++) {
-        double t = part == PARTS ? *stepper->t : from + (*stepper->t - from) * part / PARTS;
+    for (int part = 1; part <= SD_PARTS && run->watches; part++) {
+        double t = part == SD_PARTS ? *stepper->t : from + (*stepper->t - from) * part / SD_PARTS;
         stepper->dense(stepper->self, t, run->aux, run->aux_d);
         memset(run->values, 0, (size_t)run->observed * sizeof(double));
         run->observe->rows(&run->observe->frame, t, run->aux, run->aux_d, run->values);
@@ -416,6 +415,28 @@ int sd_run_accept(sd_run *run, double to, int32_t kind)
     return full;
 }
 
+/* one step, or what happens where one ends */
+static int advance(sd_run *run)
+{
+    double from = *run->stepper->t;
+    if (from >= *run->stepper->t_end)
+        return run->modes && run->modes->samples ? sd_modes_sample(run) : SD_FINISHED;
+    memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
+    if (run->stepper->step(run->stepper->self))
+        return SD_FAILED;
+    run->t_from = from;
+    if (changes(run, from)) {
+        if (!run->modes)
+            return SD_EVENT;
+        run->modes->begin = from;
+        return sd_modes_event(run);
+    }
+    measure(run, from, *run->stepper->t);
+    if (run->ledgers && run->ledgers->lost >= 0)
+        return SD_FAILED;
+    return sd_run_drain(run) ? SD_FULL : SD_RUNNING;
+}
+
 int sd_run_advance(sd_run *run, int64_t steps, double seconds)
 {
     double until = now() + seconds;
@@ -426,20 +447,9 @@ int sd_run_advance(sd_run *run, int64_t steps, double seconds)
             return SD_FULL;
         if (*run->stepper->system->stop)
             return SD_FAILED;
-        double from = *run->stepper->t;
-        if (from >= *run->stepper->t_end)
-            return SD_FINISHED;
-        memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
-        if (run->stepper->step(run->stepper->self))
-            return SD_FAILED;
-        run->t_from = from;
-        if (changes(run, from))
-            return SD_EVENT;
-        measure(run, from, *run->stepper->t);
-        if (run->ledgers && run->ledgers->lost >= 0)
-            return SD_FAILED;
-        if (sd_run_drain(run))
-            return SD_FULL;
+        int state = run->modes && run->modes->waits ? sd_modes_event(run) : advance(run);
+        if (state != SD_RUNNING)
+            return state;
         if (k % POLL == POLL - 1 && now() > until)
             return SD_RUNNING;
     }

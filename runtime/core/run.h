@@ -14,19 +14,16 @@
 
 #include "least_norm.h"
 #include "ledgers.h"
+#include "modes.h"
 #include "settle.h"
 #include "stepper.h"
 
 #define SD_ROW_HEAD 8
+#define SD_TRACE 1    /* kind of a row of the trace */
+#define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
 #define SD_COMPARED 4 /* kind of a row that runs are compared by (integrate/request.py) */
 
 enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };
-
-/* What ends a smooth piece: side * observed[row] falls below -tolerance. */
-typedef struct sd_watch {
-    int32_t row, side;
-    double tolerance;
-} sd_watch;
 
 typedef struct sd_run {
     sd_stepper *stepper;
@@ -68,6 +65,7 @@ typedef struct sd_run {
     const double *magnitude;          /* [n] of the unknowns at steps; NULL: not looked at */
     double beyond;                    /* largest |unknown| of a row within a step, in these magnitudes */
     const double *projected;          /* drift of the last step before the method itself projected it; NULL: it does not */
+    sd_modes *modes;                  /* NULL: every event goes to its handler */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,

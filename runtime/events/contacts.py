@@ -16,8 +16,9 @@ from itertools import chain, combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.events.mates import mates
 from sysdyn.runtime.events.observer import Observer
-from sysdyn.runtime.events.plan import Contact
+from sysdyn.runtime.events.plan import Contact, Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.system import System
@@ -49,8 +50,9 @@ class NoActiveSetError(Exception):
 class Contacts:
     """The active set and the senses of a model; p: its parameters, where senses stand."""
 
-    def __init__(self, contacts: tuple[Contact, ...], system: System, observer: Observer, p: Floats) -> None:
-        self.contacts, self.system, self.observer, self.p = contacts, system, observer, p
+    def __init__(self, plan: Plan, system: System, observer: Observer, p: Floats) -> None:
+        self.contacts = contacts = plan.contacts
+        self.system, self.observer, self.p = system, observer, p
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
@@ -65,6 +67,7 @@ class Contacts:
             for name in ("value", "rate", "multiplier"):
                 observer.alike([getattr(c, name) for c in same])
         self._multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
+        self.frozen = mates(plan, system, self._multiplier)
 
     def size(self, magnitude: Floats, time: float) -> None:
         """Least sizes of values, rates and multipliers: FAINT of those of the unknowns (magnitude [unknowns]) and of a
@@ -99,6 +102,8 @@ class Contacts:
     def apply(self) -> None:
         """The systems of the model follow the active set."""
         now = np.zeros(len(self.switches.places), dtype=bool)
+        for k, holds in self.frozen.items():
+            self.active[k] = holds
         for k, contact in enumerate(self.contacts):
             if contact.kind == "follows":
                 self.active[k] = self.active[k - 1]
@@ -153,7 +158,7 @@ class Contacts:
         """Contacts whose condition does not hold."""
         for k, contact in enumerate(self.contacts):
             test = _TESTS.get(contact.kind, Contacts._unilateral)
-            if contact.kind == "follows":
+            if contact.kind == "follows" or k in self.frozen:
                 continue
             if contact.kind == "guarded":
                 if bool(values[contact.guard]) != bool(self.active[k]):
@@ -166,7 +171,8 @@ class Contacts:
 
     def doubtful(self, values: Floats) -> bool:
         """Whether a contact that does not hold is on its boundary."""
-        off = (c for k, c in enumerate(self.contacts) if not self.active[k] and c.kind in _TESTED)
+        asked = (k for k, c in enumerate(self.contacts) if c.kind in _TESTED and k not in self.frozen)
+        off = (self.contacts[k] for k in asked if not self.active[k])
         return any(abs(values[c.value]) <= self.observer.zero(c.value) for c in off)
 
     def bar(self, k: int, values: Floats) -> bool:
@@ -217,13 +223,19 @@ class Contacts:
         seen: set[tuple[float, ...]] = set()
         changed: list[int] = []
         fewest = len(self.contacts)
+        block: tuple[NDArray[np.bool_], int, Floats] | None = None
         for _ in range(TRIALS * (1 + len(self.contacts))):
             self.apply()
             state = self.state()
             if state in seen:  # another order of pivots: from the other end
                 changed.reverse()
             seen.add(state)
-            found = self._settled_by(t, y, yd, settle) or self._beside(t, y, yd, settle, seen)
+            found = self._settled_by(t, y, yd, settle)
+            if found is None and block is not None:  # sources that they short: one of them alone
+                self.active[:], (_, first, values), block, fewest = block[0], block, None, 0
+                self.turn(first, values)
+                continue
+            found = found or self._beside(t, y, yd, settle, seen)
             if found is None:
                 break
             values = self.observer(t, found[0], found[1])
@@ -231,9 +243,10 @@ class Contacts:
             if not wrong:
                 return found[0], found[1]
             # diodes all at once while they become fewer (Judice and Pires 1994), else the first
-            block = MANY < len(wrong) < fewest and all(self.contacts[k].kind == "psi" for k in wrong)
+            several = MANY < len(wrong) < fewest and all(self.contacts[k].kind == "psi" for k in wrong)
+            block = (self.active.copy(), wrong[0], values) if several else None
             fewest = min(fewest, len(wrong))
-            for k in wrong if block else wrong[:1]:
+            for k in wrong if several else wrong[:1]:
                 changed.append(k)
                 self.turn(k, values)
         names = dict.fromkeys(self.contacts[k].name for k in changed[-6:] or range(min(len(self.contacts), 6)))
@@ -266,10 +279,13 @@ class Contacts:
         return first[0]
 
     def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
-        """Which inequalities to turn, the fewest first; where none holds, all of them before."""
-        free = [k for k, c in enumerate(self.contacts) if c.kind in ("phi", "psi")]
-        nearest = (c for number in range(1, NEAR + 1) for c in combinations(free, number))
+        """Which inequalities to turn, the fewest first, those that do not hold before those that do; where none holds,
+        all of them before.
+        """
+        free = [k for k, c in enumerate(self.contacts) if c.kind in ("phi", "psi") and k not in self.frozen]
         rest = [k for k in free if not before[k]]
+        order = rest + [k for k in free if before[k]]
+        nearest = (c for number in range(1, NEAR + 1) for c in combinations(order, number))
         if rest == free:
             return islice(chain([rest], nearest), BESIDE)
         return chain(islice(nearest, BESIDE), [rest] if rest else [])

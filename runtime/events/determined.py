@@ -101,7 +101,7 @@ class Determined:
             for k in sorted(order, key=lambda k: k in turned):
                 contact = contacts.contacts[k]
                 small = abs(values[contact.value]) <= contacts.observer.zero(contact.value)
-                if contact.kind not in ("psi", "phi") or not small:
+                if contact.kind not in ("psi", "phi") or not small or k in contacts.frozen:
                     continue
                 contacts.active[k] = not contacts.active[k]
                 contacts.apply()

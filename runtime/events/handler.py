@@ -54,6 +54,14 @@ class Watched:
 
 
 @dataclass(frozen=True, slots=True)
+class Round:
+    """One round of assignments, event by event, and the sides [relations] behind it."""
+
+    groups: tuple[tuple[Assignment, ...], ...]
+    sides: Floats
+
+
+@dataclass(frozen=True, slots=True)
 class Bounce:
     """A gap that an impact opened, in free flight: its value there, which is zero but for round-off (level <= 0), what
     it rises to (height), and the time until it closes again (flight, s; both infinite where nothing pulls it back).
@@ -74,7 +82,7 @@ class Handler:
         self.p = system.description.p
         self.restart: Restart | None = None
         self.observer = Observer(system, rtol)
-        self.contacts = Contacts(plan.contacts, system, self.observer, self.p)
+        self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
         self.kinks = Kinks(plan.kinks, self.observer, self.p)
         self.side = np.ones(len(plan.relations))
@@ -83,8 +91,10 @@ class Handler:
         self.happened: list[Happened] = []
         self._follows: dict[tuple[tuple[float, ...], tuple[int, ...]], tuple[float, ...]] = {}
         self._impacts = any(c.kind in ("phi", "planar") for c in plan.contacts)
-        self._next = [0] * len(plan.sampled)
-        self._stalled, self._last = 0, -np.inf
+        self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
+        self._stalled, self.last = 0, -np.inf
+        self.simple, self.rounds = False, list[Round]()
+        self._exact: list[int] = []
         self.back(begin)
         self.before = self.now()
 
@@ -101,6 +111,11 @@ class Handler:
         if self.restart is not None:
             self.restart.settler.core.contents.ready = 0
 
+    def caught_up(self, t: float) -> None:
+        """The core has been in charge, until an event at t (s)."""
+        if t > self.last:
+            self._stalled, self.last = 0, t
+
     def stands(self, which: Sequence[Watched]) -> bool:
         """Whether kinks alone were crossed since `before`, and every branch is what it was."""
         return all(w.kink >= 0 for w in which) and bool(np.array_equal(self.before[0], self.p))
@@ -115,7 +130,7 @@ class Handler:
                 found += [Watched(k, -1, r.row, s) for s in ((int(side),) if side else (1, -1))]
         for k, c in enumerate(self.plan.contacts):
             sticks = bool(self.contacts.active[k])
-            if self.contacts.barred[k]:
+            if self.contacts.barred[k] or k in self.contacts.frozen:
                 continue
             if c.kind == "friction":
                 rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)
@@ -150,24 +165,28 @@ class Handler:
         return self.settled(t, y, yd, self._words()) if anew else None
 
     def _side(self, k: int, value: float, before: float) -> float:
+        """The side of relation k, which was `before`: a value that a jump made zero is on neither, one that was found
+        as the root of a crossing is past it.
+        """
         relation = self.plan.relations[k]
         small = self.observer.zero(relation.row) if relation.moves else 0.0
-        return before if abs(value) <= small and value != 0.0 else float(np.sign(value))
+        near = abs(value) <= small and (value != 0.0 or k in self._exact)
+        return before if near else float(np.sign(value))
 
     # -- samples -------------------------------------------------------------------------------------------------
 
     def next_sample(self) -> float:
         """The next instant of an `every`."""
         t0 = self.span[0]
-        times = (t0 + n * s.period for n, s in zip(self._next, self.plan.sampled, strict=True))
+        times = (t0 + n * s.period for n, s in zip(self.next.tolist(), self.plan.sampled, strict=False))
         return min(times, default=np.inf)
 
     def due(self, t: float) -> list[int]:
         """Numbers of the samples at t, which are counted."""
         found = []
         for k, s in enumerate(self.plan.sampled):
-            while self.span[0] + self._next[k] * s.period <= t:
-                self._next[k] += 1
+            while self.span[0] + int(self.next[k]) * s.period <= t:
+                self.next[k] += 1
                 found.append(k)
         return list(dict.fromkeys(found))
 
@@ -176,7 +195,7 @@ class Handler:
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        rows = [(w.row, w.side, self._least(w), self._rate(w), self._level(w)) for w in watched]
+        rows = [(w.row, w.side, self._least(w), self.rate(w), self._level(w)) for w in watched]
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
@@ -201,7 +220,7 @@ class Handler:
         low = (b.flight for row, b in self.bounces.items() if b.height < unseen * self.observer.largest[row])
         return min(low, default=np.inf)
 
-    def _rate(self, watched: Watched) -> int:
+    def rate(self, watched: Watched) -> int:
         """The row of the rate of what is watched, where there is one."""
         if watched.kink >= 0:
             kink = self.plan.kinks[watched.kink]
@@ -214,11 +233,17 @@ class Handler:
     def fire(
         self, t: float, y: Floats, yd: Floats, samples: Sequence[int] = (), which: Sequence[Watched] = ()
     ) -> Point | None:
-        """The point after everything that happens at t; None where nothing changes.  which: of the watched."""
+        """The point after everything that happens at t; None where nothing changes.  which: of the watched.
+
+        rounds, simple: what is assigned, and whether that is all, and without an impact.
+        """
         self._count(t)
+        self.simple, self.rounds = not self.bounces, []
         said, stood = self._words(), self.kinks.state()
         self.kinks.anew()
         crossed = [w.relation for w in which if w.relation >= 0]
+        values = self.observer(t, y, yd) if crossed else ()
+        self._exact = [k for k in crossed if values[self.plan.relations[k].row] == 0.0]
         for w in which:
             if w.relation >= 0:
                 self.side[w.relation] = -float(w.side)
@@ -235,11 +260,15 @@ class Handler:
             if not assigned:
                 break
             y = self._assign(t, y, yd, assigned)
-            changed, assigned, crossed = True, [], []
             self._renew(t, y, yd)
+            self.rounds.append(Round(tuple(group for _, group in assigned), self.side.copy()))
+            changed, assigned, crossed = True, [], []
         else:
             raise SolverFailure("chatter", t, 0.0, self._names())
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
+        flows = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
+        self.simple &= not flows and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
+        self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
         if not (changed or touched):
             return None
         point = self._followed(t, self.settled(t, y, yd, said, touched))
@@ -252,7 +281,7 @@ class Handler:
             fired = self._risen(())
             if not fired:
                 return point
-            said = self._words()
+            self.simple, said = False, self._words()
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
             self._renew(t, y, point[1])
             point = self.settled(t, y, point[1], said)
@@ -480,8 +509,8 @@ class Handler:
     # -- what never ends -----------------------------------------------------------------------------------------
 
     def _count(self, t: float) -> None:
-        near = t - self._last <= NOTHING * (self.span[1] - self.span[0])
-        self._stalled, self._last = (self._stalled + 1 if near else 0), t
+        near = t - self.last <= NOTHING * (self.span[1] - self.span[0])
+        self._stalled, self.last = (self._stalled + 1 if near else 0), t
         if self._stalled > STALLED:
             raise SolverFailure("chatter", t, 0.0, self._names())
         if self.plan.limit is not None and len(self.happened) > self.plan.limit:

@@ -32,7 +32,7 @@ class Observer:
         self.largest = np.zeros(self._number)
         families = [system.description.rows[k] for k in system.description.rows_of("observe")]
         self._units = [family.unit for family in families for _ in range(family.size)]
-        self._alike: list[NDArray[np.int64]] = []
+        self.groups: list[NDArray[np.int64]] = []
 
     def _rows(self, call: lib.Call | None, t: float) -> Floats:
         self._out[:] = 0.0
@@ -49,19 +49,19 @@ class Observer:
         values = self._rows(self._calls[0], t)
         scale = self._rows(self._calls[1], t)
         size = np.maximum(np.abs(values), np.abs(scale))
-        self.largest = np.fmax(self.largest, np.where(np.isfinite(size), size, 0.0))
-        for rows in self._alike:
+        np.fmax(self.largest, np.where(np.isfinite(size), size, 0.0), out=self.largest)
+        for rows in self.groups:
             self.largest[rows] = self.largest[rows].max()
         return values
 
     def know(self, largest: Floats) -> None:
         """Take sizes that others met."""
-        self.largest = np.fmax(self.largest, largest)
+        np.fmax(self.largest, largest, out=self.largest)
 
     def alike(self, rows: Sequence[int]) -> None:
         """Rows of one size: what one has never met, another has (a diode that has not conducted yet)."""
         if len(rows) > 1:
-            self._alike.append(np.asarray(rows, dtype=np.int64))
+            self.groups.append(np.asarray(rows, dtype=np.int64))
 
     def unit(self, row: int) -> str:
         """The unit of a row."""

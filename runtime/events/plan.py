@@ -98,7 +98,9 @@ class Kink:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """limit: of events; rest: an impact left slower than this part of the fastest is the last."""
+    """limit: of events; rest: an impact left slower than this part of the fastest is the last; plain: row families that
+    are sums of unknowns, with factors that are numbers, and of nothing else.
+    """
 
     relations: tuple[Relation, ...] = ()
     whens: tuple[When, ...] = ()
@@ -107,6 +109,7 @@ class Plan:
     kinks: tuple[Kink, ...] = ()
     limit: int | None = None
     rest: float = 1e-6
+    plain: frozenset[int] = frozenset()
 
     def __bool__(self) -> bool:
         return bool(self.whens or self.sampled or self.contacts or self.kinks)

@@ -262,7 +262,7 @@ class Integration:
 
     def happened(self) -> tuple[Happened, ...]:
         """The events so far."""
-        return tuple(self.pieces.handler.happened) if self.pieces is not None else ()
+        return self.pieces.happened() if self.pieces is not None else ()
 
     def largest(self) -> Floats:
         """Largest magnitude so far of each observed quantity and of the terms of its expression [observed]."""
@@ -319,7 +319,7 @@ class Integration:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero."""
         if (np.abs(self.y) <= 2.0 * self._resolved).all():
             return
-        self._resolved = np.maximum(self._resolved, np.abs(self.y))
+        np.maximum(self._resolved, np.abs(self.y), out=self._resolved)
         jy, _ = self.system.jacobian(t, self.y, self.yd)
         open_ = np.where(self._carries, 0.0, noise(self.system, self.y, jy, self._time))
         np.maximum(self.magnitude, UNRESOLVED * open_ / max(self.request.rtol, 1e-15), out=self.magnitude)
@@ -365,6 +365,7 @@ class Integration:
                 self.cpu += time.process_time() - before
                 if more:
                     continue
+                self.drain(sink)
             if state == 1:
                 break
             if method.steps - marked >= CRAWL:

@@ -11,8 +11,9 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
-from sysdyn.runtime.events.handler import Handler
-from sysdyn.runtime.events.plan import Plan
+from sysdyn.runtime.events.handler import Handler, Point, Watched
+from sysdyn.runtime.events.plan import Happened, Plan
+from sysdyn.runtime.integrate.modes import Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
@@ -43,6 +44,8 @@ class Pieces:
         self._longest, self._landing, self._end = run.method.contents.h_max, np.inf, run.segments[0].end
         n = run.system.form.written
         self._first(self.handler.begin(start.t, run.y[:n].copy(), run._start_rate[:n].copy()))
+        self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
+        self._mode = -1
         self._watch()
 
     def _first(self, point: tuple[Floats, Floats] | None) -> None:
@@ -60,10 +63,43 @@ class Pieces:
         self._array = self.handler.core()
         core = self.run.run_.contents
         core.watch, core.watches = c.addressof(self._array), len(self.handler.watched())
+        if self.modes is not None:
+            self._mode = self.modes.stands()
+
+    def _told(self) -> None:
+        """The handler knows what the core has done without it."""
+        if self.modes is None:
+            return
+        if self.modes.told():
+            self._landing = np.inf
+        self._mode = self.modes.core.now
+
+    def happened(self) -> tuple[Happened, ...]:
+        """The events so far."""
+        self._told()
+        return tuple(self.handler.happened)
+
+    def _fire(self, t: float, before: tuple[Floats, Floats], due: list[int], which: list[Watched]) -> Point | None:
+        """What the handler says, which the core learns."""
+        handler, modes = self.handler, self.modes
+        if modes is None:
+            return handler.fire(t, *before, samples=due, which=which)
+        crossed, begin, events = modes.places(which), self._mode, len(handler.happened)
+        flipped = handler.side.copy()
+        for w in which:
+            if w.relation >= 0:
+                flipped[w.relation] = -float(w.side)
+        point = handler.fire(t, *before, samples=due, which=which)
+        if not (which and handler.stands(which)):
+            modes.learn(begin, (crossed, due), (flipped, point, events))
+        self._mode = modes.stands()
+        return point
 
     def aim(self, end: float) -> None:
         """The next step ends no later than at the next sample, or the end (s) of the segment."""
         self._end, sample = end, self.handler.next_sample()
+        if self.modes is not None:
+            self.modes.core.segment = end
         self.run.method.contents.t_end = min(end, sample, self._landing)
         self.run.run_.contents.end_kind = TRACE if sample <= min(end, self._landing) else 0
 
@@ -107,10 +143,11 @@ class Pieces:
         began = time.process_time()
         run, core, method = self.run, self.run.run_.contents, self.run.method.contents
         stepper = method.stepper
+        self._told()
         self.handler.before = self.handler.now()
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
-        begin, end = core.t_from, method.t
+        begin, end = core.t_from if self.modes is None else self.modes.core.begin, method.t
         while True:
             found = self.handler.crossed(self._values, begin, end)
             if found is None:
@@ -119,7 +156,7 @@ class Pieces:
                 return time.process_time() - began
             t, which = found
             before = self._point(t)
-            point = self.handler.fire(t, *before, which=which)
+            point = self._fire(t, before, [], which)
             if point is not None:
                 self._accept(t, TRACE, sink)
                 self._go_on(t, point, before, misled=end - core.t_from if self.handler.stands(which) else 0.0)
@@ -153,6 +190,7 @@ class Pieces:
     def sample(self, end: float, sink: Sink) -> bool:
         """What is due where a piece has met its end; whether the segment, which ends at `end` (s), goes on."""
         run, method = self.run, self.run.method.contents
+        self._told()
         due = self.handler.due(method.t)
         if not due and method.t < end:  # a bounce that has not come back
             self._landing, method.h_max = np.inf, self._longest
@@ -162,7 +200,8 @@ class Pieces:
             n = run.system.form.written
             y, yd = run.method.point()
             y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
-            point = self.handler.fire(method.t, y, yd, samples=due)
+            self.handler.before = self.handler.now()
+            point = self._fire(method.t, (y, yd), due, [])
             run.drain(sink)
             self.aim(end)
             if point is not None:
@@ -171,6 +210,7 @@ class Pieces:
 
     def jump(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
         """The point behind an instant at which the text jumps."""
+        self._told()
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or self.handler.anew(t, y, yd)

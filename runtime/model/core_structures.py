@@ -375,6 +375,69 @@ class Watch(c.Structure):
     _fields_ = [("row", _I), ("side", _I), ("tolerance", _D)]
 
 
+class Held(c.Structure):
+    """sd_held."""
+
+    _fields_ = [
+        *[(name, _I) for name in ["held", "clear"]],
+        *[(name, _P) for name in ["row", "unknown", "slot", "rate", "cleared"]],
+    ]
+
+
+class Mode(c.Structure):
+    """sd_mode."""
+
+    _fields_ = [
+        *[(name, _I) for name in ["watches", "first"]],
+        *[(name, _P) for name in ["row", "side", "rate", "value", "relation", "holds", "held"]],
+    ]
+
+
+class Transition(c.Structure):
+    """sd_transition."""
+
+    _fields_ = [
+        *[(name, _I) for name in ["to", "next", "crossed", "due", "rounds", "moves"]],
+        *[(name, _P) for name in ["which", "sample", "end", "kind", "place", "read", "sides"]],
+        ("entries", _L),
+    ]
+
+
+class Contact(c.Structure):
+    """sd_contact."""
+
+    _fields_ = [(name, _I) for name in ["kind", "value", "rate", "multiplier", "bound", "guard", "sense"]]
+
+
+class Kink(c.Structure):
+    """sd_kink."""
+
+    _fields_ = [(name, _I) for name in ["branch", "value", "rate", "above", "below"]]
+
+
+class Modes(c.Structure):
+    """sd_modes."""
+
+    _fields_ = [
+        *[(name, _P) for name in ["mode", "transition"]],
+        *[(name, _I) for name in ["now", "rates", "parameters", "places", "relations", "contacts", "kinks"]],
+        *[(name, _I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
+        *[(name, _P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
+        *[(name, _P) for name in ["period", "next"]],
+        *[(name, _D) for name in ["first", "segment", "last", "nothing", "begin", "longest"]],
+        *[(name, _P) for name in ["t_end", "h_max", "largest"]],
+        *[(name, _D) for name in ["small", "still"]],
+        *[(name, _P) for name in ["alike", "alike_end", "state", "differential", "unnamed"]],
+        *[(name, _P) for name in ["met", "magnitude", "resolved"]],
+        *[(name, _D) for name in ["unknown_size", "round_off"]],
+        *[(name, _P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
+        *[(name, _P) for name in ["values", "low", "high", "p_before", "p_after"]],
+        *[(name, _P) for name in ["exact", "found", "which", "watch", "log"]],
+        ("left", _L),
+        *[(name, _I) for name in ["width", "room", "logged", "waits"]],
+    ]
+
+
 class Run(c.Structure):
     """sd_run."""
 
@@ -426,6 +489,7 @@ class Run(c.Structure):
         ("magnitude", _P),
         ("beyond", _D),
         ("projected", _P),
+        ("modes", _P),
     ]
 
 

@@ -79,6 +79,11 @@ class Restart:
         self._same[key] = self._same.get(key, 0) + 1 if same else 0
         return found
 
+    def plain(self) -> bool:
+        """Whether a settled point with the present constraints is all that `struck` would find without rates."""
+        key = self.settler.system.description.switches.active.tobytes()
+        return not self.thorough or self._same.get(key, 0) >= SAME
+
     def _rates(self, magnitude: Floats) -> Floats:
         """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""
         rates, known = self.settler.rates, self.settler.scale[magnitude.size :]

@@ -47,11 +47,25 @@ def test_floating_bridge_at_every_tolerance(method, rtol, four, tmp_path):
     assert abs(found["R.e"][-1] - four["R.e"][-1]) < 2e3 * rtol + 2e-8
 
 
-@pytest.mark.parametrize(("series", "parallel"), [(2, 1), (1, 2), (2, 2), (4, 1)])
+@pytest.mark.parametrize(("series", "parallel"), [(2, 1), (1, 2), (2, 2), (4, 4)])
 def test_strings_and_parallels_are_as_one(series, parallel, four, tmp_path):
     """An ideal diode in series or in parallel with its like changes no voltage outside."""
     found = run(bridge(series, parallel), tmp_path, rtol=1e-8, method="radau")
     assert abs(found["R.e"][-1] - four["R.e"][-1]) < 1e-5
+
+
+def test_diodes_behind_sources_of_their_own_are_no_parallel(tmp_path):
+    """Both sources are zero for most of the time, so that at most instants the diodes say the same."""
+    pulse = "pulse(lo = 0 V, hi = 10 V, rise = 10 us, fall = 10 us, width = 1 ms, period = 1 s, delay = {} ms)"
+    lines = ["  node a, b, p: electrical"]
+    for name, at in (("a", 1), ("b", 3)):
+        lines += [f"  V{name}: {pulse.format(at)} {name} -> ground", f"  D{name}: ideal_diode() {name} -> p"]
+    lines += ["  R: resistor(R = 5 ohm) p -> ground", "}"]
+    text = "\n".join([HEAD.replace("voltage", "voltage, pulse"), "model m {", *lines])
+    found = run(text + "\nscene s of m { time 0 s to 5 ms; trace R.e, Da.f, Db.f every 0.5 ms }", tmp_path)
+    at = {round(t * 1e4): k for k, t in enumerate(found.time)}
+    for name, values in (("R.e", (0.0, 10.0, 0.0, 10.0, 0.0)), ("Da.f", (0.0, 2.0, 0.0, 0.0, 0.0))):
+        assert np.allclose([found[name][at[k]] for k in (5, 15, 25, 35, 45)], values, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])

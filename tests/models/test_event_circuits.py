@@ -36,7 +36,10 @@ scene s of m {{
 """
 
 
-@pytest.mark.parametrize(("phases", "formulation"), [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian")])
+BRIDGES = [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian"), (5, "lagrangian")]
+
+
+@pytest.mark.parametrize(("phases", "formulation"), BRIDGES)
 def test_a_bridge_commutates_and_does_nothing_else(phases, formulation, tmp_path):
     trace = run(bridge(phases), tmp_path, formulation)
     waves = [10.0 * np.sin(W * trace.time + PHASE - 2.0 * np.pi * k / phases) for k in range(phases)]
@@ -167,3 +170,49 @@ def test_valves_in_series_begin_with_the_flow_that_keeps_both_pressures_alike(tm
     trace = run(VALVES, tmp_path, "lagrangian")
     assert trace["p"].values[0] == pytest.approx(1e5 / 5e9 / 101.0, rel=1e-9)
     assert abs(trace["s"].values[0]) < 1e-15
+
+
+INVERTER = """from std.electrical import capacitor, pulse, voltage
+component nmos {
+  port d, g, s: electrical
+  let on = max(g.e - s.e - 0.7 V, 0 V)
+  let back = max(g.e - d.e - 0.7 V, 0 V)
+  channel: dissipator(f = 1.1e-4 A/V^2*(on^2 - back^2)) d -> s
+}
+component pmos {
+  port d, g, s: electrical
+  let on = max(s.e - g.e - 0.8 V, 0 V)
+  let back = max(d.e - g.e - 0.8 V, 0 V)
+  channel: dissipator(f = 1e-4 A/V^2*(on^2 - back^2)) s -> d
+}
+model m {
+  node vdd, a, b, c: electrical
+  supply: voltage(v = 3.3 V) vdd -> ground
+  gate: pulse(lo = 0 V, hi = 3.3 V, rise = 100 ps, fall = 100 ps, width = 4 ns, period = 10 ns,
+      delay = 1 ns) a -> ground
+  N: nmos() d = b, g = a, s = ground
+  P: pmos() d = b, g = a, s = vdd
+  C: capacitor(C = 50 fF) b -> ground
+  N2: nmos() d = c, g = b, s = ground
+  P2: pmos() d = c, g = b, s = vdd
+  C2: capacitor(C = 100 fF) c -> ground
+  init C.f = 0 A
+  init C2.f = 0 A
+}
+scene s of m { time 0 s to 20 ns; trace b.e as v every 0.1 ns }
+"""
+
+
+def test_a_gate_whose_transistors_are_off_by_turns(tmp_path):
+    """An off transistor's law is zero, and its row has no term beside its residual; the discharge has a closed form."""
+    file = tmp_path / "m.sd"
+    file.write_text(INVERTER)
+    for rtol in (1e-11, 1e-10, 1e-8):
+        trace = simulate(file, output=tmp_path / "m.h5", method="radau", rtol=rtol)
+        assert trace.statistics["newton_failures"] < 0.05 * trace.statistics["steps"]
+    at = {round(t * 1e10): v for t, v in zip(trace.time, trace["v"].values, strict=True)}
+    # in its linear region C v' = -beta (u v - v^2/2), u = 2.6 V: v/(2u - v) falls as exp(-beta u t/C)
+    u, rate = 2.6, 2.2e-4 * 2.6 / 50e-15
+    begin, end = at[17], at[27]
+    fallen = begin / (2.0 * u - begin) * np.exp(-rate * 1e-9)
+    assert abs(end - 2.0 * u * fallen / (1.0 + fallen)) < 1e-6

@@ -1,0 +1,280 @@
+"""What the core knows of a run's events: the modes met so far, and the transitions between them (core/modes.h).
+
+The handler says what happens; where it was simple (no impact, no flow assigned) it is told to the core, which takes
+the same transition by itself from then on as long as the conditions behind it hold.  Before the handler is asked again
+it is told what has happened since.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from sysdyn.runtime.events.handler import NOTHING, Handler, Watched
+from sysdyn.runtime.events.plan import Assignment, Happened, Plan
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
+from sysdyn.runtime.start.restart import STILL
+
+if TYPE_CHECKING:
+    from sysdyn.runtime.integrate.integrate import Integration
+
+KINDS = {"psi": 0, "friction": 1, "phi": 2, "guarded": 3, "follows": 4}
+MOST, MANY = 4096, 16384
+"""Modes and transitions that are kept."""
+ROUNDS = 4
+"""Times the assignments of the text: so many are made at one instant."""
+AGAIN = 3
+"""Times a transition between two modes is told: it may be another one (assignments), or its conditions at the edge."""
+LOG = 1024
+"""Events between two looks at them."""
+UNLIMITED = 1 << 62
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a transition is called: its assignments, event by event, and its entries as they were."""
+
+    groups: tuple[tuple[Assignment, ...], ...]
+    entries: tuple[Happened, ...]
+
+    def at(self, t: float, values: Sequence[float]) -> list[Happened]:
+        """The entries at t (s); values: before and after of each assignment."""
+        found, k = [], 0
+        for entry, group in zip(self.entries, self.groups, strict=False):
+            pairs = [(a.name, values[2 * (k + i)], values[2 * (k + i) + 1]) for i, a in enumerate(group)]
+            before, after = (", ".join(f"{p[0]} = {p[side]:.9g}" for p in pairs) for side in (1, 2))
+            found.append(Happened(t, entry.name, entry.element, before, after))
+            k += len(group)
+        rest = self.entries[len(self.groups) :]
+        return found + [Happened(t, e.name, e.element, e.before, e.after) for e in rest]
+
+
+def serves(plan: Plan, run: Integration) -> bool:
+    """Whether the core can take transitions of this run."""
+    equal = any(_equal(w.condition, plan) for w in plan.whens)
+    kinds = all(k.kind in KINDS and (k.kind == "guarded" or k.guard < 0) for k in plan.contacts)
+    return kinds and not equal and run._calls["observe"] is not None and not run.request.least_norm
+
+
+def _equal(condition: tuple[Any, ...], plan: Plan) -> bool:
+    """Whether a condition is true at the instant of a crossing alone."""
+    if condition[0] == "relation":
+        return condition[2] in ("==", "!=") and plan.relations[condition[1]].moves
+    return any(_equal(item, plan) for item in condition[1:])
+
+
+class Modes:
+    """Modes and transitions of one run."""
+
+    def __init__(self, run: Integration, handler: Handler, longest: float) -> None:
+        self.run, self.handler, plan = run, handler, handler.plan
+        self._keep: list[Any] = []
+        self._number: dict[Any, int] = {}
+        self._states: list[Any] = []
+        self._told: list[Told] = []
+        self._tried: dict[str, int] = {}
+        self._modes, self._transitions = (lib.Mode * 8)(), (lib.Transition * 16)()
+        settled = [run.system, run.settler.system, *([run._project.system] if run._project else [])]
+        self._systems = list({id(s): s for s in settled}.values())
+        self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
+        self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, left=UNLIMITED)
+        self._sizes(plan)
+        self._plan(plan)
+        self._run()
+        run.run_.contents.modes = c.addressof(self.core)
+
+    # -- the core's structure ------------------------------------------------------------------------------------
+
+    def _array(self, values: Any, dtype: Any = np.float64) -> int:
+        """The address of a copy that is kept."""
+        array = np.array(values, dtype=dtype)
+        array = array if array.size else np.zeros(1, dtype=dtype)
+        self._keep.append(array)
+        return int(array.ctypes.data)
+
+    def _sizes(self, plan: Plan) -> None:
+        core, run = self.core, self.run
+        core.parameters, core.places = self.handler.p.size, len(self._fixed)
+        core.relations, core.contacts, core.kinks = len(plan.relations), len(plan.contacts), len(plan.kinks)
+        core.systems, core.samples = len(self._systems), len(plan.sampled)
+        core.observed, core.unknowns = run.observed, run.system.unknowns
+
+    def _plan(self, plan: Plan) -> None:
+        core, handler = self.core, self.handler
+        core.p, core.place = lib.pointer(handler.p), self._array(self._fixed, np.int32)
+        core.relation_row = self._array([r.row for r in plan.relations], np.int32)
+        core.relation_moves = self._array([r.moves for r in plan.relations], np.int32)
+        contacts, kinks = (lib.Contact * max(len(plan.contacts), 1))(), (lib.Kink * max(len(plan.kinks), 1))()
+        for k, one in enumerate(plan.contacts):
+            rows = one.value, one.rate, one.multiplier, one.bound, one.guard, one.sense
+            contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
+        for k, kink in enumerate(plan.kinks):
+            kinks[k] = lib.Kink(kink.branch, kink.value, kink.rate, kink.above, kink.below)
+        systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))
+        self._keep += [contacts, kinks, systems]
+        core.contact, core.kink = c.addressof(contacts), c.addressof(kinks)
+        core.system = c.addressof(systems)
+        core.period, core.next = self._array([s.period for s in plan.sampled]), lib.pointer(handler.next)
+        core.first, core.nothing = handler.span[0], NOTHING * (handler.span[1] - handler.span[0])
+        core.small, core.largest = handler.observer.small, lib.pointer(handler.observer.largest)
+        alike = handler.observer.groups
+        core.alikes, core.alike = len(alike), self._array(np.concatenate([*alike, []]), np.int32)
+        core.alike_end = self._array(np.cumsum([g.size for g in alike]), np.int32)
+        assigned = sum(len(e.assignments) for e in plan.whens) + sum(len(e.assignments) for e in plan.sampled)
+        core.width, core.room = 2 + 2 * ROUNDS * assigned, LOG
+        self._log = np.zeros((LOG, core.width))
+        core.log = lib.pointer(self._log)
+
+    def _run(self) -> None:
+        core, run, method = self.core, self.run, self.run.method.contents
+        extended = max(run.system.unknowns, run.system.form.extended) + 8
+        core.still, core.unknown_size, core.round_off = STILL, UNKNOWN, ROUND_OFF
+        core.rates = not run.restart.thorough
+        core.state = self._array(run.roles.state[: run.system.form.written], np.int32)
+        core.differential = self._array(run.roles.differential, np.int32)
+        core.unnamed, core.met = self._array(run._unnamed, np.int32), lib.pointer(run._met)
+        core.magnitude, core.resolved = lib.pointer(run.magnitude), lib.pointer(run._resolved)
+        core.rate = lib.pointer(run._start_rate)
+        core.t_end, core.h_max = (c.addressof(method) + getattr(type(method), f).offset for f in ("t_end", "h_max"))
+        for name in ("y", "yd", "before", "before_d", "restart", "restart_d"):
+            setattr(core, name, self._array(np.zeros(extended)))
+        for name in ("values", "low", "high"):
+            setattr(core, name, self._array(np.zeros(run.observed + 1)))
+        for name in ("p_before", "p_after"):
+            setattr(core, name, self._array(np.zeros(core.parameters + 1)))
+        core.exact = self._array(np.zeros(core.relations + 1), np.int32)
+        self._room(len(self.handler.plan.sampled) + 16)
+
+    def _room(self, watches: int) -> None:
+        """Room for as many watches."""
+        self._watches = watches
+        watch = (lib.Watch * watches)()
+        self._keep.append(watch)
+        self.core.watch = c.addressof(watch)
+        self.core.found, self.core.which = self._array(np.zeros(watches)), self._array(np.zeros(watches), np.int32)
+
+    # -- between the core and the handler ------------------------------------------------------------------------
+
+    def told(self) -> bool:
+        """The handler stands where the core does, and knows what has happened; whether anything has."""
+        core, handler = self.core, self.handler
+        for row in self._log[: core.logged]:
+            handler.happened += self._told[int(row[1])].at(float(row[0]), row[2:].tolist())
+        some, core.logged = bool(core.logged), 0
+        if core.now >= 0:
+            side, truth, contacts = self._states[core.now]
+            handler.side[:], handler.truth = side, list(truth)
+            handler.contacts.become(contacts)
+            handler.caught_up(core.last)
+        return some
+
+    def stands(self) -> int:
+        """The number of the handler's present mode, which the core is in from now on; -1: one too many."""
+        core, handler = self.core, self.handler
+        key = handler.side.tobytes(), tuple(handler.truth), handler.contacts.state(), tuple(handler.kinks.state())
+        core.last = handler.last
+        limit = handler.plan.limit
+        core.left = UNLIMITED if limit is None else limit - len(handler.happened)
+        usual = not handler.bounces and not handler.contacts.barred.any()
+        core.now = self._mode(key) if usual else -1
+        return int(core.now)
+
+    def _mode(self, key: Any) -> int:
+        if key in self._number:
+            return self._number[key]
+        number = len(self._states)
+        if number >= MOST:
+            return -1
+        self._modes = _grown(self._modes, number)
+        self._modes[number] = self._described()
+        self.core.mode = c.addressof(self._modes)
+        self._states.append((self.handler.side.copy(), key[1], key[2]))
+        self._number[key] = number
+        return number
+
+    def _described(self) -> Any:
+        """The handler's present mode as the core's structure."""
+        handler, held = self.handler, (lib.Held * len(self._systems))()
+        watched = handler.watched()
+        if len(watched) > self._watches:
+            self._room(2 * len(watched))
+        for k, system in enumerate(self._systems):
+            s = system.core
+            rows = s.held_row, s.held_unknown, s.held_slot, s.held_rate, s.cleared
+            held[k] = lib.Held(s.held, s.clear, *rows)
+            self._keep.append(system._held)
+        self._keep.append(held)
+        return lib.Mode(
+            watches=len(watched),
+            first=-1,
+            row=self._array([w.row for w in watched], np.int32),
+            side=self._array([w.side for w in watched], np.int32),
+            rate=self._array([handler.rate(w) for w in watched], np.int32),
+            value=self._array(handler.p[self._fixed]),
+            relation=self._array(handler.side),
+            holds=self._array(handler.contacts.active, np.int32),
+            held=c.addressof(held),
+        )
+
+    def learn(self, begin: int, what: tuple[Sequence[int], Sequence[int]], moved: tuple[Any, Any, int]) -> None:
+        """The handler went from mode `begin`; what: watches that crossed, samples due; moved: sides once these had
+        changed, the point behind (None: nothing but sides changed), events before.
+        """
+        (crossed, due), (flipped, point, before) = what, moved
+        handler, number = self.handler, len(self._told)
+        if begin < 0 or number >= MANY or not handler.simple or not self._determined(point):
+            return
+        end = self.stands()
+        groups = tuple(group for r in handler.rounds for group in r.groups)
+        flat = [a for group in groups for a in group]
+        ends = np.cumsum([sum(map(len, r.groups)) for r in handler.rounds])
+        same = what[0], what[1], begin, end
+        if end < 0 or 2 + 2 * len(flat) > self.core.width or self._tried.setdefault(repr(same), 0) >= AGAIN:
+            return
+        self._tried[repr(same)] += 1
+        self._transitions = _grown(self._transitions, number)
+        entries = tuple(handler.happened[before:])
+        self._transitions[number] = lib.Transition(
+            to=end,
+            next=self._modes[begin].first,
+            crossed=len(crossed),
+            due=len(due),
+            rounds=len(handler.rounds),
+            moves=point is not None,
+            which=self._array(sorted(crossed), np.int32),
+            sample=self._array(sorted(due), np.int32),
+            kind=self._array([a.kind != "discrete" for a in flat], np.int32),
+            place=self._array([a.place for a in flat], np.int32),
+            read=self._array([a.row for a in flat], np.int32),
+            end=self._array(ends, np.int32),
+            sides=self._array(np.concatenate([flipped, *(r.sides for r in handler.rounds)])),
+            entries=len(entries),
+        )
+        self.core.transition = c.addressof(self._transitions)
+        self._modes[begin].first = number
+        self._told.append(Told(groups, entries))
+
+    def _determined(self, point: Any) -> bool:
+        """Whether the mode leaves nothing open, and its settled points are all that the handler would ask for."""
+        handler, restart = self.handler, self.run.restart
+        if point is None or not handler.plan.contacts:
+            return True
+        return restart.plain() and bool(handler.determined.leaves(handler.last, *point) == 0)
+
+    def places(self, which: Sequence[Watched]) -> list[int]:
+        """Numbers of these among what is watched."""
+        watched = self.handler.watched()
+        return [watched.index(w) for w in which]
+
+
+def _grown(array: Any, number: int) -> Any:
+    """The same structures with room for one more at `number`."""
+    if number < len(array):
+        return array
+    larger = (array._type_ * (2 * len(array)))()
+    c.memmove(larger, array, c.sizeof(array))
+    return larger
