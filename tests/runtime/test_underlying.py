@@ -171,7 +171,6 @@ def test_seed_models_meet_their_references(tmp_path):
                 formulation=formulation,
                 index="0",
                 method="dopri",
-                backend="numpy",
                 accuracy=1e-6,
                 at=",".join(map(repr, wanted["t"])),
                 output=str(tmp_path / "t.h5"),
