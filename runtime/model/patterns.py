@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from sysdyn.runtime.model.description import Index, Ints, Kernel, Reference, Sha
 from sysdyn.runtime.model.failures import ContractError
 
 Longs = NDArray[np.int64]
+Array = TypeVar("Array", bound=NDArray[Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +27,7 @@ class Places:
     column: Longs
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Pattern:
     """Compressed columns: column [unknowns + 1], row [entries]; rows ascend within a column."""
 
@@ -39,8 +42,18 @@ class Pattern:
         return int(self.row.size)
 
     def columns_of(self) -> Longs:
-        """Column of each entry [entries]."""
-        return np.repeat(np.arange(self.unknowns), np.diff(self.column))
+        """Column of each entry [entries]; read-only."""
+        return self._columns
+
+    @cached_property
+    def _columns(self) -> Longs:
+        return read_only(np.repeat(np.arange(self.unknowns), np.diff(self.column)))
+
+
+def read_only(array: Array) -> Array:
+    """The array, which nobody may change from now on: several hold it."""
+    array.flags.writeable = False
+    return array
 
 
 def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:

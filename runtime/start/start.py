@@ -447,6 +447,7 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
         raise _explain(starter, t0, guess, free, best)
     starter.work = Work(EXPLAINED)
     best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
+    system.starter = None if starter.missed.size or starter.summed else starter
     y, yd = starter.expand(best.x)
     counted = Starter(system, remember=True) if starter.missed.size else starter
     freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
