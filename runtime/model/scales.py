@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import compliance
-from sysdyn.runtime.model.patterns import read_only
+from sysdyn.runtime.model.patterns import numbered, read_only
 from sysdyn.runtime.model.system import System
 
 ROUND_OFF = 1e-12
@@ -139,8 +139,8 @@ def of_a_kind(
     rows: NDArray[np.integer], columns: NDArray[np.integer], alike: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Number of the row and the kind of its unknown, of each place [entries]."""
-    keys = rows.astype(np.int64) * (1 + int(alike.max(initial=0))) + alike[columns]
-    return np.unique(keys, return_inverse=True)[1].astype(np.int64)
+    kinds = 1 + int(alike.max(initial=0))
+    return numbered(rows, alike[columns], 1 + int(rows.max(initial=0)), kinds)[0].astype(np.int64)
 
 
 def of_kinds(system: System) -> NDArray[np.int64]:
