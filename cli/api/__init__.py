@@ -289,7 +289,7 @@ class Model:
             raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
         given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
         report = Report()
-        ran = self._loaded.run(set or {}, report, **_changes(given))
+        ran = self._loaded.run(set or {}, report, alone=True, **_changes(given))
         return _handed(ran, report, unmet)
 
 

@@ -112,14 +112,18 @@ class Loaded:
             return compiled.prepared, compiled
         return replace(compiled.prepared, binding=binding, cpu_compile_s=0.0), compiled
 
-    def run(self, settings: Settings, report: Report, **changes: Any) -> Ran | None:
+    def run(self, settings: Settings, report: Report, *, alone: bool = False, **changes: Any) -> Ran | None:
         """One run; changes: options of the request that differ (`until`, `at`, `output`, ...), output None: in memory.
 
+        alone: nobody looks at more of it than at its trace once the next one begins.
         None where the report says why not.
         """
         request = replace(self.request, **changes)
         check_tolerances(request)
         prepared, compiled = self.bound(settings)
+        network = prepared.network
+        if alone and not (network.events or network.switches or prepared.compiled.form.kinks):
+            prepared = replace(prepared, alone=True)
         with ex.fresh(compiled.nodes):
             options = options_of(request, self.target, prepared, report, time.monotonic(), None)
             if options is None:

@@ -44,13 +44,15 @@ class Prepared:
     unasked: frozenset[str] = frozenset()
     layouts: dict[Any, dict[Any, Any]] = field(default_factory=dict, compare=False, repr=False)
     """What the runtime finds of the structure of index forms, by sizes: other numbers have the same."""
+    alone: bool = False
+    """Nothing of a run but its trace is asked for: the next one may take its structures."""
 
     @property
     def arrays(self) -> dict[str, Any]:
         """The binding as the contract's plain arrays."""
         b = self.binding
         sizes = b.ix.tobytes(), b.shapes, b.row_shapes
-        return {**self.arrays_of(b), "layouts": self.layouts.setdefault(sizes, {})}
+        return {**self.arrays_of(b), "layouts": self.layouts.setdefault(sizes, {}), "alone": self.alone}
 
     @staticmethod
     def arrays_of(b: Binding) -> dict[str, Any]:

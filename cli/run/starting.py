@@ -15,6 +15,7 @@ from sysdyn.dsl.model.network import Expectation
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.text.diagnostics import Related, Report
 from sysdyn.runtime.events.start import eventful_start
+from sysdyn.runtime.model.description import describe
 from sysdyn.runtime.model.failures import InconsistentStart
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
@@ -41,7 +42,7 @@ def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None 
     """
     scene = prepared.network.scene
     policy = redundancy or (scene.redundancy if scene else None) or "error"
-    system = System(prepared.manifest, prepared.arrays, prepared.carrier)
+    system = System.of(describe(prepared.manifest, prepared.arrays), prepared.carrier, "3")
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
             state = eventful_start(system, t0, plan(prepared, system))

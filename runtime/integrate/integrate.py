@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,11 @@ Sink = Callable[[Floats], None]
 Progress = Callable[[float], None]
 
 
+def same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    """Whether all numbers are the same."""
+    return len(one) == len(other) and all(map(np.array_equal, one, other))
+
+
 class Integration:
     """The core's structures for one system and request; `run` drives them."""
 
@@ -65,7 +71,7 @@ class Integration:
         self.yd = np.where(system.differential(jyd), self.yd, 0.0)
         self.roles: Roles = roles(system, start.t, jyd, request.index)
         self._carries, self._resolved = self.roles.state, np.zeros(system.unknowns)
-        state = np.isin(system.kinds, ("q", "f"))
+        state = system.are("q", "f")
         # a tolerance below what round-off leaves open is one that no step meets
         self._least = np.where(state, UNRESOLVED * unresolved(system, self.y, jy), 0.0) / max(request.rtol, 1e-15)
         self.magnitude = self._magnitudes(jy, jyd)
@@ -92,9 +98,18 @@ class Integration:
         return jy, jyd
 
     def _magnitudes(self, jy: Floats, jyd: Floats) -> Floats:
-        far = displacement(self.system, jy, jyd, self.yd)
-        found, self._time = magnitudes(self.system, self.start.t, self.request.t_end, self.y, self.yd, far)
+        found, self._time = self._sized(jy, jyd)
         return np.maximum(found, self._least)
+
+    def _sized(self, jy: Floats, jyd: Floats) -> tuple[Floats, float]:
+        """Magnitudes and the time scale of the start: those of the integration before this one, at the same point."""
+        system, request = self.system, self.request
+        point = self.start.t, request.t_end, jy, jyd, self.y, self.yd, system.description.p, system.held[0]
+        if not same(system.sized[0], point):
+            far = displacement(system, jy, jyd, self.yd)
+            found = magnitudes(system, self.start.t, request.t_end, self.y, self.yd, far)
+            system.sized = tuple(map(np.copy, point)), found
+        return system.sized[1]
 
     def _linear(self, jy: Floats, jyd: Floats) -> None:
         self.underlying: Underlying | None = None
@@ -123,7 +138,7 @@ class Integration:
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._met = np.zeros(self.system.unknowns)
-        self._unnamed = np.isin(self.system.kinds, ("q", "f", "p", "s")) & (self.system.nominal == 0.0)
+        self._unnamed = self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
         self._smooth = self.roles.smooth.astype(np.int32)
         method = self.method.contents
         self._idle = self.roles.idle.astype(np.int32)

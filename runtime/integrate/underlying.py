@@ -60,9 +60,11 @@ class Underlying:
         self._unknown = np.flatnonzero(kinds != "q").astype(np.int32)
         self._column = np.full(system.unknowns, -1, dtype=np.int32)
         self._column[self._unknown] = np.arange(self._unknown.size)
-        moved = np.isin(kinds, ("f", "p"))
+        moved = system.are("f", "p")
         self._rate = np.where(moved, 2, np.where(kinds == "s", 1, 0)).astype(np.int32)[self._unknown]
-        self._select()
+        (
+            self._in_matrix, self._source, self._from_rate, self.pattern
+        ) = system.once("selection", self._select)  # fmt: skip
         self._systems()
         order = column_order(self.pattern, self.values(jy, jyd))
         self._order = order
@@ -81,20 +83,20 @@ class Underlying:
         core.magnitude, core.tolerance = lib.pointer(magnitude), 1e-14
         core.displaced = lib.pointer(self._displaced)
 
-    def _select(self) -> None:
-        """The matrix's pattern, and where its entries stand in dF/dy, dF/dy'."""
+    def _select(self) -> tuple[NDArray[np.bool_], Ints, Ints, Pattern]:
+        """Which entries of dF/dy, dF/dy' stand in the matrix, where from, and its pattern."""
         system = self.system
         pattern, first = system.pattern, system.form.k_row.size
         columns = pattern.columns_of()
         in_y, in_rate = system.structural()
-        self._in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
+        in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
         of_rate = (self._rate > 0)[self._column[columns]]
-        take = self._in_matrix & np.where(of_rate, in_rate, in_y)
-        self._source = np.flatnonzero(take).astype(np.int32)
-        self._from_rate = of_rate[take].astype(np.int32)
+        take = in_matrix & np.where(of_rate, in_rate, in_y)
+        source, from_rate = np.flatnonzero(take).astype(np.int32), of_rate[take].astype(np.int32)
         number = self._unknown.size
         start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
-        self.pattern = Pattern(number, number, start, (pattern.row[take] - first).astype(np.int32))
+        rows = (pattern.row[take] - first).astype(np.int32)
+        return in_matrix, source, from_rate, Pattern(number, number, start, rows)
 
     def _systems(self) -> None:
         """The systems of the core: matrix, applied, position, velocity."""
@@ -179,7 +181,8 @@ class Underlying:
         if number == 0:
             return ()
         if number > DENSE:
-            return self._largest(_sparse_null(self.pattern, matrix))
+            alone = _unmatched(self.pattern)
+            return self._largest(alone if alone.any() else _sparse_null(self.pattern, matrix))
         full = np.zeros((number, number))
         full[self.pattern.row, self.pattern.columns_of()] = matrix
         if not np.isfinite(full).all():
@@ -232,6 +235,19 @@ def _balanced(pattern: Pattern, values: Floats) -> Floats:
     columns = pattern.columns_of()
     row, column = sparse_factors(pattern.row, columns, np.abs(values), (pattern.rows, pattern.unknowns))
     return values * row[pattern.row] * column[columns]
+
+
+def _unmatched(pattern: Pattern) -> NDArray[np.float64]:
+    """1 for unknowns that no row is left for, whatever the values (a maximum matching of rows and columns), else 0.
+
+    Round-off makes pivots of what is singular by structure: a line of 20000 sections passes for regular by its values.
+    """
+    from scipy.sparse import csc_array
+    from scipy.sparse.csgraph import maximum_bipartite_matching
+
+    shape = (pattern.rows, pattern.unknowns)
+    graph = csc_array((np.ones(pattern.entries, dtype=np.int8), pattern.row, pattern.column), shape=shape).tocsr()
+    return np.asarray(maximum_bipartite_matching(graph, perm_type="row") < 0, dtype=np.float64)
 
 
 def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:

@@ -42,18 +42,18 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     """
     kinds = system.kinds
     differential = system.differential(jyd)
-    state = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & differential)
+    state = system.are("q", "p", "s") | ((kinds == "f") & differential)
     test = np.where(state, 0, -1)
     power = np.zeros(system.unknowns, dtype=np.int32)
-    multiplier = np.isin(kinds, ("kappa", "mu", "nu"))
+    multiplier = system.are("kappa", "mu", "nu")
     if index >= 2:
         steep = np.zeros(system.unknowns, dtype=bool)
         steep[system.pattern.columns_of()[system.steep_rows(t)[system.pattern.row]]] = True
         power[multiplier | (((kinds == "e") | ((kinds == "f") & ~differential)) & ~steep)] = 1
     if index >= 3:
-        power[np.isin(kinds, ("kappa", "mu"))] = 2
-        power[np.isin(kinds, ("f", "p")) & state] = 1
-        test[np.isin(kinds, ("f", "p")) & state] = 1
+        power[system.are("kappa", "mu")] = 2
+        power[system.are("f", "p") & state] = 1
+        test[system.are("f", "p") & state] = 1
     if not state.any():
         test[kinds == "f"] = 0
     if (test < 0).all():

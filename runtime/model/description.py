@@ -7,7 +7,7 @@ hands on a `Description`: unknown families, row families, blocks with their kern
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -135,7 +135,7 @@ class Initial:
 class Description:
     """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts, orders: of the index
     forms made so far (model/system.py, integrate/relaxation.py), which need be found once; branches: places in p of
-    laws that may slide (events/kinks.py).
+    laws that may slide (events/kinks.py); systems: those of runs one after the other that share p, by index form.
     """
 
     families: tuple[Family, ...]
@@ -146,6 +146,7 @@ class Description:
     initial: tuple[Initial, ...]
     switches: Switches
     branches: tuple[int, ...] = ()
+    systems: dict[Any, Any] | None = field(default=None, compare=False)
     layouts: dict[Any, Any] = field(default_factory=dict, compare=False)
     orders: dict[Any, Ints] = field(default_factory=dict, compare=False, init=False)
 
@@ -266,17 +267,28 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
             },
         )
     own_families, own_rows, blocks = layouts["described"]
-    return Description(
+    initial = tuple(_initial(item, names) for item in binding.get("initial", ()))
+    before: Description | None = layouts.get("last") if binding.get("alone") else None
+    if before is not None:
+        before.p[:] = binding["p"]
+        found = replace(before, initial=initial)
+        found.orders.update(before.orders)
+        return found
+    found = Description(
         families=own_families,
         rows=own_rows,
         blocks=blocks,
         p=np.array(binding["p"], dtype=np.float64),  # its own: events write there
         ix=np.ascontiguousarray(binding["ix"], dtype=np.int32),
-        initial=tuple(_initial(item, names) for item in binding.get("initial", ())),
+        initial=initial,
         switches=Switches(tuple(_switched(item, families, shapes) for item in structure.get("switches", ()))),
         branches=tuple(int(place) for place in structure.get("branches", ())),
+        systems={} if binding.get("alone") else None,
         layouts=layouts,
     )
+    if binding.get("alone"):
+        layouts["last"] = found
+    return found
 
 
 def _switched(item: Mapping[str, Any], families: Sequence[Mapping[str, Any]], shapes: list[Shape]) -> tuple[int, int]:

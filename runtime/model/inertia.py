@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 
 
 def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
     """|entry| of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
-    found = np.zeros(system.unknowns)
+    found, columns = np.zeros(system.unknowns), system.pattern.columns_of()
+    mine = system.once(("own", group, kind), lambda: _places(system, group, kind))
+    np.maximum.at(found, columns[mine], np.abs(values[mine]))
+    return found
+
+
+def _places(system: System, group: str, kind: str) -> NDArray[np.int64]:
+    """Places in the pattern of the entries of each unknown of a kind in its coordinate's row of a group."""
     families = system.description.families
     own = {family.owner: k for k, family in enumerate(families) if family.kind == kind}
     place = np.full(system.rows, -1, dtype=np.int64)
@@ -18,10 +26,7 @@ def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
         unknown = own.get(row.owner)
         if name == group and unknown is not None and families[unknown].size == row.size:
             place[first : first + row.size] = system.form.at[unknown] + np.arange(row.size)
-    columns = system.pattern.columns_of()
-    mine = place[system.pattern.row] == columns
-    np.maximum.at(found, columns[mine], np.abs(values[mine]))
-    return found
+    return np.flatnonzero(place[system.pattern.row] == system.pattern.columns_of())
 
 
 def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:

@@ -7,13 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Index, Ints, Kernel, Reference, Shape
 from sysdyn.runtime.model.failures import ContractError
 
 Longs = NDArray[np.int64]
+Array = TypeVar("Array", bound=NDArray[Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +28,7 @@ class Places:
     column: Longs
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Pattern:
     """Compressed columns: column [unknowns + 1], row [entries]; rows ascend within a column."""
 
@@ -39,8 +43,18 @@ class Pattern:
         return int(self.row.size)
 
     def columns_of(self) -> Longs:
-        """Column of each entry [entries]."""
-        return np.repeat(np.arange(self.unknowns), np.diff(self.column))
+        """Column of each entry [entries]; read-only."""
+        return self._columns
+
+    @cached_property
+    def _columns(self) -> Longs:
+        return read_only(np.repeat(np.arange(self.unknowns), np.diff(self.column)))
+
+
+def read_only(array: Array) -> Array:
+    """The array, which nobody may change from now on: several hold it."""
+    array.flags.writeable = False
+    return array
 
 
 def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:
@@ -116,9 +130,26 @@ def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern
     column = np.concatenate([part.column for part in parts]) if parts else np.zeros(0, dtype=np.int64)
     if row.size and (row.min() < 0 or row.max() >= rows or column.min() < 0 or column.max() >= unknowns):
         raise ContractError("an entry lies outside the matrix")
-    keys, inverse = np.unique(column * max(rows, 1) + row, return_inverse=True)
-    starts = np.searchsorted(keys, np.arange(unknowns + 1, dtype=np.int64) * max(rows, 1))
-    pattern = Pattern(rows, unknowns, starts.astype(np.int32), (keys % max(rows, 1)).astype(np.int32))
+    number, count = numbered(column, row, unknowns, rows)
+    starts, own = np.zeros(unknowns + 1, dtype=np.int32), np.zeros(count, dtype=np.int32)
+    own[number] = column
+    starts[1:] = np.cumsum(np.bincount(own, minlength=unknowns))
+    own[number] = row
     cuts = np.cumsum([part.row.size for part in parts])[:-1]
-    slots = [np.ascontiguousarray(piece, dtype=np.int32) for piece in np.split(inverse.ravel(), cuts)]
-    return pattern, slots
+    slots = [np.ascontiguousarray(piece) for piece in np.split(number, cuts)]
+    return Pattern(rows, unknowns, starts, own), slots
+
+
+def numbered(
+    first: NDArray[np.integer], second: NDArray[np.integer], firsts: int, seconds: int
+) -> tuple[Ints, int]:
+    """The place of each pair [entries] among the distinct ones in ascending order, and their number; first below
+    firsts, second below seconds.
+    """
+    number = np.zeros(first.size, dtype=np.int32)
+    pair = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in (first, second))
+    arrays = map(lib.pointer, (*pair, number))
+    count = lib.core.sd_pairs(number.size, max(firsts, 1), max(seconds, 1), *arrays)
+    if count < 0:
+        raise MemoryError
+    return number, int(count)

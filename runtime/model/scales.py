@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import compliance
+from sysdyn.runtime.model.patterns import numbered, read_only
 from sysdyn.runtime.model.system import System
 
 ROUND_OFF = 1e-12
@@ -33,6 +34,8 @@ NOISE = 1e-6
 QUIET = 1e-9
 """Efforts below this part of (largest energy) / q are round-off."""
 _SAMPLES = 16
+_HOLDS = ("phi", "psi")
+"""Beginnings of the names of groups of constraints."""
 _SWEEPS = 8
 
 
@@ -62,7 +65,7 @@ def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -
 def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: float) -> float:
     """Shortest of: a hundredth of the span, y / y', sqrt(q / f'), the time scale of what moves with t (s)."""
     found = min(SPAN * span, excited)
-    state = np.isin(system.kinds, ("q", "f", "p", "s"))
+    state = system.are("q", "f", "p", "s")
     form, size, rate = system.form, group_maximum(system, np.abs(y)), np.abs(yd)
     # values that are nothing beside what their rate makes of them are round-off
     real = state & (size > FRESH * rate * found) & (rate > 0.0)
@@ -136,38 +139,52 @@ def of_a_kind(
     rows: NDArray[np.integer], columns: NDArray[np.integer], alike: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Number of the row and the kind of its unknown, of each place [entries]."""
-    keys = rows.astype(np.int64) * (1 + int(alike.max(initial=0))) + alike[columns]
-    return np.unique(keys, return_inverse=True)[1].astype(np.int64)
+    kinds = 1 + int(alike.max(initial=0))
+    return numbered(rows, alike[columns], 1 + int(rows.max(initial=0)), kinds)[0].astype(np.int64)
+
+
+def of_kinds(system: System) -> NDArray[np.int64]:
+    """What `of_a_kind` says of the places of a system's pattern [entries]; read-only."""
+    rows, columns = system.pattern.row, system.pattern.columns_of()
+    return system.once("of kinds", lambda: read_only(of_a_kind(rows, columns, alike(system))))
 
 
 def _efforts(system: System, found: Floats, row: Floats) -> Floats:
     """Least effort that counts in each row of dynamics [rows]: a tiny part of the largest energy over its q."""
+    i, columns = system.once("efforts", lambda: _displaced(system))
+    least, q = np.zeros(system.rows), found[columns]
+    least[i] = QUIET * (row[i] * q).max(initial=0.0) / np.where(q > 0.0, q, np.inf)
+    return least
+
+
+def _displaced(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of dynamics, and the places of their displacements."""
     form, description = system.form, system.description
     places = {description.families[k].owner: k for k in description.families_of("q")}
-    rows: list[NDArray[np.int64]] = []
-    columns: list[NDArray[np.int64]] = []
+    rows = [np.zeros(0, dtype=np.int64)]
+    columns = [np.zeros(0, dtype=np.int64)]
     for group, family, first in form.groups:
         owner = description.rows[family].owner
         number = description.rows[family].size
         if group == "dynamics" and owner in places and description.families[places[owner]].size == number:
             rows.append(first + np.arange(number))
             columns.append(form.at[places[owner]] + np.arange(number))
-    least = np.zeros(system.rows)
-    if rows:
-        i, q = np.concatenate(rows), found[np.concatenate(columns)]
-        least[i] = QUIET * (row[i] * q).max(initial=0.0) / np.where(q > 0.0, q, np.inf)
-    return least
+    return np.concatenate(rows), np.concatenate(columns)
 
 
 def alike(system: System) -> NDArray[np.int64]:
-    """Number of the kind and unit of each unknown [unknowns]."""
+    """Number of the kind and unit of each unknown [unknowns]; read-only."""
+    return system.once("alike", lambda: _alike(system))
+
+
+def _alike(system: System) -> NDArray[np.int64]:
     families = system.description.families
     keys: dict[tuple[str, str], int] = {}
     number = np.empty(len(families) + 1, dtype=np.int64)
     for k, family in enumerate(families):
         number[k] = keys.setdefault((family.kind, family.unit), len(keys))
     number[-1] = len(keys)
-    return number[system.family_of]
+    return read_only(number[system.family_of])
 
 
 def group_maximum(system: System, values: Floats) -> Floats:
@@ -185,7 +202,8 @@ def balanced(system: System, y: Floats, jy: Floats) -> Floats:
     """Size of each unknown at a point [unknowns], all positive: |y|, or what balances its rows."""
     rows, columns = system.pattern.row.astype(np.int64), system.pattern.columns_of()
     size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
-    found = propagate(np.abs(y), rows, columns, size, np.zeros(system.rows), alike(system), largest=True)
+    nothing, group = np.zeros(system.rows), of_kinds(system)
+    found = propagate(np.abs(y), rows, columns, size, nothing, alike(system), largest=True, group=group)
     found = np.maximum(found, GROUP * group_maximum(system, found))
     return np.where(found > 0.0, found, 1.0)
 
@@ -196,10 +214,7 @@ def unresolved(system: System, y: Floats, jy: Floats) -> Floats:
     A charge of 1e-17 C in a sum with one of 0.1 C is known to 1e-17 C, whatever tolerance is asked of it.
     """
     rows, columns = system.pattern.row, system.pattern.columns_of()
-    constraint = np.zeros(system.rows, dtype=bool)
-    for group, family, first in system.form.groups:
-        if group.startswith(("phi", "psi")):
-            constraint[first : first + system.description.rows[family].size] = True
+    constraint = system.of_groups(*(g for g in dict.fromkeys(g for g, _, _ in system.form.groups) if g[:3] in _HOLDS))
     take = constraint[rows] & np.isfinite(jy) & (jy != 0.0)
     i, j, slope = rows[take], columns[take], np.abs(jy[take])
     size = np.zeros(system.rows)
@@ -216,10 +231,7 @@ def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
     rows, columns = system.pattern.row.astype(np.int64), system.pattern.columns_of()
     form, found = system.form, unresolved(system, y, jy)
     found[form.k_f] = np.maximum(found[form.k_f], found[form.k_q] / time)
-    balance = np.zeros(system.rows, dtype=bool)
-    for group, family, first in form.groups:
-        if group == "dynamics":
-            balance[first : first + system.description.rows[family].size] = True
+    balance = system.of_groups("dynamics")
     slope = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     take = balance[rows] & (slope > 0.0)
     i, j, slope = rows[take], columns[take], slope[take]
@@ -238,11 +250,15 @@ def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
 
 
 def _with_momentum(system: System) -> NDArray[np.bool_]:
-    """Unknowns of coordinates whose momenta are unknowns [unknowns]."""
+    """Unknowns of coordinates whose momenta are unknowns [unknowns]; read-only."""
+    return system.once("with momentum", lambda: _own_momentum(system))
+
+
+def _own_momentum(system: System) -> NDArray[np.bool_]:
     families = system.description.families
     owners = {family.owner for family in families if family.kind == "p"}
     member = np.array([*(family.owner in owners for family in families), False])
-    return np.asarray(member[system.family_of])
+    return read_only(np.asarray(member[system.family_of]))
 
 
 def magnitudes(
@@ -254,7 +270,7 @@ def magnitudes(
     """
     span = max(t_end - t0, 0.0) or 1.0
     y, yd = (np.where(np.isfinite(item), item, 0.0) for item in (y, yd))
-    state = np.isin(system.kinds, ("q", "f", "p", "s"))
+    state = system.are("q", "f", "p", "s")
     excited, quick = excitation(system, t0, t0 + span, y, yd)
     tau = time_scale(system, span, y, yd, quick)
     jy, jyd = system.jacobian(t0, y, yd)
@@ -272,19 +288,20 @@ def magnitudes(
     size = np.where(np.isfinite(size), size, 0.0)
     pattern = system.pattern
     rows, columns, kinds = pattern.row.astype(np.int64), pattern.columns_of(), alike(system)
+    group = of_kinds(system)
     # what round-off leaves of a zero is nothing beside what the sources will make of it
-    driven = propagate(np.zeros(found.size), rows, columns, size, excited, kinds, capped=True)
+    driven = propagate(np.zeros(found.size), rows, columns, size, excited, kinds, capped=True, group=group)
     found = np.where(carries & (found < ROUND_OFF * driven), driven, found)
     # momenta and dynamic variables are balanced against flows, what follows from the state against all of it: so
     # round-off of a start does not pass for a magnitude
-    kept = np.where(np.isin(system.kinds, ("q", "f")) & carries, found, 0.0)
-    balanced = propagate(kept, rows, columns, size, excited, kinds, largest=True, capped=True)
-    found = np.where(~np.isin(system.kinds, ("p", "s")) | (found > NOISE * balanced), found, balanced)
+    kept = np.where(system.are("q", "f") & carries, found, 0.0)
+    balanced = propagate(kept, rows, columns, size, excited, kinds, largest=True, capped=True, group=group)
+    found = np.where(~system.are("p", "s") | (found > NOISE * balanced), found, balanced)
     kept = np.where(carries, found, 0.0)
     row = excited.copy()
     np.maximum.at(row, rows, size * kept[columns])
     excited = np.maximum(excited, _efforts(system, found, row))
-    balanced = propagate(kept, rows, columns, size, excited, kinds, capped=True)
+    balanced = propagate(kept, rows, columns, size, excited, kinds, capped=True, group=group)
     found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, group_maximum(system, found), found)
     found[form.k_q] = np.where(found[form.k_q] == 0.0, tau * found[form.k_f], found[form.k_q])
@@ -298,5 +315,5 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     round-off altogether.
     """
     found = _flows(system, np.maximum(met, GROUP * group_maximum(system, met)), span)
-    free = np.isin(system.kinds, ("q", "f", "p", "s")) & (system.nominal == 0.0)
+    free = system.are("q", "f", "p", "s") & (system.nominal == 0.0)
     return np.where(free, np.clip(found, NOISE * magnitude, magnitude), magnitude)

@@ -7,10 +7,10 @@ what Python sees is what the stepper integrates.
 from __future__ import annotations
 
 import ctypes as c
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,10 @@ from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, de
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
 from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
-from sysdyn.runtime.model.patterns import Pattern, Places, compress, places
+from sysdyn.runtime.model.patterns import Pattern, Places, compress, places, read_only
 
 Mask = NDArray[np.bool_]
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +56,21 @@ class System:
     def of(
         cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
     ) -> System:
-        """The same from a description; left_out: multipliers (family, position) of constraints that do not count."""
-        self = cls.__new__(cls)
-        self._make(description, carrier, index_form, left_out)
-        return self
+        """The same from a description; left_out: multipliers (family, position) of constraints that do not count.
+
+        Where the description has the systems of a run before it, one of those, at this one's numbers.
+        """
+        made = description.systems
+        if made is None or (index_form, left_out) not in made:
+            self = cls.__new__(cls)
+            self._make(description, carrier, index_form, left_out)
+            if made is not None:
+                made[index_form, left_out] = self
+            return self
+        self = made[index_form, left_out]
+        self.description, self.starter = description, None
+        self.kinematic_scale[:] = 1.0
+        return self  # type: ignore[no-any-return]
 
     def another(self, index_form: str) -> System:
         """The same model in another form."""
@@ -79,8 +91,19 @@ class System:
             description.layouts[key] = plan(description, index_form)
         self.form: Form = description.layouts[key]
         self.failure = Failure()
+        self.sized: tuple[tuple[Any, ...], tuple[Floats, float]] = ((), (np.zeros(0), 0.0))
+        """Magnitudes found last, and the point at which (integrate/integrate.py)."""
+        self.starter: Any = None
+        """What the start was sought in (start/starter.py), where it may serve again."""
         self._keep: list[Any] = []
         self._assemble()
+
+    def once(self, name: Hashable, make: Callable[[], Found]) -> Found:
+        """What follows from the structure of this form alone: made once for all runs of a text with these sizes."""
+        key = "once", name, self.form.name, self.left_out
+        if key not in self.description.layouts:
+            self.description.layouts[key] = make()
+        return self.description.layouts[key]  # type: ignore[no-any-return]
 
     @property
     def unknowns(self) -> int:
@@ -167,7 +190,7 @@ class System:
             v=lib.pointer(self._scratch),
             stop=lib.pointer(self.failure.flag),
         )
-        self._sets: dict[bytes, tuple[Any, Any]] = {}
+        self._sets: dict[bytes, tuple[Any, Any]] = self.once("sets", dict)
         self.switch()
         self.description.switches.join(self)
 
@@ -230,13 +253,16 @@ class System:
 
     def structural(self) -> tuple[Mask, Mask]:
         """Which places of the pattern [entries] some block writes in dF/dy, in dF/dyd (rows q' - f left out)."""
+        return self.once("structural", self._structural)
+
+    def _structural(self) -> tuple[Mask, Mask]:
         in_y, in_rate = np.zeros(self.pattern.entries, dtype=bool), np.zeros(self.pattern.entries, dtype=bool)
         for k in range(len(self.form.calls)):
             in_y[self._slots[2 * k + 2]] = True
             in_rate[self._slots[2 * k + 3]] = True
         in_y[self._slots[-1]] = True
         in_rate[self._slots[-1][self._reads_rate != 0]] = True
-        return in_y, in_rate
+        return read_only(in_y), read_only(in_rate)
 
     def observer(self, block: str) -> lib.Call | None:
         """A call of observe, observe_rate, observe_scale or audit whose rows begin at 0."""
@@ -247,6 +273,9 @@ class System:
 
     def observed_rows(self, block: str) -> tuple[Ints, int]:
         """First row of each row family of an observing block, and their number."""
+        return self.once(("observed", block), lambda: self._observed_rows(block))
+
+    def _observed_rows(self, block: str) -> tuple[Ints, int]:
         table = np.full(len(self.description.rows), -1, dtype=np.int32)
         number = 0
         for k in self.description.rows_of(BASE.get(block, block)):
@@ -353,23 +382,44 @@ class System:
 
     @cached_property
     def kinds(self) -> NDArray[np.str_]:
-        """Kind of each unknown: q f p s e kappa mu nu."""
-        return np.array(self.form.kind, dtype="<U5") if self.form.kind else np.zeros(0, dtype="<U5")
+        """Kind of each unknown: q f p s e kappa mu nu; read-only."""
+        return self.once("kinds", lambda: read_only(np.array(self.form.kind, dtype="<U5")))
+
+    def are(self, *kinds: str) -> Mask:
+        """Unknowns of these kinds [unknowns]; read-only."""
+        return self.once(("are", kinds), lambda: read_only(np.isin(self.kinds, kinds)))
+
+    def of_groups(self, *names: str) -> Mask:
+        """Rows of these groups [rows]; read-only."""
+        return self.once(("groups", names), lambda: read_only(self._of_groups(names)))
+
+    def _of_groups(self, names: tuple[str, ...]) -> Mask:
+        mask = np.zeros(self.rows, dtype=bool)
+        for group, family, first in self.form.groups:
+            if group in names:
+                mask[first : first + self.description.rows[family].size] = True
+        return mask
 
     @cached_property
     def family_of(self) -> Ints:
-        """Number of the family of each unknown (nu: -1)."""
+        """Number of the family of each unknown (nu: -1); read-only."""
+        return self.once("family_of", self._family_of)
+
+    def _family_of(self) -> Ints:
         found = np.full(self.unknowns, -1, dtype=np.int32)
         for k, family in enumerate(self.description.families):
             if family.kind != "audit":
                 found[self.form.at[k] : self.form.at[k] + family.size] = k
-        return found
+        return read_only(found)
 
     @cached_property
     def nominal(self) -> Floats:
-        """Nominal magnitudes from the manifest; 0 where it names none."""
+        """Nominal magnitudes from the manifest; 0 where it names none; read-only."""
+        return self.once("nominal", self._nominal)
+
+    def _nominal(self) -> Floats:
         values = [0.0 if family.nominal is None else family.nominal for family in self.description.families]
-        return np.append(np.array(values, dtype=np.float64), 0.0)[self.family_of]
+        return read_only(np.append(np.array(values, dtype=np.float64), 0.0)[self.family_of])
 
     def differential(self, jyd: Floats) -> Mask:
         """Unknowns whose derivative occurs with a nonzero coefficient."""

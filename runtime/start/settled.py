@@ -25,6 +25,10 @@ HELD = 1e8
 
 def rates_of(settled: System) -> Ints:
     """Places of y whose derivatives occur in the settled rows."""
+    return settled.once("rates", lambda: _rates(settled))
+
+
+def _rates(settled: System) -> Ints:
     used = np.zeros(settled.unknowns, dtype=bool)
     pattern = settled.pattern
     for call in settled.form.calls:
@@ -55,13 +59,12 @@ class Settler:
         n, k = settled.unknowns, int(self.rates.size)
         self._n, self._moves = n, n + k
         self.pattern: Pattern
-        self.pattern, self._slots = self._saddle()
+        self.pattern, self._slots, self._sort = settled.once("saddle", lambda: (*self._saddle(), self._sorts()))
         self._weight = np.ones(self._moves)
         if light is not None:
             self._weight[:n][light] = LIGHT
         self._weight[:n][~state] = FREE**2
         self._weight[n:] = FREE**2
-        self._sort = self._sorts()
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
         self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
         self._allocate()
@@ -73,9 +76,9 @@ class Settler:
         columns, rows = pattern.columns_of(), pattern.row.astype(np.int64)
         rate_at = np.full(n, -1, dtype=np.int64)
         rate_at[self.rates] = n + np.arange(self.rates.size)
-        self._with_rate = rate_at[columns] >= 0
+        with_rate = rate_at[columns] >= 0
         x, r = rows + self._moves, columns
-        xd, rd = rows[self._with_rate] + self._moves, rate_at[columns[self._with_rate]]
+        xd, rd = rows[with_rate] + self._moves, rate_at[columns[with_rate]]
         diagonal_x, diagonal_r = np.arange(self._moves), self._moves + np.arange(self.system.rows)
         parts = [
             Places(x, r),
@@ -88,7 +91,7 @@ class Settler:
         found, slots = compress(number, number, parts)
         for k in (2, 3):
             full = np.full(pattern.entries, -1, dtype=np.int32)
-            full[self._with_rate] = slots[k]
+            full[with_rate] = slots[k]
             slots[k] = full
         return found, slots
 

@@ -447,6 +447,8 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
         raise _explain(starter, t0, guess, free, best)
     starter.work = Work(EXPLAINED)
     best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
+    again = not starter.missed.size and not starter.summed and best.x.size <= DENSE  # of a large one the room counts
+    system.starter = starter if again else None
     y, yd = starter.expand(best.x)
     counted = Starter(system, remember=True) if starter.missed.size else starter
     freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])

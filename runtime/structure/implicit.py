@@ -30,10 +30,7 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
     implicit = np.flatnonzero(system.kinds == "e")
     if not implicit.size:
         return ()
-    gamma = np.zeros(system.rows, dtype=bool)
-    for group, family, first in system.form.groups:
-        if group == "gamma":
-            gamma[first : first + system.description.rows[family].size] = True
+    gamma = system.of_groups("gamma")
     columns = system.pattern.columns_of()
 
     def slopes(point: Floats) -> Floats:

@@ -53,11 +53,8 @@ def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu
     """J from the reactions of the multipliers of those kinds (virtual displacements)."""
     pattern = system.pattern
     columns = pattern.columns_of()
-    multipliers = np.setdiff1d(np.flatnonzero(np.isin(system.kinds, kinds)), system.idle_multipliers())
-    dynamics = np.zeros(system.rows, dtype=bool)
-    for group, family, first in system.form.groups:
-        if group == "dynamics":
-            dynamics[first : first + system.description.rows[family].size] = True
+    multipliers = np.setdiff1d(np.flatnonzero(system.are(*kinds)), system.idle_multipliers())
+    dynamics = system.of_groups("dynamics")
     take = np.flatnonzero(np.isin(columns, multipliers) & dynamics[pattern.row] & (jy != 0.0))
     which, value = np.searchsorted(multipliers, columns[take]), jy[take]
     largest = np.zeros(multipliers.size)
@@ -155,7 +152,7 @@ def vanished(system: System, state: ConsistentState) -> Ints:
         straight = (here > 0.0) & (here == _sizes(system, system.jacobian(state.t, anywhere, yd)[0]))
     if straight.all():  # rows of J that are the same everywhere vanish nowhere
         return np.zeros(0, dtype=np.int32)
-    starter = Starter(system, remember=True)
+    starter = system.starter or Starter(system, remember=True)
     x = np.concatenate([state.y, state.yd[starter.rates]])
     q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
     size = np.where(q, starter.scale(state.t, x), 0.0)
@@ -170,11 +167,8 @@ def vanished(system: System, state: ConsistentState) -> Ints:
 def _sizes(system: System, jy: Floats) -> Floats:
     """The largest entry of each row of J, as written."""
     columns = system.pattern.columns_of()
-    multipliers = np.flatnonzero(np.isin(system.kinds, ("kappa", "mu")))
-    dynamics = np.zeros(system.rows, dtype=bool)
-    for group, family, first in system.form.groups:
-        if group == "dynamics":
-            dynamics[first : first + system.description.rows[family].size] = True
+    multipliers = np.flatnonzero(system.are("kappa", "mu"))
+    dynamics = system.of_groups("dynamics")
     take = np.flatnonzero(np.isin(columns, multipliers) & dynamics[system.pattern.row])
     found = np.zeros(multipliers.size)
     np.maximum.at(found, np.searchsorted(multipliers, columns[take]), np.abs(jy[take]))

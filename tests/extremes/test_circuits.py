@@ -3,6 +3,7 @@
 A slice of the numbers runs always; SYSDYN_LONG=1 runs all 200.
 """
 
+import functools
 import os
 import re
 from collections import Counter
@@ -19,10 +20,17 @@ FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian")
 RIGHT = 1e-3
 
 
+@functools.cache
+def reference(number):
+    """Of a circuit, at its instants; all formulations are held to one."""
+    made = circuit(number)
+    return made.reference(made.time)
+
+
 def verdict(folder, number, formulation):
     """right, refused or wrong; and what was measured."""
     made = circuit(number)
-    wanted = made.reference(made.time)
+    wanted = reference(number)
     run = ran(folder, made.text, formulation=formulation)
     if run.refused:
         return "refused", run.refused

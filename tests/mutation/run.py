@@ -16,6 +16,7 @@ import argparse
 import ast
 import contextlib
 import dataclasses
+import functools
 import hashlib
 import importlib
 import importlib.abc
@@ -124,12 +125,13 @@ class Known:
     formulations: tuple[str, ...]
 
 
-def sites(name: str) -> list[Site]:
+@functools.cache
+def sites(name: str) -> tuple[Site, ...]:
     """All mutants of a file of the compiler."""
     text = (ROOT / "compiler" / name).read_text()
     tree = ast.parse(text)
     lines = text.splitlines()
-    return [Site(name, m, *_around(tree, m.line), lines[m.line - 1]) for m in mutants(text)]
+    return tuple(Site(name, m, *_around(tree, m.line), lines[m.line - 1]) for m in mutants(text))
 
 
 def _around(tree: ast.Module, line: int) -> tuple[str, frozenset[int]]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.model.description import _kernel
 from sysdyn.runtime.model.failures import ContractError
-from sysdyn.runtime.model.patterns import places
+from sysdyn.runtime.model.patterns import numbered, places
 
 # x[i] in rows i, columns j; loops i = 1..n, j = 1..i (ix = 1, n)
 LOOPS = [[0, 1], [0, [0, -1, 0]]]
@@ -34,3 +34,13 @@ def test_an_empty_inner_loop_and_an_offset_bound():
 def test_a_bound_follows_outer_loops_only():
     with pytest.raises(ContractError, match="bound"):
         kernel([[0, [1, -1, 0]], [0, 1]])
+
+
+@pytest.mark.parametrize(("size", "firsts", "seconds"), [(0, 1, 1), (1, 5, 5), (99, 1, 7), (500, 40, 3), (999, 90, 90)])
+def test_pairs_are_numbered_in_their_order(size, firsts, seconds):
+    random = np.random.default_rng(size)
+    first, second = random.integers(0, firsts, size), random.integers(0, seconds, size)
+    keys, wanted = np.unique(first * seconds + second, return_inverse=True)
+    found, count = numbered(first, second, firsts, seconds)
+    assert count == keys.size
+    assert np.array_equal(found, wanted.ravel())

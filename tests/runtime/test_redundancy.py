@@ -1,5 +1,9 @@
 """Constraints stated twice, and more: found by name, left out, least multipliers; singular configurations apart."""
 
+import functools
+import tempfile
+from pathlib import Path
+
 import numpy as np
 import pytest
 import small_models as models
@@ -57,18 +61,23 @@ def test_a_constraint_stated_twice_is_redundant_and_named():
     assert len(facts.left_out) == 1
 
 
+@functools.cache
+def single():
+    """The reaction of the one rod, with the other left out."""
+    with tempfile.TemporaryDirectory() as folder:
+        return run(pendulum(), Path(folder) / "s.h5", "drop", method="radau", accuracy=1e-9)[1]["k1"]
+
+
 @pytest.mark.parametrize("index", ["auto", "3", "2v", "1"])
 @pytest.mark.parametrize("redundancy", ["drop", "minimum_norm"])
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 def test_the_motion_is_that_of_one_rod(tmp_path, redundancy, index, method):
-    _, found = run(
-        pendulum(), tmp_path / "t.h5", redundancy, index=index, method=method, accuracy=1e-6 if index == "3" else 1e-8
-    )
-    assert np.abs(found["q1"] - Q1).max() < (1e-5 if index == "3" else 1e-7)
+    accuracy = 1e-6 if index == "3" or method == "bdf" else 1e-8
+    _, found = run(pendulum(), tmp_path / "t.h5", redundancy, index=index, method=method, accuracy=accuracy)
+    assert np.abs(found["q1"] - Q1).max() < 10.0 * accuracy
     # the reaction is one; its parts follow the policy
     whole = found["k1"] + 2 * found["k2"]
-    _, single = run(pendulum(), tmp_path / "s.h5", "drop", method="radau", accuracy=1e-9)
-    assert whole == pytest.approx(single["k1"], abs=1e-4 if index == "3" else 1e-6)
+    assert whole == pytest.approx(single(), abs=100.0 * accuracy)
     if redundancy == "drop":
         assert np.abs(found["k2"]).max() < 1e-12
     else:

@@ -17,9 +17,10 @@ from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
-from sysdyn.runtime.integrate.underlying import Underlying
+from sysdyn.runtime.integrate.underlying import Underlying, _unmatched
 from sysdyn.runtime.model import carrier
 from sysdyn.runtime.model.description import describe
+from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.trace.trace import Trace
@@ -171,7 +172,6 @@ def test_seed_models_meet_their_references(tmp_path):
                 formulation=formulation,
                 index="0",
                 method="dopri",
-                backend="numpy",
                 accuracy=1e-6,
                 at=",".join(map(repr, wanted["t"])),
                 output=str(tmp_path / "t.h5"),
@@ -192,3 +192,19 @@ def test_seed_models_meet_their_references(tmp_path):
     assert len(met) >= 45
     for model in ("lead_filter", "diode_circuit", "ebers_moll", "thermal_two_node"):
         assert (model, "lagrangian") in refused
+
+
+def test_what_is_singular_by_structure_is_so_whatever_its_values():
+    """Two columns with one entry, in the same row, beside a regular band; a line of 20000 sections has two such."""
+    n = 1000
+    dense = np.eye(n, dtype=bool) | np.eye(n, k=1, dtype=bool)
+    assert not _unmatched(_pattern(dense)).any()
+    dense[:, [3, 7]] = False
+    dense[5, [3, 7]] = True
+    assert _unmatched(_pattern(dense)).sum() >= 1.0
+
+
+def _pattern(dense):
+    columns, rows = np.nonzero(dense.T)
+    start = np.searchsorted(columns, np.arange(len(dense) + 1))
+    return Pattern(len(dense), len(dense), start.astype(np.int32), rows.astype(np.int32))

@@ -1,0 +1,15 @@
+"""What all tests share."""
+
+import os
+
+import pytest
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _one_cache(tmp_path_factory):
+    """One folder of compiled models for all rooms and all processes of a run, empty at its begin."""
+    base = tmp_path_factory.getbasetemp()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SYSDYN_CACHE", str((base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"))
+        patch.delenv("NO_COLOR", raising=False)
+        yield
