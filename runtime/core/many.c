@@ -7,11 +7,13 @@
 #include <string.h>
 #include <time.h>
 
-#define MOST 24          /* instants of comparison, at most twice that (integrate/common_instants.py) */
+#define MOST 48          /* instants of comparison, at most twice that (many/batch.py) */
 #define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
 #define SAFETY 2.5
 #define STRETCH 1.5
 #define SHORT 60
+#define FAR 1e-2
+#define UNSEEN 100.0
 #define SHORT_CREDIT 0.75
 #define FIRST_DROP 1e-2
 #define PARTED 10.0
@@ -358,6 +360,8 @@ static double difference(const sd_many *many, const sd_pass *pass, const sd_samp
         }
         if (largest <= noise[q])
             continue;
+        if (size[q] > UNSEEN * largest)
+            apart = INFINITY; /* it did something between the instants of comparison */
         apart = isfinite(size[q]) ? apart / size[q] : INFINITY;
         worst = fmax(worst, apart);
         *over = fmax(*over, apart / many->target[q]);
@@ -387,7 +391,7 @@ static int parted(const sd_many *many, const sd_pass *pass, const sd_samples *co
 
 static double shrink(double power, double step)
 {
-    double ratio = pow(10.0, -power * step);
+    double ratio = fmax(pow(10.0, -power * step), pow(FAR, power));
     return SAFETY * ratio / (1.0 - ratio);
 }
 

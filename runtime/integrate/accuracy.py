@@ -30,6 +30,11 @@ RATIO = 0.1
 """Of the tolerances of the first two runs."""
 RETRIED = (1.0, 0.1, 1e-2)
 """Of the tolerance of a first run: the next ones where it fails."""
+FAR = 1e-2
+"""Of a draft's tolerance: a run with less says nothing of itself by its difference from it."""
+UNSEEN, ALIKE = 100.0, 0.3
+"""A quantity that was so many times larger than at any instant of comparison did something between them: two runs must
+agree on how large it was within this part."""
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
 SHORT, SHORT_CREDIT = 60, 0.75
@@ -159,9 +164,11 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     if not use.any():
         return 0.0, 0.0
     there = ... if fine.between is None else ~fine.between
+    seen = np.maximum(np.abs(before), np.abs(fine.values)).max(axis=0)[use]
     with np.errstate(all="ignore"):
+        unlike = (size[use] > UNSEEN * seen) & (np.abs(size - coarse.largest)[use] > ALIKE * size[use])
         relative = apart(coarse, fine)[there][:, use].max(axis=0, initial=0.0) / size[use]
-    relative = np.where(np.isfinite(relative), relative, np.inf)
+    relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
 
 
@@ -183,8 +190,10 @@ def parted(coarse: Sampled, fine: Sampled) -> bool:
 
 
 def _shrink(power: float, step: float) -> float:
-    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger."""
-    ratio = 10.0 ** (-power * step)
+    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger; beyond FAR
+    nothing more is credited.
+    """
+    ratio = max(10.0 ** (-power * step), FAR**power)
     return float(SAFETY * ratio / (1.0 - ratio))
 
 
@@ -275,13 +284,16 @@ def control(
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, tolerance, law.finest)
     estimate, longest = _Estimate(law, target), LONGEST
+    number = 1
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
+    if tolerance < FAR * last.tolerance:  # much happens: the next one is a draft too
+        last = _finer(run, last, tolerance / RATIO, STRETCH * LONGEST, compared=False) or last
+        number += 1
     tolerance = max(min(tolerance, RATIO * last.tolerance), law.finest)
-    number = 1
     while number < RUNS:
         number += 1
-        now = _finer(run, last, tolerance, longest, compared=number > 2)
+        now = _finer(run, last, tolerance, longest, compared=bool(np.isfinite(estimate.over)))
         if now is None:
             break
         apart = estimate.compare(last, now)

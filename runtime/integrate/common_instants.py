@@ -14,7 +14,8 @@ from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
 
 MOST = 24
-"""Instants at which runs are compared, at most twice that."""
+"""Instants at which runs are compared, at most twice that; of a long run a part of its steps, and at most twice MANY."""
+PART, MANY = 16, 500
 GRID = 600
 """Rows of a trace with an interval that are compared at most: between steps errors differ from row to row."""
 FEW = 48
@@ -46,7 +47,7 @@ class Thinned:
             self._kept.append(rows[first :: self._stride].copy())
             self._number += len(self._kept[-1])
         self._last = rows[-1:].copy()
-        while self._number > 2 * MOST:
+        while self._number > 2 * min(max(MOST, self._seen // PART), MANY):
             self._kept = [np.concatenate(self._kept)[::2]]
             self._stride, self._number = 2 * self._stride, len(self._kept[0])
 

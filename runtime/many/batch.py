@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, RATIO, STRETCH
-from sysdyn.runtime.integrate.common_instants import MOST, drafted, joined
+from sysdyn.runtime.integrate.common_instants import drafted, joined
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
@@ -31,6 +31,8 @@ from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, Structure
 
+MOST = 48
+"""Instants of comparison that are taken of a run's steps, at most twice that (core/many.c)."""
 DONE = 0
 WHY = ("", "start", "structure", "stopped", "accuracy", "energy", "claim")
 """What kept a run from a result, by its state."""

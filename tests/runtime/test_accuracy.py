@@ -86,3 +86,51 @@ def test_a_finer_run_that_fails_is_tried_half_the_way(wall, half):
     assert achieved.tolerance == min(done) >= wall
     assert len(done) == (3 if half else 2)
     assert achieved.error_estimate >= 100.0 * achieved.tolerance
+
+
+def test_what_only_one_run_did_between_the_instants_is_not_believed():
+    peaks = iter((1.0, 1e6, 1.02))
+
+    def run(tolerance, longest):
+        value = np.array([[1.0], [0.5 + tolerance]])
+        return Sampled(tolerance, value, np.array([next(peaks)]), steps=100)
+
+    achieved = control(run, np.array([1e-2]), LAWS["dopri"])
+    assert achieved.met
+    assert achieved.runs == 3
+
+
+def test_what_both_runs_did_between_the_instants_is_believed():
+    def run(tolerance, longest):
+        return Sampled(tolerance, np.array([[1.0], [0.5 + tolerance]]), np.array([1e6 + 1e4 * tolerance]), steps=100)
+
+    achieved = control(run, np.array([1e-2]), LAWS["dopri"])
+    assert achieved.met
+    assert achieved.runs == 2
+
+
+def test_a_draft_in_which_much_happens_is_followed_by_another():
+    """Its error is no measure of that of a run a thousand times finer."""
+    asked = []
+
+    def run(tolerance, longest):
+        asked.append(tolerance)
+        wrong = 0.5 if tolerance > 1e-3 else 10.0 * tolerance
+        return sampled(tolerance, [1.0, 0.5 + wrong], steps=4000)
+
+    law = LAWS["radau"]
+    achieved = control(run, np.array([1e-2]), law)
+    assert achieved.met
+    assert achieved.runs == len(asked) == 3
+    assert asked[2] == pytest.approx(law.tolerance(1e-2, 4000))
+    assert asked[1] == pytest.approx(10.0 * asked[2])
+    assert achieved.error_estimate >= 10.0 * asked[2]
+
+
+def test_no_more_is_credited_than_a_tolerance_a_hundred_times_smaller():
+    def run(tolerance, longest):
+        return sampled(tolerance, [1.0, 0.5 if tolerance > 1e-5 else 1.0], steps=100)
+
+    # the first run differs by a half: of the second that says next to nothing
+    achieved = control(run, np.array([1e-4]), LAWS["radau"], first=1e-9)
+    assert achieved.runs > 2
