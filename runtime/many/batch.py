@@ -192,7 +192,7 @@ class Batch:
     def _pass(self, number: int, tolerance: float, longest: float) -> Integration:
         """The structures of the draft (0), or of the runs behind it (1)."""
         runs, options = self.runs, self.options
-        runs.controlled = True
+        runs.controlled, runs.open = True, False  # every run is compared at the same instants
         request: Request = runs.request(tolerance, None, longest)
         instants, kinds = runs.instants, runs.kinds
         if runs.common is not None:
