@@ -169,12 +169,6 @@ class Contacts:
             elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
                 yield k
 
-    def doubtful(self, values: Floats) -> bool:
-        """Whether a contact that does not hold is on its boundary."""
-        asked = (k for k, c in enumerate(self.contacts) if c.kind in _TESTED and k not in self.frozen)
-        off = (self.contacts[k] for k in asked if not self.active[k])
-        return any(abs(values[c.value]) <= self.observer.zero(c.value) for c in off)
-
     def bar(self, k: int, values: Floats) -> bool:
         """Whether the guard of an inequality says that it is not there."""
         guard = self.contacts[k].guard
@@ -390,5 +384,4 @@ class Contacts:
         return self._form
 
 
-_TESTED = ("phi", "psi", "friction", "planar")
 _TESTS = {"friction": Contacts._friction, "planar": Contacts._planar}
