@@ -1,6 +1,6 @@
 """Circuits of ideal diodes by ours, Siconos and ngspice in one run: python tests/bench/event_race.py
 
-bridge: a coil and a capacitor in parallel ring through a bridge of four diodes into a resistor (the example of Siconos);
+bridge: a coil and a capacitor in parallel ring through a bridge of four diodes into a resistor (Siconos' example);
 the resistor sees the magnitude of the voltage, so the ringing is that of a linear circuit.  rectifier: a sine behind a
 diode into a capacitor and a resistor; it follows the sine until the current turns, then discharges.  Error: against
 these closed forms, the largest at 200 instants over the largest value.  CPU: ours `cpu_integrate_s` of `--accuracy`
