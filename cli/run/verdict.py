@@ -46,6 +46,12 @@ _REMEDIES = {
     "E934": "a higher limit, or a looser --accuracy",
 }
 
+_REMEDIES_OF_EVENTS = {
+    "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
+    "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
+    "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",
+}
+
 
 _BOUNDED = "a law that keeps it in bounds (an energy with a minimum, a stop), or an earlier end: --until"
 
@@ -78,7 +84,8 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     partial = error.partial
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
-    remedy = _BOUNDED if why else _RANK if lost else _REMEDIES[code]
+    usual = _REMEDIES_OF_EVENTS.get(error.cause, _REMEDIES[code])
+    remedy = _BOUNDED if why else _RANK if lost else usual
     known = f"last good state at {last.time:.9g} s: {last.listed()}" if last is not None and last.states() else ""
     help_ = "; ".join(filter(None, (remedy, known)))
     report.error(code, text, where, help=help_)

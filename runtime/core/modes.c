@@ -187,7 +187,7 @@ static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const
         return 0;
     if (slip > zero(m, c->value))
         return 1;
-    return m->rates && c->kind != SD_PHI && slip >= -zero(m, c->value) && sense * v[c->rate] >= -zero(m, c->rate);
+    return c->kind != SD_PHI && slip >= -zero(m, c->value) && sense * v[c->rate] >= -zero(m, c->rate);
 }
 
 /* Whether the branch of a law is what its switching function says. */

@@ -60,7 +60,7 @@ typedef struct sd_kink {
 typedef struct sd_modes {
     const sd_mode *mode;
     const sd_transition *transition;
-    int32_t now, rates;               /* the mode, -1: unknown here; 1: a settled point has all rates */
+    int32_t now;                      /* the mode, -1: unknown here */
     int32_t parameters, places, relations, contacts, kinks, systems, samples, observed, alikes, unknowns;
     double *p;                        /* [parameters] */
     const int32_t *place;             /* [places] in p */

@@ -98,7 +98,9 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
             settle->row_scale[system->row[e]] += fabs(settle->jy[e]) + fabs(settle->jyd[e]);
         }
     for (int32_t i = 0; i < settle->rows; i++)
-        settle->row_scale[i] = settle->row_scale[i] > 0.0 ? 1.0 / settle->row_scale[i] : 1.0;
+        settle->row_scale[i] = settle->sort[i] == SD_LEFT_OUT   ? 0.0
+                               : settle->row_scale[i] > 0.0 ? 1.0 / settle->row_scale[i]
+                                                            : 1.0;
     for (int32_t e = 0; e < system->entries; e++) {
         double scale = settle->row_scale[system->row[e]];
         double a = settle->jy[e] * scale, b = settle->jyd[e] * scale;

@@ -14,7 +14,7 @@
 #include "assembly.h"
 #include "linear.h"
 
-enum { SD_OTHER, SD_CONSTRAINT, SD_RATE };
+enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
 
 typedef struct sd_settle {
     sd_system *system;
@@ -27,7 +27,7 @@ typedef struct sd_settle {
     const double *weight;            /* [unknowns + rates]: 1 for the state, less for what has no inertia, almost
                                         nothing for what follows from it */
     double *scale;                   /* [unknowns + rates] magnitudes */
-    const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE */
+    const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;
     double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;

@@ -358,13 +358,9 @@ class Handler:
         assert self.restart is not None
         before = self.contacts.active.copy(), self.p.copy()
         self.contacts.become(after)
-        found = self.restart.struck(t, *point, rates=False)
-        values = None if found is None else self.observer(t, *found[:2])
-        if values is not None and self.contacts.doubtful(values):  # their rates decide
-            found = self.restart.struck(t, *point)
-            values = None if found is None else self.observer(t, *found[:2])
-        if found is not None and values is not None:
-            fits = self.contacts.wrong(values, found[2]) < 0
+        found = self.restart.struck(t, *point)
+        if found is not None:
+            fits = self.contacts.wrong(self.observer(t, *found[:2]), found[2]) < 0
             if fits and self.determined.leaves(t, *found[:2]) == 0:
                 return found[0], found[1]
         self.contacts.active[:], self.p[:] = before

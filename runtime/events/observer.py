@@ -29,7 +29,7 @@ class Observer:
         self._out = np.zeros(max(self._number, 1))
         self._pointers = [lib.pointer(item) for item in (self._y, self._yd, self._out)]
         self._functions: dict[int, Any] = {}
-        self.largest = np.zeros(self._number)
+        self.largest, self.terms = np.zeros(self._number), np.zeros(self._number)
         families = [system.description.rows[k] for k in system.description.rows_of("observe")]
         self._units = [family.unit for family in families for _ in range(family.size)]
         self.groups: list[NDArray[np.int64]] = []
@@ -43,11 +43,11 @@ class Observer:
         return self._out[: self._number].copy()
 
     def __call__(self, t: float, y: Floats, yd: Floats) -> Floats:
-        """Values [observed] at y, yd [unknowns as written or more]."""
+        """Values [observed] at y, yd [unknowns as written or more]; `terms` [observed]: magnitudes of theirs."""
         n = min(y.size, self._y.size)
         self._y[:n], self._yd[:n] = y[:n], yd[:n]
         values = self._rows(self._calls[0], t)
-        scale = self._rows(self._calls[1], t)
+        scale = self.terms = self._rows(self._calls[1], t)
         size = np.maximum(np.abs(values), np.abs(scale))
         np.fmax(self.largest, np.where(np.isfinite(size), size, 0.0), out=self.largest)
         for rows in self.groups:

@@ -52,8 +52,8 @@ ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 
 
-FEW_STEPS = 40
-"""Of a draft in which little happens."""
+FEW_STEPS, MANY_STEPS = 40, 150
+"""Of a draft in which little happens, or much: beyond, errors do not follow from the number of steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class Law:
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
-        gain = self.gain * (max(steps, FEW_STEPS) / FEW_STEPS) ** self.growth
+        gain = self.gain * (min(max(steps, FEW_STEPS), MANY_STEPS) / FEW_STEPS) ** self.growth
         return float(np.clip((wanted / gain) ** (1.0 / self.power), self.finest, COARSEST))
 
 
@@ -287,10 +287,7 @@ def control(
     number = 1
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
-    if tolerance < FAR * last.tolerance:  # much happens: the next one is a draft too
-        last = _finer(run, last, tolerance / RATIO, STRETCH * LONGEST, compared=False) or last
-        number += 1
-    tolerance = max(min(tolerance, RATIO * last.tolerance), law.finest)
+    tolerance = max(min(tolerance, RATIO * last.tolerance), FAR * last.tolerance, law.finest)
     while number < RUNS:
         number += 1
         now = _finer(run, last, tolerance, longest, compared=bool(np.isfinite(estimate.over)))

@@ -79,7 +79,10 @@ class Integration:
             jy, jyd = self._weighted(jy, jyd)
         self._light = light(system, jy, jyd)
         self._linear(jy, jyd)
-        self.settler = self._settler("settled", self.roles.state[: system.form.written])
+        # flows without inertia in loops of stores follow from the rate of their balance alone
+        contacts = request.events.contacts if request.events is not None else ()
+        rated = bool(contacts) and "dynamics_rate" in system.description.blocks
+        self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         stops = None if request.fixed_step else request.stops
         self.segments = segments(start.t, request.t_end, stops)

@@ -133,7 +133,6 @@ class Modes:
         core, run, method = self.core, self.run, self.run.method.contents
         extended = max(run.system.unknowns, run.system.form.extended) + 8
         core.still, core.unknown_size, core.round_off = STILL, UNKNOWN, ROUND_OFF
-        core.rates = not run.restart.thorough
         core.state = self._array(run.roles.state[: run.system.form.written], np.int32)
         core.differential = self._array(run.roles.differential, np.int32)
         core.unnamed, core.met = self._array(run._unnamed, np.int32), lib.pointer(run._met)
@@ -259,11 +258,11 @@ class Modes:
         self._told.append(Told(groups, entries))
 
     def _determined(self, point: Any) -> bool:
-        """Whether the mode leaves nothing open, and its settled points are all that the handler would ask for."""
-        handler, restart = self.handler, self.run.restart
+        """Whether the mode leaves nothing open."""
+        handler = self.handler
         if point is None or not handler.plan.contacts:
             return True
-        return restart.plain() and bool(handler.determined.leaves(handler.last, *point) == 0)
+        return bool(handler.determined.leaves(handler.last, *point) == 0)
 
     def places(self, which: Sequence[Watched]) -> list[int]:
         """Numbers of these among what is watched."""

@@ -39,7 +39,6 @@ class Pieces:
         assert run.request.begin is not None
         self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
         self.handler.restart = run.restart
-        run.restart.thorough = "dynamics_rate" in run.system.description.blocks and bool(plan.contacts)
         self.handler.contacts.size(run.magnitude, run._time)
         self._longest, self._landing, self._end = run.method.contents.h_max, np.inf, run.segments[0].end
         n = run.system.form.written

@@ -420,7 +420,7 @@ class Modes(c.Structure):
 
     _fields_ = [
         *[(name, _P) for name in ["mode", "transition"]],
-        *[(name, _I) for name in ["now", "rates", "parameters", "places", "relations", "contacts", "kinks"]],
+        *[(name, _I) for name in ["now", "parameters", "places", "relations", "contacts", "kinks"]],
         *[(name, _I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
         *[(name, _P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
         *[(name, _P) for name in ["period", "next"]],

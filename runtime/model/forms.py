@@ -10,7 +10,8 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
   0     as 1, momentum_rate in the place of momentum: linear in the slopes, what the underlying equation is made of
   constraints   what holds between displacements, flows and momenta alone (no rows q' - f)
   settled   all rows that hold at a consistent point: as written and hidden (no rows q' - f)
-  start     the same, dynamics_rate and the block `initial`
+  rated     the same and dynamics_rate: what has no inertia follows from the rate of its balance
+  start     the same and the block `initial`
 """
 
 from __future__ import annotations
@@ -68,9 +69,10 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
         ("lambda", "lambda"),
     ),
 }
-FORMS["start"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"), ("initial", "initial"))
+FORMS["rated"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"))
+FORMS["start"] = (*FORMS["rated"], ("initial", "initial"))
 """form -> (block, group of rows it is added to); blocks a model lacks are skipped."""
-BARE = ("constraints", "settled", "start")
+BARE = ("constraints", "settled", "rated", "start")
 """Forms without rows q' - f."""
 
 

@@ -21,6 +21,7 @@ _ROWS = {
     "0": {"kappa": "phi_acceleration", "mu": "psi_rate"},
     "constraints": {},
     "settled": {"kappa": "phi_acceleration", "mu": "psi_rate"},
+    "rated": {"kappa": "phi_acceleration", "mu": "psi_rate"},
     "start": {"kappa": "phi_acceleration", "mu": "psi_rate"},
 }
 """Form -> multiplier -> group of rows whose row it is.  Where rows and their derivatives all stand, the derivative that
@@ -68,11 +69,12 @@ _HELD = {
     "0": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
     "constraints": (("phi", "kappa"), ("phi_rate", "kappa"), ("psi", "mu")),
 }
-_HELD["settled"] = _HELD["start"] = (
+_HELD["settled"] = _HELD["rated"] = _HELD["start"] = (
     *_HELD["constraints"], ("phi_acceleration", "kappa"), ("psi_rate", "mu"),
 )  # fmt: skip
 """Form -> groups of rows of a constraint, and the unknown that each reads where the constraint does not hold."""
 _RATES = {"start": {"kappa": "phi_acceleration", "mu": "psi_rate"}}
+_RATES["rated"] = _RATES["start"]
 """Form -> multiplier -> group whose rows read its derivative: a force that is zero stays it, and what balances without
 inertia follows from that.  Only where the derivatives of balances stand among the rows.
 """

@@ -17,8 +17,6 @@ from sysdyn.runtime.start.starter import Starter
 
 STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
-SAME = 4
-"""Searches in a row."""
 EXACT = 1e-9
 """Scaled residual with which the slower search is content."""
 
@@ -30,27 +28,21 @@ class Restart:
         self.settler, self.state = settler, state
         self.impulses = Impulses(settler.system)
         self._starter: Starter | None = None
-        self.thorough = False
-        self._same: dict[bytes, int] = {}
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
         found = self.struck(t, y, yd)
         return None if found is None else found[:2]
 
-    def struck(
-        self, t: float, y: Floats, yd: Floats, *, rates: bool = True
-    ) -> tuple[Floats, Floats, Floats] | None:
-        """The same with the impulses [unknowns as written] that took the flows there; rates: those of flows without
-        inertia are asked for.
-        """
+    def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        """The same with the impulses [unknowns as written] that took the flows there."""
         magnitude = self.magnitude(y.size)
         impulse = np.zeros(y.size)
         self.settler.core.contents.ready = 0
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
         still = done and bool((np.abs(found - y)[self.state] <= STILL * magnitude[self.state]).all())
         if still:  # no state need jump: there is no impulse
-            return *self._thoroughly(t, found, rate, magnitude, rates=rates), impulse
+            return found, rate, impulse
         if self.impulses.broken(t, y, yd, magnitude):
             y, impulse = self.impulses.after(t, y, yd, magnitude)
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
@@ -58,31 +50,9 @@ class Restart:
             self.settler.core.contents.ready = 0
             found, rate, done = self.settler.settle(t, y, yd, hold=hold)
             if done:
-                return *self._thoroughly(t, found, rate, magnitude, rates=rates), impulse
+                return found, rate, impulse
         searched = self._search(t, y, yd, magnitude)
         return None if searched is None else (*searched, impulse)
-
-    def _thoroughly(
-        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, rates: bool
-    ) -> tuple[Floats, Floats]:
-        """Flows without inertia in loops of stores follow from the rate of their balance alone, and so do the rates of
-        all flows without inertia.  Where nobody asks for these, the flows are sought until SAME searches with this set
-        of constraints have changed none: it has no such loop.
-        """
-        key = self.settler.system.description.switches.active.tobytes()
-        if not self.thorough or (not rates and self._same.get(key, 0) >= SAME):
-            return y, yd
-        found = self._search(t, y, yd, magnitude, most=1)
-        if found is None:
-            return y, yd
-        same = bool((np.abs(found[0] - y) <= STILL * magnitude).all())
-        self._same[key] = self._same.get(key, 0) + 1 if same else 0
-        return found
-
-    def plain(self) -> bool:
-        """Whether a settled point with the present constraints is all that `struck` would find without rates."""
-        key = self.settler.system.description.switches.active.tobytes()
-        return not self.thorough or self._same.get(key, 0) >= SAME
 
     def _rates(self, magnitude: Floats) -> Floats:
         """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""
@@ -97,9 +67,7 @@ class Restart:
         """Magnitudes [number] of the first unknowns."""
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
-    def _search(
-        self, t: float, y: Floats, yd: Floats, magnitude: Floats, most: int = 2
-    ) -> tuple[Floats, Floats] | None:
+    def _search(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
         """The same by Gauss-Newton with shortened steps: first with the state held, then with everything free."""
         if self._starter is None:
             self._starter = Starter(self.settler.system.another("3"))
@@ -110,7 +78,7 @@ class Restart:
         # a multiplier that is zero because its constraint does not hold stays zero
         still = np.append(np.zeros(y.size, dtype=bool), np.isin(starter.rates, starter.system.idle_multipliers()))
         guess[still] = 0.0
-        for free in (follows & ~still, ~still)[:most]:
+        for free in (follows & ~still, ~still):
             problem = Problem(
                 residual=lambda z: starter.residual(t, z),
                 jacobian=lambda z: starter.jacobian(t, z),

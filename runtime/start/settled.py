@@ -19,6 +19,7 @@ LIGHT = 1e-3
 """Weight (of squares) of displacements without inertia: they follow those that have some."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
+RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
 HELD = 1e8
 """Weight (of squares) of a state that moves only where the rows leave nothing else."""
 
@@ -35,6 +36,30 @@ def _rates(settled: System) -> Ints:
         used[settled._places(call)[1].column] = True
     assert pattern.unknowns == settled.unknowns
     return np.flatnonzero(used).astype(np.int32)
+
+
+def inertial_rates(settled: System) -> NDArray[np.bool_]:
+    """Rows [rows] that are rates of balances with inertia: a point does not know them.  A momentum that nothing moves
+    with is none.
+    """
+    pattern, groups = settled.pattern, settled.form.groups
+    size = {family: settled.description.rows[family].size for _, family, _ in groups}
+    momentum = np.zeros(settled.rows, dtype=bool)
+    for group, family, first in groups:
+        momentum[first : first + size[family]] |= group == "momentum"
+    in_y, in_rate = settled.structural()
+    columns = pattern.columns_of()
+    alone = in_y & momentum[pattern.row]
+    alone &= (np.bincount(pattern.row[alone], minlength=settled.rows) == 1)[pattern.row]
+    inertial = np.zeros(settled.rows, dtype=bool)
+    inertial[pattern.row[in_rate & ~np.isin(columns, columns[alone])]] = True
+    balances = {family: first for group, family, first in groups if group == "dynamics"}
+    mask = np.zeros(settled.rows, dtype=bool)
+    for group, family, first in groups:
+        if group == "dynamics_rate":
+            own = balances[family]
+            mask[first : first + size[family]] = inertial[own : own + size[family]]
+    return mask
 
 
 class Settler:
@@ -96,11 +121,13 @@ class Settler:
         return found, slots
 
     def _sorts(self) -> Ints:
-        """Of the rows, as core/settle.h names them: constraints, rates of other rows, others."""
+        """Of the rows, as core/settle.h names them: constraints, rates of other rows, others, left out."""
         found = np.zeros(max(self.system.rows, 1), dtype=np.int32)
         for group, family, first in self.system.form.groups:
-            sort = 1 if group in ("phi", "phi_rate", "psi") else 2 if group in ("momentum_rate", "gamma_rate") else 0
+            sort = 1 if group in ("phi", "phi_rate", "psi") else 2 if group in RATES else 0
             found[first : first + self.system.description.rows[family].size] = sort
+        if self.system.form.name == "rated":
+            found[: self.system.rows][inertial_rates(self.system)] = 3
         return found
 
     def _typical(self) -> Floats:

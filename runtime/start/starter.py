@@ -22,7 +22,7 @@ from sysdyn.runtime.model.scales import alike, group_maximum, of_a_kind, propaga
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
-from sysdyn.runtime.start.settled import rates_of
+from sysdyn.runtime.start.settled import inertial_rates, rates_of
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
@@ -343,21 +343,8 @@ class Starter:
         return np.where(many, "", found)[self.missed]
 
     def _unsettled(self) -> Mask:
-        """Rates of balances with inertia: the start does not know them.  A momentum that nothing moves with is none."""
-        pattern = self.settled.pattern
-        in_y, in_rate = self.settled.structural()
-        columns = pattern.columns_of()
-        alone = in_y & self.groups("momentum")[pattern.row]
-        alone &= (np.bincount(pattern.row[alone], minlength=self.settled.rows) == 1)[pattern.row]
-        inertial = np.zeros(self.settled.rows, dtype=bool)
-        inertial[pattern.row[in_rate & ~np.isin(columns, columns[alone])]] = True
-        balances = {family: first for group, family, first in self.settled.form.groups if group == "dynamics"}
-        mask = np.zeros(self.settled.rows, dtype=bool)
-        for group, family, first in self.settled.form.groups:
-            if group == "dynamics_rate":
-                size, own = self.settled.description.rows[family].size, balances[family]
-                mask[first : first + size] = inertial[own : own + size]
-        return mask
+        """Rates of balances with inertia: the start does not know them."""
+        return inertial_rates(self.settled)
 
     @remembered
     def following(self, t: float, x: Floats) -> Mask:

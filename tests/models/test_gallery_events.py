@@ -29,3 +29,20 @@ def test_the_clutch_locks_alike_by_friction_and_by_events(tmp_path):
         for scene in ("launch", "modes")
     ]
     assert ends[0] == pytest.approx(ends[1], rel=2e-6)
+
+
+@pytest.mark.parametrize("name", ["six_pulse_rectifier", "buck_converter", "piston_pump", "backlash_gear"])
+def test_what_a_model_expects_holds(name, tmp_path):
+    """Its own expects are closed forms, or bounds, and raise where they fail; the books close."""
+    run = simulate(GALLERY / f"{name}.sd", accuracy=1e-6, o=tmp_path / "x.h5")
+    assert run.statistics["error_estimate"] <= 1e-6
+    assert len(run.events) > 10
+
+
+def test_the_teeth_of_a_gear_with_play_keep_their_distance_and_lose_energy_at_each_knock(tmp_path):
+    run = simulate(GALLERY / "backlash_gear.sd", accuracy=1e-6, o=tmp_path / "x.h5")
+    assert max(abs(run["gap"].values)) <= 0.01 + 1e-9
+    first = next(e.time for e in run.events if e.name == "impact forward")
+    # alone until the first knock: J1 driver' = T/w (1 - cos w t), so the play of 0.01 rad is crossed where
+    # T/(J1 w^2) (w t - sin w t) = 0.01
+    assert 1.0 / (0.01 * 36.0) * (6.0 * first - sin(6.0 * first)) == pytest.approx(0.01, rel=0, abs=1e-8)
