@@ -46,7 +46,7 @@ def content_of(
         case "matrices":
             return Content(matrices=matrices(algebra, compiled.form), counted=tuple(_counted(compiled.form)))
         case "canonical":
-            function, found = canonical(algebra, compiled.energies, compiled.form)
+            function, found = canonical(algebra, compiled.functions, compiled.form)
             return Content((function, variation(algebra, function, compiled.form)), tuple(found))
         case "underlying":
             found_ = tuple(underlying(algebra, compiled.form))
@@ -60,7 +60,7 @@ def content_of(
             more = sum(r.block in WORDS for r in compiled.form.rows) - MOST
             return Content(
                 tuple(functions(algebra, compiled.functions)),
-                tuple(equations(algebra, compiled.energies, compiled.form, MOST)),
+                tuple(equations(algebra, compiled.functions, compiled.form, MOST)),
                 more=max(more, 0),
             )
 

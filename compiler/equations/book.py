@@ -17,9 +17,10 @@ from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import Piece, pieces
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations
 from sysdyn.compiler.forms.lowering import whole
+from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.compiler.model.energies import EnergyModel, Family
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, var, variables
+from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, sub, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 
 FUNCTIONS = ("T*", "T", "V", "V*", "D", "G")
@@ -97,7 +98,14 @@ def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm, most: 
     yield from kinematics(model, form)
     rows = [(number, row) for number, row in enumerate(form.rows) if row.block in BLOCKS]
     for number, row in rows[:most]:
-        yield from _of_row(algebra, row, pieces(form, number))
+        solved = row.block == "momentum" and row.owner in model.solved
+        yield from _of_row(algebra, row, [_momentum(model, row.owner)] if solved else pieces(form, number))
+
+
+def _momentum(model: EnergyModel, owner: str) -> Piece:
+    """P - dT*/df of a coordinate whose row is solved for its flow in the residual."""
+    own = var(owner, model.mirror.conjugate)
+    return Piece((), (), (), sub(own, momentum(model, own)))
 
 
 def kinematics(model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:

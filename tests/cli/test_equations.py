@@ -263,7 +263,7 @@ def test_what_is_printed_is_what_is_compiled(name):
             if made is None:
                 continue
             order = Order([p.name for p in made.network.parameters])
-            found = [e for e in equations(Algebra(order), made.energies, made.form, 1000) if e.kind != "kinematic"]
+            found = [e for e in equations(Algebra(order), made.functions, made.form, 1000) if e.kind != "kinematic"]
             rows = [k for k, row in enumerate(made.form.rows) if row.block in BLOCKS]
             by_row = [list(group) for _, group in itertools.groupby(found, key=lambda e: (e.kind, e.owner))]
             assert len(by_row) == len(rows)
@@ -308,7 +308,7 @@ def test_the_canonical_equations_are_derivatives_of_h(name):
     """q' = dH/dp, and p' + dH/dq holds what is no conservative effort: the same at any momenta."""
     with ex.fresh():
         made = model(name, "hamiltonian")
-        function, found = canonical(Algebra(Order()), made.energies, made.form)
+        function, found = canonical(Algebra(Order()), made.functions, made.form)
         h = ex.add(*(t.expression for t in function.terms))
         carriers = [f.owner for f in made.form.families if f.kind == "p"]
         values = Values(4)
