@@ -68,7 +68,7 @@ class Linearised:
         return ZerosPolesGain(found.zeros, found.poles, found.gain)
 
     def control(self) -> Any:
-        """The reduction as `control.StateSpace`, with names (python-control takes none with dots); it is to be installed."""
+        """The reduction as `control.StateSpace`, with names (python-control takes no dots); it is to be installed."""
         try:
             import control  # type: ignore[import-not-found, unused-ignore]
         except ImportError as error:
