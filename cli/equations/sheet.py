@@ -128,6 +128,7 @@ class Sheets:
         """What is printed, in both alphabets."""
         lines = [self._matrix(m) for m in content.matrices] + [self.line(e) for e in content.equations]
         legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
+        legend = () if any(e.kind == "element" for e in content.equations) else legend
         functions = tuple(self.named(f) for f in content.functions)
         return Sheet(functions, tuple(lines), legend, content.more, content.counted)
 
