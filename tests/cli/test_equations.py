@@ -399,13 +399,13 @@ def test_a_circuit_has_no_underlying_equation(capsys):
 
 def test_elements_have_their_state_functions_side_by_side(capsys):
     assert printed(capsys, "lead_filter", "--form", "elements").splitlines() == [
-        "e_r1 = R1 f_r1", "D_r1 = 1/2 R1 f_r1^2", "G_r1 = e_r1^2/(2 R1)",
-        " q_c = C e_c", " V_c = q_c^2/(2 C)", "V*_c = 1/2 C e_c^2",
-        "e_r2 = R2 f_r2", "D_r2 = 1/2 R2 f_r2^2", "G_r2 = e_r2^2/(2 R2)",
+        "e_r1 = R1 f_r1    e-f", "D_r1 = 1/2 R1 f_r1^2    e-f", "G_r1 = e_r1^2/(2 R1)    e-f",
+        " q_c = C e_c    q-e", " V_c = q_c^2/(2 C)    q-e", "V*_c = 1/2 C e_c^2    q-e",
+        "e_r2 = R2 f_r2    e-f", "D_r2 = 1/2 R2 f_r2^2    e-f", "G_r2 = e_r2^2/(2 R2)    e-f",
     ]  # fmt: skip
     found = run_json(capsys, "equations", str(SEED / "dc_motor.sd"), "--form", "elements")[1]["result"]["equations"]
     assert [e["text"] for e in found if "coil (p-f)" in e["label"]] == [
-        "p_coil = L1 f_coil", "T*_coil = 1/2 L1 f_coil^2", "T_coil = p_coil^2/(2 L1)",
+        "p_coil = L1 f_coil, p-f", "T*_coil = 1/2 L1 f_coil^2, p-f", "T_coil = p_coil^2/(2 L1), p-f",
     ]  # fmt: skip
     assert run(["equations", str(SEED / "pendulum.sd"), "--form", "elements", "--quiet"]) == 1  # no elements
 
