@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 FORMULATIONS = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "co_kane", "auto"]
-TRIED = tuple(name for name in FORMULATIONS if name not in ("co_kane", "auto"))
-"""What `verify` and `trade` run by themselves; co_kane is the lowering of kane behind the mirror of co_lagrangian."""
+EVERY = tuple(name for name in FORMULATIONS if name != "auto")
+"""What `verify` runs by itself."""
+TRIED = tuple(name for name in EVERY if name != "co_kane")
+"""What `trade` measures by itself: co_kane has co_lagrangian's rows but those of effort constraints."""
 INDICES = ["auto", "3", "2", "2v", "1", "0"]
 
 

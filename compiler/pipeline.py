@@ -47,7 +47,6 @@ from sysdyn.compiler.program.emit_numpy import emit_numpy
 from sysdyn.compiler.program.program import Program
 from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import budget
-from sysdyn.dsl.model.expression import is_const
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
@@ -152,7 +151,8 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
     with _timed("energies", timings):
         model = anchored(energies.energies(network))
         energies.verify_energies(model)
-        model, notes = integrate(model) if integrating and not _keeps_flow(network) else (model, ())
+        as_written = network.scene is not None and network.scene.keeps("keep_flow")
+        model, notes = integrate(model) if integrating and not as_written else (model, ())
         if traced and not any(o.stored for o in network.observations):
             model, cut = with_coordinates_observed(model, network)
             notes = (*notes, *cut)
@@ -177,12 +177,6 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *found)
     return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
-
-
-def _keeps_flow(network: Network) -> bool:
-    """Whether the scene says keep_flow = true: flow constraints stay as they are written."""
-    options = network.scene.solver_options if network.scene is not None else ()
-    return any(name == "keep_flow" and is_const(node, 1.0) for name, node in options)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from sysdyn.cli.analysis import linear as linear_
@@ -67,12 +68,13 @@ class Linearised:
         return ZerosPolesGain(found.zeros, found.poles, found.gain)
 
     def control(self) -> Any:
-        """The reduction as `control.StateSpace`, with names; python-control is to be installed for it."""
+        """The reduction as `control.StateSpace`, with names (python-control takes no dots); it is to be installed."""
         try:
             import control  # type: ignore[import-not-found, unused-ignore]
         except ImportError as error:
             raise UsageError("control() needs python-control: pip install control") from error
-        named = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        every = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
+        named = {what: _without_dots(names) for what, names in every.items()}
         return control.ss(*self._proper(), **named)
 
     def answers(self) -> tuple[Answer, ...]:
@@ -83,6 +85,15 @@ class Linearised:
         i = output if isinstance(output, int) else self.outputs.index(output)
         j = input if isinstance(input, int) else self.inputs.index(input)
         return next(t for t in self.transfers if (t.output, t.input) == (i, j))
+
+
+def _without_dots(names: Sequence[str]) -> list[str]:
+    """Names that python-control takes, each its own."""
+    found: list[str] = []
+    for name in names:
+        plain = name.replace(".", "_").replace(":", "_")
+        found.append(plain if plain not in found else f"{plain}_{len(found)}")
+    return found
 
 
 def linearised_at(

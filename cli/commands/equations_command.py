@@ -9,7 +9,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.options import chosen
 from sysdyn.cli.run.running import Request
 
-FORMS = ("descriptor", "matrices", "canonical", "underlying", "linear", "port_hamiltonian")
+FORMS = ("descriptor", "matrices", "canonical", "underlying", "linear", "port_hamiltonian", "efforts", "elements")
 
 
 @with_console("equations")
@@ -24,6 +24,8 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
 
     descriptor: q' = f, M f' + Phi_q^T kappa + Psi_f^T mu = Y, and so on. matrices: M, Phi_q, Psi_f, Y, Z1, Z2.
     canonical: Hamilton's equations in q and p. underlying: rates and multipliers solved for. linear: about the start.
+    efforts: those on each coordinate by class (inertial, potential, dissipative, source, implicit, constraint).
+    elements: the law of each store and dissipator with T, T*, V, V*, D, G side by side.
     port_hamiltonian: E z' = (J - R) e + G u with E^T e = dH/dz, J = -J^T, R >= 0 (whether it is, by `check --explain`).
     """
     from sysdyn.cli.analysis.asked import compiled

@@ -10,11 +10,23 @@ from sysdyn.cli.analysis.linear import inputs_of, linearised
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.targets import Target
-from sysdyn.compiler.equations.book import CO_WORDS, WORDS, Equation, Function, Summed, algebra_of, equations, functions
+from sysdyn.compiler.equations.book import (
+    CO_WORDS,
+    WORDS,
+    Equation,
+    Function,
+    Summed,
+    algebra_of,
+    classes,
+    equations,
+    functions,
+)
+from sysdyn.compiler.equations.elements import elements
 from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonical, matrices, underlying, variation
 from sysdyn.compiler.equations.offsets import offsets
 from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian, written
 from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.compiler.forms.legendre import transformed
 from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model.expression import Node, const, param, scale, var
 from sysdyn.dsl.text.diagnostics import Report
@@ -46,22 +58,33 @@ def content_of(
         case "matrices":
             return Content(matrices=matrices(algebra, compiled.form), counted=tuple(_counted(compiled.form)))
         case "canonical":
-            function, found = canonical(algebra, compiled.energies, compiled.form)
-            return Content((function, variation(algebra, function, compiled.form)), tuple(found))
+            function, rates = canonical(algebra, compiled.functions, compiled.form)
+            return Content((function, variation(algebra, function, compiled.form)), tuple(rates))
         case "underlying":
             found_ = tuple(underlying(algebra, compiled.form))
             return Content(equations=found_, counted=tuple(_counted(compiled.form)))
         case "port_hamiltonian":
-            function, shown = written(algebra, port_hamiltonian(compiled.energies, compiled.form))
-            return Content((function,), matrices=shown)
+            function, view = written(algebra, port_hamiltonian(compiled.energies, compiled.form))
+            return Content((function,), matrices=view)
+        case "efforts":
+            found = tuple(classes(algebra, compiled.energies, compiled.form))
+            beside, _ = transformed(compiled.energies, compiled.network.parameters)
+            own = {"W", *compiled.energies.functions}
+            more = (f for f in functions(algebra, beside) if f.name not in own)
+            return Content((*functions(algebra, compiled.energies), *more), found)
+        case "elements":
+            shown = tuple(elements(algebra, prepared.network))
+            if not shown:
+                raise NoSuchEquations("the text has no stores and dissipators between nodes: see --form efforts")
+            return Content(equations=shown)
         case "linear":
             return _linear(target, prepared, request, report)
         case _:
-            more = sum(r.block in WORDS for r in compiled.form.rows) - MOST
+            rows = sum(r.block in WORDS for r in compiled.form.rows) - MOST
             return Content(
                 tuple(functions(algebra, compiled.functions)),
-                tuple(equations(algebra, compiled.energies, compiled.form, MOST)),
-                more=max(more, 0),
+                tuple(equations(algebra, compiled.functions, compiled.form, MOST)),
+                more=max(rows, 0),
             )
 
 

@@ -128,6 +128,7 @@ class Sheets:
         """What is printed, in both alphabets."""
         lines = [self._matrix(m) for m in content.matrices] + [self.line(e) for e in content.equations]
         legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
+        legend = () if any(e.kind == "element" for e in content.equations) else legend
         functions = tuple(self.named(f) for f in content.functions)
         return Sheet(functions, tuple(lines), legend, content.more, content.counted)
 
@@ -170,10 +171,15 @@ class Sheets:
         words = WORDS | CO_WORDS if self.complementary else WORDS
         pairs = [(w.sum_of(equation.left), w.sum_of(equation.right)) for w in self.writers]
         conditions = [self._condition(w, equation.where, equation.fixed) for w in self.writers]
-        label = f"{words.get(equation.kind, 'rate of')} {equation.owner}".strip()
+        own = {"element": "", "class": "flow on" if self.complementary else "effort on"}
+        word = own.get(equation.kind, words.get(equation.kind, "rate of"))
+        label = f"{word} {equation.owner}".strip()
         if equation.more:
             pairs = [("", right) for _, right in pairs]
         ends = (conditions[0], conditions[1])
+        if equation.kind == "element":  # the edge of Paynter's diagram
+            edge = equation.owner.rpartition("(")[2].removesuffix(")")
+            ends = (", ".join(filter(None, (edge, ends[0]))), ", \\ ".join(filter(None, (edge, ends[1]))))
         return Line(equation.kind, label, pairs[0], pairs[1], ends, equation.place, equation.more)
 
     def _condition(self, writer: Writer, where: Nest, fixed: Sequence[tuple[int, Node]]) -> str:

@@ -15,7 +15,7 @@ MOST = 200
 def section(study: Study) -> str:
     """Every equation of the formulation."""
     compiled = study.prepared.compiled
-    found = equations(_algebra(study), compiled.energies, compiled.form, MOST)
+    found = equations(_algebra(study), compiled.functions, compiled.form, MOST)
     lines = typeset.rows(found, study.typesetter, study.link, complementary=study.complementary)
     left = sum(r.block in WORDS for r in compiled.form.rows) - MOST
     more = f'<p class="soft">… {left} more</p>' if left > 0 else ""

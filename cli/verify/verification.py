@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import TRIED
+from sysdyn.cli.options import EVERY
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
@@ -108,7 +108,7 @@ class _Verification:
     ) -> None:
         self.request, self.target, self.report, self.folder, self._progress = request, target, report, folder, progress
         self.began = time.monotonic()
-        self.done, self.planned = 0, 2 * len(TRIED) + 1
+        self.done, self.planned = 0, 2 * len(EVERY) + 1
         self.runs: list[Run] = []
         self.refusals: list[Refusal] = []
         self.twins: list[Twins] = []
@@ -127,7 +127,7 @@ class _Verification:
             self._tell()
             return None
         first = self.runs[0].formulation
-        for name in TRIED:
+        for name in EVERY:
             if name != first:
                 self._formulation(name)
         self._tell()
@@ -138,7 +138,7 @@ class _Verification:
         silent = Report()
         with ex.fresh():
             first = ready(self.request, self.target, silent)
-        others = [name for name in TRIED if first and name != first.formulation]
+        others = [name for name in EVERY if first and name != first.formulation]
         items = [(self.request, self.folder, name) for name in (None, *others)]
         parts: dict[int, _Part] = {}
         for k, part in each(_part, items, jobs):

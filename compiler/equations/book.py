@@ -15,11 +15,14 @@ from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.joining import joined, shorter
 from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import Piece, pieces
+from sysdyn.compiler.forms.conjugates import signed
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations
+from sysdyn.compiler.forms.efforts import PREFIX, effort
 from sysdyn.compiler.forms.lowering import whole
+from sysdyn.compiler.forms.momenta import momentum, resolve
 from sysdyn.compiler.model.energies import EnergyModel, Family
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, var, variables
+from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, sub, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 
 FUNCTIONS = ("T*", "T", "V", "V*", "D", "G")
@@ -35,6 +38,8 @@ WORDS = {
 }
 CO_WORDS = {"momentum": "displacement of", "phi": "momentum constraint", "psi": "effort constraint"}
 """What rows are called, and in the complementary family."""
+CLASSES = ("inertial", "potential", "dissipative", "source", "implicit", "constraint")
+"""Of efforts."""
 BLOCKS = ("dynamics", "momentum", "phi", "psi", "gamma", "lambda")
 
 
@@ -97,7 +102,14 @@ def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm, most: 
     yield from kinematics(model, form)
     rows = [(number, row) for number, row in enumerate(form.rows) if row.block in BLOCKS]
     for number, row in rows[:most]:
-        yield from _of_row(algebra, row, pieces(form, number))
+        solved = row.block == "momentum" and row.owner in model.solved
+        yield from _of_row(algebra, row, [_momentum(model, row.owner)] if solved else pieces(form, number))
+
+
+def _momentum(model: EnergyModel, owner: str) -> Piece:
+    """P - dT*/df of a coordinate whose row is solved for its flow in the residual."""
+    own = var(owner, model.mirror.conjugate)
+    return Piece((), (), (), sub(own, momentum(model, own)))
 
 
 def kinematics(model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
@@ -173,6 +185,21 @@ def _class(term: Node) -> str:
     if found & {"kappa", "mu"}:
         return "multiplier"
     return next(iter(found)) if len(found) == 1 and found <= {"p", "f"} else ""
+
+
+def classes(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
+    """The efforts of every coordinate by class (2.10), of complementary forms the flows; they add up to zero."""
+    complementary = form.formulation.startswith("co_")
+    carriers = frozenset(f.owner for f in form.families if f.kind == model.mirror.conjugate)
+    for family in model.coordinates:
+        nest, at = whole(family)
+        for name in CLASSES:
+            acting = resolve(model, carriers, effort(model, var(family.name, f"{PREFIX}{name}", *at)))
+            found = joined(algebra, signed(acting) if complementary else acting)
+            if found:
+                left = param(f"{'f' if complementary else 'e'}_{name}_{family.name}", *at)
+                right = tuple(Summed((), term) for term in found)
+                yield Equation("class", family.name, family.place, (Summed((), left),), right, nest)
 
 
 def functions(algebra: Algebra, model: EnergyModel) -> Iterator[Function]:

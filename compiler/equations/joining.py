@@ -88,8 +88,15 @@ def _polynomial(algebra: Algebra, whole: Any, leaves: Sequence[Node]) -> list[tu
 
 
 def _opened(sympy: Any, whole: Any) -> Any:
-    """Products of sums multiplied out, functions left as they are."""
-    return sympy.expand(whole, power_base=False, power_exp=False, log=False, basic=False)
+    """Products of sums multiplied out, functions and what stands below left as they are."""
+    held = {p: sympy.Dummy() for p in _over_sums(sympy, whole)}
+    opened = sympy.expand(whole.xreplace(held), power_base=False, power_exp=False, log=False, basic=False)
+    return opened.xreplace({symbol: p for p, symbol in held.items()})
+
+
+def _over_sums(sympy: Any, whole: Any) -> list[Any]:
+    """The whole negative powers of sums in it."""
+    return [p for p in whole.atoms(sympy.Pow) if p.base.is_Add and p.exp.is_Integer and p.exp < 0]
 
 
 def shortest(algebra: Algebra, coefficient: Any) -> Any:
@@ -102,7 +109,9 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
     forms = [coefficient]
     waves = coefficient.has(sympy.sin, sympy.cos)
     ways: list[Callable[[Any], Any]] = [sympy.factor]
-    if waves and size <= TURNING:
+    if waves and _over_sums(sympy, coefficient):
+        pass  # its factors are looked at one by one
+    elif waves and size <= TURNING:
         ways += [lambda c: sympy.fu(sympy.expand(c)), lambda c: sympy.factor(sympy.trigsimp(sympy.expand(c)))]
         ways += [lambda c: sympy.factor(sympy.fu(sympy.factor(c)))]
     elif not coefficient.is_Mul:
@@ -112,7 +121,20 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
             forms.append(way(coefficient))
         except (sympy.PolynomialError, NotImplementedError):
             continue
+    if waves:
+        forms += [turned_factors(sympy, form) for form in forms[1:] if form.is_Mul]
     return min(forms, key=lambda c: (sympy.count_ops(c, visual=False), str(c)))
+
+
+def turned_factors(sympy: Any, form: Any) -> Any:
+    """A product with each sum of squares of sines and cosines in it as short as it can be."""
+    found = []
+    for factor in form.args if form.is_Mul else (form,):
+        base, exponent = factor.as_base_exp()
+        if base.is_Add and base.has(sympy.sin, sympy.cos) and base.count_ops() <= TURNING:
+            base = min(base, sympy.fu(base), key=lambda c: (sympy.count_ops(c, visual=False), str(c)))
+        found.append(base**exponent)
+    return sympy.Mul(*found)
 
 
 def _split(algebra: Algebra, whole: Any) -> list[Node]:

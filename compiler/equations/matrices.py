@@ -12,19 +12,22 @@ Received: a form without families over ranges, of at most LARGEST rates and mult
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import Effort, Equation, Function, Summed, gathered, sides
-from sysdyn.compiler.equations.joining import joined, length, ordered, shortest
+from sysdyn.compiler.equations.joining import joined, length, ordered, shortest, turned_factors
 from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.dsl.model.expression import Node, add, const, derivative, neg, product, substitute, var, variables
+from sysdyn.dsl.model.expression import Node, add, const, derivative, neg, product, sub, substitute, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 
 LARGEST = 12
 """Rates and multipliers that are solved for in symbols."""
+MOVING = 3
+"""Coordinates whose momenta are, where their inertia moves with displacements."""
 
 
 class NoSuchEquations(Exception):  # noqa: N818
@@ -122,6 +125,10 @@ def underlying(algebra: Algebra, form: DescriptorForm) -> list[Equation]:
     rows = rows_of(form, "dynamics", "momentum_rate", "phi_acceleration", "psi_rate")
     kinds = (("f", 1), ("p", 1), ("kappa", 0), ("mu", 0))
     wanted = [n for kind, order in kinds for n in unknowns(form, kind, order)]
+    read = {n for row in rows if row.block != "momentum_rate" for n in variables(row.expression)}
+    idle = {row.owner for row in rows if row.block == "momentum_rate" and var(row.owner, "f", order=1) not in read}
+    rows = [row for row in rows if row.block != "momentum_rate" or row.owner not in idle]
+    wanted = [n for n in wanted if not (_is(n, "f", 1) and n.data[0] in idle)]
     solution = _solved(algebra, rows, wanted)
     found = []
     for node, value in zip(wanted, solution, strict=True):
@@ -141,6 +148,7 @@ def _quotient(algebra: Algebra, value: Any) -> tuple[Node, ...]:
     above, below = algebra.sympy.fraction(algebra.sympy.factor(algebra.sympy.together(value)))
     if all(algebra.node(s).op == "param" for s in below.free_symbols):
         return joined(algebra, algebra.node(algebra.sympy.expand(above) / below))
+    below = turned_factors(algebra.sympy, below)
     factor, rest = above.as_independent(*(s for s in above.free_symbols if algebra.node(s).op != "param"), as_Add=False)
     terms = joined(algebra, algebra.node(rest))
     parts = ((1.0, algebra.node(factor)), (1.0, add(*terms)), (-1.0, algebra.node(below)))
@@ -264,11 +272,17 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
     """H(q, p) and Hamilton's equations without the flows of coordinates that carry a momentum."""
     if form.formulation != "hamiltonian":
         raise NoSuchEquations("the canonical equations are Hamilton's: --formulation hamiltonian")
-    rows = rows_of(form, "momentum")
+    rows = [_unsolved(model, row) for row in rows_of(form, "momentum")]
     carriers = [row.owner for row in rows]
     if not carriers:
         raise NoSuchEquations("no coordinate carries a momentum: there is no kinetic store")
     flows = [var(owner, "f") for owner in carriers]
+    if len(model.solved) > MOVING and any(n.op == "var" for r in rows for f in flows for n in
+                                          variables(derivative(r.expression, f)) if r.owner in model.solved):
+        raise NoSuchEquations(
+            f"the inertia of {', '.join(model.solved)} moves: up to {MOVING} such coordinates are solved in symbols;"
+            " --form descriptor has p = dT*/df"
+        )
     try:
         solution = _solved(algebra, rows, flows)
     except NoSuchEquations as error:
@@ -281,6 +295,14 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
         left, right = sides(row.block, [Summed((), t) for t in _without_flows(algebra, row.expression, values)])
         found.append(Equation(row.block, row.owner, row.place, left, right))
     return function, found
+
+
+def _unsolved(model: EnergyModel, row: Row) -> Row:
+    """P - dT*/df where the residual solves for the flow."""
+    if row.owner not in model.solved:
+        return row
+    own = var(row.owner, model.mirror.conjugate)
+    return replace(row, expression=sub(own, momentum(model, own)))
 
 
 def _energy(

@@ -20,7 +20,8 @@ def with_book_signs(form: DescriptorForm) -> DescriptorForm:
     return replace(form, blocks=blocks, pins=pins)
 
 
-def _signed(root: Node) -> Node:
+def signed(root: Node) -> Node:
+    """The expression with every conjugate's sign changed."""
     change = {}
     for node in variables(root):
         if node.op == "var" and node.data[1] == "p":
@@ -34,8 +35,8 @@ def _block(block: Block) -> Block:
     defines = HOME.get(block.name, block.name) == "momentum"
     kernels = []
     for kernel in block.kernels:
-        signed = ((s, _signed(s.expression)) for s in kernel.rows)
-        rows = tuple(replace(s, expression=neg(e) if defines else e) for s, e in signed)
+        found = ((s, signed(s.expression)) for s in kernel.rows)
+        rows = tuple(replace(s, expression=neg(e) if defines else e) for s, e in found)
         kernels.append(replace(kernel, rows=rows))
     return replace(block, kernels=tuple(kernels))
 

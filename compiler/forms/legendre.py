@@ -4,16 +4,22 @@
     T  = (p - b)^T M^-1 (p - b)/2 - c                       T + T* = p^T f,  dT/dp = f,  dT/dq = -dT*/dq
 
 A block is a set of flows that the terms of T* join.  It is transformed where its M is regular at the values of the
-parameters and at some points, small, and no family over a range; elsewhere T* stays, and 0 = p - dT*/df with it.
+parameters and at some points, and no family over a range; elsewhere T* stays, and 0 = p - dT*/df with it.  M^-1 is
+written by minors up to WRITTEN coordinates.  Above, the residual solves for the flows:
+
+    M = L D L^T,  L y = p - b,  D L^T f = y    dT/dp = f, and dT*/dq at these flows in the place of -dT/dq
+
+each pivot and each y a shared expression, none multiplied out.
 """
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from sysdyn.compiler.forms.minors import determinant, inverse
+from sysdyn.compiler.forms.minors import Square, inverse
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.terms import Term, local_variables
 from sysdyn.dsl.model.expression import (
@@ -28,6 +34,7 @@ from sysdyn.dsl.model.expression import (
     power,
     sub,
     substitute,
+    time_derivative,
     topological,
     var,
     variables,
@@ -36,15 +43,21 @@ from sysdyn.dsl.model.network import Parameter, Slope
 
 LARGEST = 12
 """Coordinates of a block that is looked at."""
-COUPLED = 2
-"""Coordinates that M may join for its inverse to be written out; only where it does not move."""
+WRITTEN = 2
+"""Coordinates that M may join for its inverse to be written out."""
+COUPLED = 5
+"""Coordinates that M may join; of more the rows stay 0 = p - dT*/df, for the Jacobian of M^-1 p grows too fast."""
 LONGEST = 400
 """Nodes of the terms of such a block."""
-DRAWN = 3
+DRAWN = 8
 """Points at which M is looked at."""
+NEAR = (0.2, 1.0)
+WIDE = 3.0
+"""Displacements there, of every other point: about a turn of an angle."""
 SINGULAR = 1e-9
-"""Of a determinant, relative to the product of the rows' largest entries."""
+"""Of a pivot, relative to its row's largest entry."""
 Values = Callable[[str], float]
+Ends = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,28 +75,40 @@ def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[En
     gone: set[int] = set()
     found: list[Term] = []
     rests: list[Slope] = []
+    solved: dict[str, tuple[Node, Node]] = {}
     for block in _blocks(terms, m.rate):
         whole = add(*(terms[k].expression for k in block.terms))
-        energy = _energy(whole, block.flows, m.conjugate, _known(parameters))
-        if energy is not None:
-            place = terms[block.terms[0]].place
+        inertia = _inertia(whole, block.flows, _known(parameters))
+        if inertia is None:
+            continue
+        place = terms[block.terms[0]].place
+        momenta = _momenta(whole, block.flows, m.conjugate)
+        if len(inertia) > WRITTEN and not _apart(inertia):
+            solved |= _solved(whole, block.flows, inertia, momenta, m.conjugate)
+        else:
             gone |= set(block.terms)
-            found += [Term(part, (), place) for part in energy]
-            rests += [Slope(f.data[0], size, (), False, place) for f, size in _rest_on(whole, block.flows)]
-    if not found:
+            found += [Term(part, (), place) for part in _energy(whole, block.flows, inertia, momenta)]
+        rests += [Slope(f.data[0], size, (), False, place) for f, size in _rest_on(inertia, block.flows)]
+    if not found and not solved:
         return model, ()
     kept = tuple(t for k, t in enumerate(terms) if k not in gone)
     functions = {**model.functions, m.coenergy: kept, m.energy: (*model.function(m.energy), *found)}
-    return replace(model, functions=functions), tuple(rests)
+    return replace(model, functions=functions, solved=solved), tuple(rests)
 
 
-def _rest_on(whole: Node, flows: Sequence[Node]) -> Iterator[tuple[Node, Node]]:
-    """A flow and what of parameters must not be zero, for M to have an inverse."""
-    inertia = [[derivative(derivative(whole, f), g) for g in flows] for f in flows]
-    sizes = [row[k] for k, row in enumerate(inertia)] if _apart(inertia) else [determinant(inertia)]
-    for f, size in zip(flows, sizes, strict=False):
-        if not is_const(size) and not any(n.op in ("var", "time") for n in topological([size])):
-            yield f, size
+def _rest_on(inertia: Square, flows: Sequence[Node]) -> Iterator[tuple[Node, Node]]:
+    """A flow and what of parameters must not be zero, for M to have an inverse; at one point where M moves."""
+    apart = _apart(inertia)
+    sizes = [row[k] for k, row in enumerate(inertia)] if apart else _eliminated(inertia)[1]
+    drawn = random.Random(0)
+    at: dict[Node, Node] = {}
+    for node in topological(sizes):
+        if node.op in ("var", "time"):
+            at[node] = const(drawn.uniform(-WIDE, WIDE))
+    for f, size in zip(flows, sizes, strict=True):
+        fixed = substitute(size, at) if at else size
+        if not is_const(fixed) and (not at or not apart):
+            yield f, fixed
 
 
 def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_Block]:
@@ -109,71 +134,117 @@ def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_Block]:
             yield _Block(tuple(flows), tuple(numbers))
 
 
-def _energy(whole: Node, flows: Sequence[Node], conjugate: str, known: Values) -> list[Node] | None:
-    """The summands of T of a block, None where it has none."""
+def _inertia(whole: Node, flows: Sequence[Node], known: Values) -> list[list[Node]] | None:
+    """M of a block, None where it is not transformed."""
     if len(flows) > LARGEST or len(topological([whole])) > LONGEST:
         return None
-    still = dict.fromkeys(flows, const(0.0))
-    slopes = [derivative(whole, f) for f in flows]
-    inertia = [[derivative(slope, f) for f in flows] for slope in slopes]
+    inertia = [[derivative(derivative(whole, f), g) for g in flows] for f in flows]
     rates = set(flows)
     for entry in (e for row in inertia for e in row):
         if any(n in rates or (n.op == "var" and n.data[1] not in ("q", "p", "s")) for n in variables(entry)):
             return None
-    if not _small(inertia) or not _regular(inertia, known):
+    if not _apart(inertia) and len(flows) > COUPLED:
         return None
-    momenta = [
-        sub(var(f.data[0], conjugate), substitute(slope, still)) for f, slope in zip(flows, slopes, strict=True)
-    ]
+    return inertia if _regular(inertia, known) else None
+
+
+def _momenta(whole: Node, flows: Sequence[Node], conjugate: str) -> list[Node]:
+    """P - b of a block."""
+    still = dict.fromkeys(flows, const(0.0))
+    return [sub(var(f.data[0], conjugate), substitute(derivative(whole, f), still)) for f in flows]
+
+
+def _energy(whole: Node, flows: Sequence[Node], inertia: Square, momenta: Sequence[Node]) -> list[Node]:
+    """The summands of T of a block."""
+    found = _form(inertia, momenta)
+    rest = neg(substitute(whole, dict.fromkeys(flows, const(0.0))))
+    return found if is_const(rest, 0.0) else [*found, rest]
+
+
+def _form(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
+    """The terms of z^T M^-1 z/2."""
     over = _inverse(inertia)
     found = []
     for j, row in enumerate(over):
         for k in range(j, len(row)):
             if not is_const(row[k], 0.0):
                 found.append(mul(const(0.5 if j == k else 1.0), row[k], momenta[j], momenta[k]))
-    rest = neg(substitute(whole, still))
-    return found if is_const(rest, 0.0) else [*found, rest]
+    return found
 
 
-def _inverse(inertia: Sequence[Sequence[Node]]) -> list[list[Node]]:
-    if len(inertia) <= COUPLED:
+def _solved(
+    whole: Node, flows: Sequence[Node], inertia: Square, momenta: Sequence[Node], conjugate: str
+) -> dict[str, tuple[Node, Node]]:
+    """By coordinate 0 = dT/dp - f, and the rate of this where it holds: M^-1 (p' - (dT*/df)')."""
+    lost = [sub(var(f.data[0], conjugate, order=1), time_derivative(derivative(whole, f))) for f in flows]
+    pairs = zip(flows, _flows(inertia, momenta), _flows(inertia, lost), strict=True)
+    return {f.data[0]: (sub(value, f), rate) for f, value, rate in pairs}
+
+
+def _flows(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
+    """M^-1 z, by elimination."""
+    lower, pivots = _eliminated(inertia)
+    y: list[Node] = []
+    for k, z in enumerate(momenta):
+        y.append(sub(z, add(*(mul(lower[k][j], y[j]) for j in range(k)))))
+    found: list[Node] = []  # from the last
+    for k in reversed(range(len(y))):
+        later = (mul(lower[j][k], found[len(y) - 1 - j]) for j in range(k + 1, len(y)))
+        found.append(sub(mul(y[k], power(pivots[k], const(-1.0))), add(*later)))
+    return found[::-1]
+
+
+def _eliminated(inertia: Square) -> tuple[list[list[Node]], list[Node]]:
+    """The rows of L and the pivots of M = L D L^T."""
+    lower: list[list[Node]] = []
+    pivots: list[Node] = []
+    for k, row in enumerate(inertia):
+        line: list[Node] = []
+        for j in range(k):
+            held = add(*(mul(line[i], lower[j][i], pivots[i]) for i in range(j)))
+            line.append(mul(sub(row[j], held), power(pivots[j], const(-1.0))))
+        pivots.append(sub(row[k], add(*(mul(line[i], line[i], pivots[i]) for i in range(k)))))
+        lower.append(line)
+    return lower, pivots
+
+
+def _inverse(inertia: Square) -> list[list[Node]]:
+    if not _apart(inertia):
         return inverse(inertia)
     zero = const(0.0)
     return [[power(e, const(-1.0)) if j == k else zero for k, e in enumerate(row)] for j, row in enumerate(inertia)]
 
 
-def _apart(inertia: Sequence[Sequence[Node]]) -> bool:
+def _apart(inertia: Square) -> bool:
     """Whether M is diagonal."""
     return all(is_const(e, 0.0) for j, row in enumerate(inertia) for k, e in enumerate(row) if j != k)
 
 
-def _small(inertia: Sequence[Sequence[Node]]) -> bool:
-    """Whether M is diagonal, or small and at rest."""
-    still = not any(n.op in ("var", "time") for row in inertia for e in row for n in topological([e]))
-    return _apart(inertia) or (still and len(inertia) <= COUPLED)
-
-
-def _regular(inertia: Sequence[Sequence[Node]], known: Values) -> bool:
+def _regular(inertia: Square, known: Values) -> bool:
+    """Whether no pivot of M is nearly zero at some points; of those far out, only where M has values there."""
     entries = [e for row in inertia for e in row]
-    n = len(inertia)
-    whole = determinant(inertia) if n <= COUPLED else mul(*(row[k] for k, row in enumerate(inertia)))
+    pivots = [row[k] for k, row in enumerate(inertia)] if _apart(inertia) else _eliminated(inertia)[1]
+    n = len(pivots)
     for seed in range(DRAWN):
         drawn = random.Random(seed)
+        ends = NEAR if seed % 2 == 0 else (-WIDE, WIDE)
         values: dict[Node, float] = {}
 
-        def look(node: Node, drawn: random.Random = drawn, values: dict[Node, float] = values) -> float:
+        def look(
+            node: Node, drawn: random.Random = drawn, values: dict[Node, float] = values, ends: Ends = ends
+        ) -> float:
             if node not in values:
-                values[node] = known(node.data) if node.op == "param" and not node.args else drawn.uniform(0.2, 1.0)
+                values[node] = known(node.data) if node.op == "param" and not node.args else drawn.uniform(*ends)
             return values[node]
 
         try:
-            size, *found = evaluate([whole, *entries], look)
+            found = evaluate([*pivots, *entries], look)
         except (ArithmeticError, ValueError):
-            return False
-        bound = 1.0
-        for k in range(n):
-            bound *= max(abs(v) for v in found[k * n : (k + 1) * n])
-        if not abs(size) > SINGULAR * bound > 0.0:
+            found = [math.nan] * (n + n * n)
+        if ends is not NEAR and any(math.isnan(v) for v in found[n:]):
+            continue
+        rows = [max(abs(v) for v in found[(k + 1) * n : (k + 2) * n]) for k in range(n)]
+        if not all(abs(d) > SINGULAR * row > 0.0 for d, row in zip(found, rows, strict=False)):
             return False
     return True
 

@@ -4,7 +4,7 @@ With u the loop-local unknowns of a term, every gradient is taken once per term 
 
     carrier of a momentum      p' - dT*/dq + dT/dq + dV/dq + dD/df - Q          (4.14)
     any other coordinate       d/dt(dT*/df) - dT*/dq + dV/dq + dD/df - Q        (3.34); d/dt brings M f' in
-    momentum                   p - dT*/df,  or dT/dp - f where T is given
+    momentum                   p - dT*/df,  or dT/dp - f where T is given or the flows are solved for (legendre.py)
     reactions                  Phi_q^T kappa, Psi_f^T mu                         the multiplier rule
     phi rate, acceleration     Phi_q f + Phi_t;  Phi_q f' + Z1                   total derivatives (6.32)
 """
@@ -198,6 +198,8 @@ class _Lowering:
                 self._carrier(family)
         for term in self.model.function(mirror.coenergy):
             for rate in local_variables(term.expression, mirror.rate):
+                if rate.data[0] in self.model.solved:
+                    continue
                 slope = derivative(term.expression, rate)
                 if rate.data[0] in self.carriers - self.stores:
                     self._momentum(rate.data[0], rate.args, term.loops, neg(slope))
@@ -218,6 +220,11 @@ class _Lowering:
             moved = inside(name)
         self.assembly.add("dynamics", name, at, moved, var(name, m.conjugate, *at, order=1))
         held = var(name, m.conjugate, *at)
+        if name in self.model.solved:
+            zero, rate = self.model.solved[name]
+            self.assembly.add("momentum", name, at, nest, zero)
+            self.assembly.add("momentum_rate", name, at, nest, rate)
+            return
         if not given:
             self._momentum(name, at, nest, held)
             return

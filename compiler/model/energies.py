@@ -113,6 +113,7 @@ class EnergyModel:
     quasis: tuple[str, ...] = ()
     speeds: tuple[Quantity, ...] = ()
     switched: frozenset[str] = frozenset()  # labels of constraints that hold at times
+    solved: Mapping[str, tuple[Node, Node]] = field(default_factory=dict)  # 0 = dT/dp - f where T* stays; its rate
 
     def function(self, name: str) -> tuple[Term, ...]:
         """The terms of a state function."""

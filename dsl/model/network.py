@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.dsl.model.expression import Node, is_const, topological
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
 
@@ -373,6 +373,10 @@ class Scene:
     solver_options: tuple[tuple[str, Node], ...] = ()
     redundancy: str | None = None
     limits: tuple[tuple[str, Node], ...] = ()
+
+    def keeps(self, option: str) -> bool:
+        """Whether the solver's option, keep_flow or keep_implicit, is said to be true."""
+        return any(name == option and is_const(node, 1.0) for name, node in self.solver_options)
 
 
 @dataclass(frozen=True, slots=True)

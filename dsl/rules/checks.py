@@ -207,15 +207,17 @@ def _corner(node: Node, place: Place, report: Report) -> None:
 
 
 def _jumps(node: Node, at: Node) -> bool:
-    """Whether the value differs on the two sides of at = 0 (others at a sampled point)."""
+    """Whether the value differs on the two sides of at = 0, however near (others at a sampled point)."""
     leaves = [n for n in ex.topological([node]) if n.op in ("var", "param", "time", "index", "table")]
     values = {n: 0.3 + ((k + 1) * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
 
     def side(x: float) -> float:
         return ex.evaluate([node], lambda n: x if n is at else values.get(n, 0.5))[0]
 
-    sides = [side(x) for x in (-1e-9, 1e-9, 1.0)]
-    return all(map(math.isfinite, sides)) and abs(sides[1] - sides[0]) > 1e-6 * (abs(sides[2]) + abs(sides[1]))
+    sides = [side(x) for x in (-1e-9, 1e-9, -1e-6, 1e-6, 1.0)]
+    near, farther = abs(sides[1] - sides[0]), abs(sides[3] - sides[2])
+    # a slope's difference shrinks with the distance, a jump's does not
+    return all(map(math.isfinite, sides)) and near > max(0.01 * farther, 1e-6 * (abs(sides[4]) + abs(sides[1])))
 
 
 def parameters(model: Elaborator, report: Report, *, required: bool) -> None:

@@ -10,10 +10,12 @@ from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
 from sysdyn.cli.run.running import Request
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.book import BLOCKS, equations
+from sysdyn.compiler.equations.book import BLOCKS, classes, equations
+from sysdyn.compiler.equations.elements import elements
 from sysdyn.compiler.equations.matrices import canonical, rows_of, underlying, unknowns
 from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import pieces
+from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from texts import ROOT, run_json, write
@@ -266,7 +268,7 @@ def test_what_is_printed_is_what_is_compiled(name):
             if made is None:
                 continue
             order = Order([p.name for p in made.network.parameters])
-            found = [e for e in equations(Algebra(order), made.energies, made.form, 1000) if e.kind != "kinematic"]
+            found = [e for e in equations(Algebra(order), made.functions, made.form, 1000) if e.kind != "kinematic"]
             rows = [k for k, row in enumerate(made.form.rows) if row.block in BLOCKS]
             by_row = [list(group) for _, group in itertools.groupby(found, key=lambda e: (e.kind, e.owner))]
             assert len(by_row) == len(rows)
@@ -319,7 +321,7 @@ def test_the_canonical_equations_are_derivatives_of_h(name):
     """q' = dH/dp, and p' + dH/dq holds what is no conservative effort: the same at any momenta."""
     with ex.fresh():
         made = model(name, "hamiltonian")
-        function, found = canonical(Algebra(Order()), made.energies, made.form)
+        function, found = canonical(Algebra(Order()), made.functions, made.form)
         h = ex.add(*(t.expression for t in function.terms))
         carriers = [f.owner for f in made.form.families if f.kind == "p"]
         values = Values(4)
@@ -401,3 +403,59 @@ def test_a_circuit_has_no_underlying_equation(capsys):
     code, found = run_json(capsys, "equations", str(SEED / "lead_filter.sd"), "--form", "underlying")
     assert code == 1
     assert found["diagnostics"][0]["code"] == "E607"
+
+
+# -- Paynter's diagram, Tables 2.4 to 2.10 -----------------------------------------------------------------------------
+
+
+def test_elements_have_their_state_functions_side_by_side(capsys):
+    assert printed(capsys, "lead_filter", "--form", "elements").splitlines() == [
+        "e_r1 = R1 f_r1    e-f", "D_r1 = 1/2 R1 f_r1^2    e-f", "G_r1 = e_r1^2/(2 R1)    e-f",
+        " q_c = C e_c    q-e", " V_c = q_c^2/(2 C)    q-e", "V*_c = 1/2 C e_c^2    q-e",
+        "e_r2 = R2 f_r2    e-f", "D_r2 = 1/2 R2 f_r2^2    e-f", "G_r2 = e_r2^2/(2 R2)    e-f",
+    ]  # fmt: skip
+    found = run_json(capsys, "equations", str(SEED / "dc_motor.sd"), "--form", "elements")[1]["result"]["equations"]
+    assert [e["text"] for e in found if "coil (p-f)" in e["label"]] == [
+        "p_coil = L1 f_coil, p-f", "T*_coil = 1/2 L1 f_coil^2, p-f", "T_coil = p_coil^2/(2 L1), p-f",
+    ]  # fmt: skip
+    assert run(["equations", str(SEED / "pendulum.sd"), "--form", "elements", "--quiet"]) == 1  # no elements
+
+
+def test_a_law_that_is_not_linear_has_its_content_by_the_legendre_transform(capsys):
+    """D + G = e f at the diode's law, dD/df = e and dG/de = f (Legendre), at numbers."""
+    with ex.fresh():
+        _, prepared = compiled(Request(str(SEED / "diode_circuit.sd"), backend="numpy"), Report())
+        found = {e.left[0].expression.data: e for e in elements(Algebra(Order()), prepared.network)}
+        values = {ex.param("Is"): 0.3, ex.param("a"): 1.7, ex.param("e_diode"): 0.8}
+        of = lambda name: ex.evaluate(  # noqa: E731
+            [ex.add(*(t.expression for t in found[name].right))], values.__getitem__
+        )[0]
+        values[ex.param("f_diode")] = of("f_diode")
+        assert of("D_diode") + of("G_diode") == pytest.approx(0.8 * values[ex.param("f_diode")], rel=1e-14)
+        g = ex.add(*(t.expression for t in found["G_diode"].right))
+        slope = ex.evaluate([ex.derivative(g, ex.param("e_diode"))], values.__getitem__)[0]
+        assert slope == pytest.approx(values[ex.param("f_diode")], rel=1e-14)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.parametrize("name", ["slider_crank", "two_link_arm", "dc_motor", "solenoid", "lcr_nonlinear"])
+def test_efforts_by_class_add_up_to_the_balance(name, formulation):
+    """(2.10): inertial, potential, dissipative, source, implicit and constraint efforts against the balances' rows."""
+    with ex.fresh():
+        made = model(name, formulation)
+        if made is None:
+            return
+        sums = {}
+        for e in classes(Algebra(Order()), made.energies, made.form):
+            sums.setdefault(e.owner, []).extend(t.expression for t in e.right)
+        rows = {row.owner: row.expression for row in rows_of(made.form, "dynamics")}
+        known = Values(5)
+        for f in (f for f in made.form.families if f.kind == "p"):  # T(p, q) and T*(f, q) say the same at p = dT*/df
+            own = ex.var(f.owner, "p")
+            if (value := known.of(momentum(made.energies, own))) != 0.0:
+                known.known[own] = -value if formulation.startswith("co_") else value
+        assert set(sums) <= set(rows)
+        for owner, row in rows.items():
+            parts = sums.get(owner, [ex.const(0.0)])
+            size = sum(abs(known.of(t)) for t in parts) + 1e-300
+            assert sum(known.of(t) for t in parts) == pytest.approx(-known.of(row), abs=1e-11 * size), owner

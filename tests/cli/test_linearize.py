@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 from scipy import signal
 from scipy.linalg import eigvals, svdvals
+from sysdyn.api import linearize
 from sysdyn.cli.main import run
 from texts import ROOT, run_json, write
 
@@ -481,3 +482,23 @@ def test_an_output_that_does_not_exist(tmp_path, capsys):
     code, found = run_json(capsys, "linearize", str(write(tmp_path, RLC)), "--outputs", "c.z", "--backend", "numpy")
     assert code == 1
     assert found["diagnostics"][0]["severity"] == "error"
+
+
+
+@pytest.mark.parametrize(("model", "outputs"), [("motor", ("om", "i")), ("circuit", ("c.e", "v_r"))])
+def test_python_control_says_the_same(model, outputs, tmp_path):
+    """Poles, zeros, static gain and frequency response by python-control of the reduction, where it is installed."""
+    control = pytest.importorskip("control")
+    path = SEED / "dc_motor.sd" if model == "motor" else write(tmp_path, RLC)
+    found = linearize(path, inputs=["E"] if model == "motor" else None, outputs=outputs)
+    system = found.control()
+    assert list(system.output_labels) == [name.replace(".", "_") for name in found.outputs]
+    alike(np.sort_complex(control.poles(system)), np.sort_complex(found.eigenvalues))
+    for k in range(len(outputs)):
+        single, ours = system[k, 0], found.transfer_function(k)
+        theirs = control.zeros(single)  # those of modes that the output does not see among them
+        assert all(np.abs(theirs - zero).min() <= CLOSE * abs(zero) for zero in ours.zeros)
+        for s in (0.3j, 7.0j, 200.0j):
+            by_poles = ours.gain * np.prod(s - np.asarray(ours.zeros)) / np.prod(s - np.asarray(ours.poles))
+            assert single(s) == pytest.approx(by_poles, rel=CLOSE)
+        assert single.dcgain() == pytest.approx(found.transfers[k].static, rel=CLOSE, abs=1e-12)

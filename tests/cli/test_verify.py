@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from schema import EXPECT, NUMBER, STATISTICS, conforms, envelope
 from sysdyn.cli.main import run
-from sysdyn.cli.verify import twins
+from sysdyn.cli.options import TRIED
+from sysdyn.cli.verify import twins, verification
 from sysdyn.cli.verify.agreement import gaps, horizon
 from sysdyn.compiler import pipeline
 from sysdyn.dsl.model import expression as ex
@@ -94,6 +95,13 @@ def both(*formulations):
     return [(f, m) for f in formulations for m in ("bdf", "radau")]
 
 
+@pytest.fixture(autouse=True)
+def _without_co_kane(request, monkeypatch):
+    """Every circuit has it, beside co_lagrangian: some tests and SYSDYN_LONG=1 run it."""
+    if not LONG and not request.node.originalname.startswith("test_kane"):
+        monkeypatch.setattr(verification, "EVERY", TRIED)
+
+
 # --- models -----------------------------------------------------------------------------------------------------------
 
 
@@ -117,6 +125,14 @@ def test_models_of_each_kind_agree(name, options, formulations, capsys):
     assert found["result"]["compared"]
     assert found["result"]["horizon"] == found["result"]["runs"][0]["reached"]
     assert max(r["worst"]["ratio"] for r in found["result"]["runs"][1:]) < 0.2
+
+
+@pytest.mark.parametrize("name", ["seed/lead_filter", "seed/dc_motor"])
+def test_kane_agrees_in_momenta_too(name, capsys):
+    code, found = run_json(capsys, "verify", str(MODELS / f"{name}.sd"))
+    assert code == 0, found["diagnostics"]
+    assert {("co_kane", "bdf"), ("co_kane", "radau")} <= set(names(found["result"]))
+    assert found["result"]["disagreements"] == []
 
 
 def scenes():

@@ -1,7 +1,7 @@
 """Rules of events and set-valued laws."""
 
 import pytest
-from sysdyn.api import ModelError, simulate
+from sysdyn.api import ModelError, check, simulate
 
 MODEL = """
 model m {{
@@ -25,3 +25,13 @@ def test_setsign_is_no_result(asked, tmp_path):
         simulate(file, output=tmp_path / "m.h5")
     assert {d.code for d in caught.value.diagnostics} == {"E705"}
     assert all(d.place.start[0] >= 10 for d in caught.value.diagnostics)
+
+
+# van der Pol's slope is zero at 1 m/s, as that of the second
+@pytest.mark.parametrize("content", ["1/4*1 N.s^3/m^3*x'^4 - 1/2*1 N.s/m*x'^2", "1/2*1 N.s/m*x'^2 - 1 N*x'"])
+def test_a_content_without_a_corner_is_no_friction(content):
+    """A difference of slopes that shrinks with the distance is no jump, however small the slope is at the scale."""
+    text = MODEL.format("").replace("  init", f"  content D = {content}\n  init")
+    assert not any(d.code in ("N608", "W301") for d in check(text))
+    sudden = text.replace(content, "1 N*x'*(if x' > 0 m/s then 2 else 1)")
+    assert [d.code for d in check(sudden) if d.severity == "note"] == ["N608"]

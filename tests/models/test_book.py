@@ -8,6 +8,8 @@ import re
 
 import pytest
 from book_entries import BOOK, ENTRIES, begin, residual
+from reduced import ROOT
+from sysdyn.api import Trace
 from sysdyn.cli.main import run
 from sysdyn.compiler.equations.offsets import offsets
 from sysdyn.dsl.model import expression as ex
@@ -65,3 +67,22 @@ def test_a_flow_constraint_stays_where_the_scene_says_so(tmp_path, capsys):
     path.write_text(text.replace("keep_flow = true", "keep_flow = A > 1 m^2"))
     assert run(["check", str(path), "--quiet"]) == 1
     assert "E405" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_efforts_of_gyrators_are_unknowns_where_the_scene_keeps_them(formulation, tmp_path, capsys):
+    """A motor with and without keep_implicit: (2.94)'s two gammas with their implicit efforts, and the same motion."""
+    text = (ROOT / "models" / "seed" / "dc_motor.sd").read_text()
+    path, found = tmp_path / "motor.sd", []
+    for change in ("false", "true"):
+        said = text.replace("time 0 s to 0.6 s", f"time 0 s to 0.1 s\n  solver bdf(keep_implicit = {change})")
+        path.write_text(said)
+        options = ["--scene", "reference", "--formulation", formulation, "--quiet", "--backend", "numpy"]
+        assert run(["compile", str(path), *options[:4], "--dump", "descriptor", "--quiet"]) == 0
+        rows = capsys.readouterr().out
+        found.append(("emf.e1" in rows, "emf.e2" in rows, "gamma of emf.e1.law" in rows, "gamma of emf.e2.law" in rows))
+        assert run(["simulate", str(path), *options, "--accuracy", "1e-7", "-o", str(tmp_path / f"{change}.h5")]) == 0
+    assert found == [(False,) * 4, (True,) * 4]
+    one, other = (Trace.open(tmp_path / f"{change}.h5") for change in ("false", "true"))
+    for name in ("i", "om", "e", "torque"):
+        assert one[name][-1] == pytest.approx(other[name][-1], rel=1e-6), name

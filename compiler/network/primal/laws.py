@@ -4,7 +4,8 @@
     potential e(q)    V += int e dq           potential q(e)    inverted, or implicit effort; psi f without slope
     dissipator e(f)   D += int e df           dissipator f(e)   inverted, or implicit effort; psi f - f(0) without slope
     effort source     work -e on q            flow source       psi f - f_s, or implicit effort where it is controlled
-    transformer       psi f1 - n f2           gyrator           works -r f2 on q1, r f1 on q2
+    transformer       psi f1 - n f2           gyrator           works -r f2 on q1, r f1 on q2; with keep_implicit of
+                                                                implicit efforts, closed by gammas
 
 A law that has no antiderivative of ours does work -e on q.  Elements of pseudo domains do works only: efforts times
 flows of a domain add up to zero over all its branches (Tellegen), so they leave no trace in the energy audit.
@@ -102,8 +103,9 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     efforts, momenta = field_quantities(network, elements)
     found.efforts.update(efforts)
     found.momenta.update(momenta)
+    keep = network.scene is not None and network.scene.keeps("keep_implicit")
     for coupling, label in _ratios(network, elements, sizes):
-        _couple(coupling, label, elements, sizes, found)
+        _couple(coupling, label, elements, sizes, found, keep=keep)
     return found
 
 
@@ -219,7 +221,7 @@ class _Statement:
         self._row("gamma", self.law.stated, unit)
 
 
-def _ratios(network: Network, elements: Sequence[Element], sizes: Sizes) -> Iterator[tuple[Coupling, str]]:
+def _ratios(network: Network, elements: Sequence[Element], sizes: Sizes) -> Iterator[tuple[Coupling, Part]]:
     """Couplings with the label of their constraint."""
     live = [c for c in network.couplings if any(e.name == c.first for e in elements)]
     stems: dict[str, set[str]] = {}
@@ -231,20 +233,28 @@ def _ratios(network: Network, elements: Sequence[Element], sizes: Sizes) -> Iter
         ranges = {loop.index: sizes.interval(loop.first, loop.last, c.place) for loop in c.loops}
         boxes.append(tuple(sizes.affine(node, ranges, c.place).over(ranges) for node in c.at))
     labels = parts([(f"{name}.ratio", box) for name, box in zip(families, boxes, strict=True)])
-    return ((c, label.name) for c, label in zip(live, labels, strict=True))
+    return zip(live, labels, strict=True)
 
 
 def _stem(name: str) -> str:
     return name.rpartition(".")[0] or name
 
 
-def _couple(coupling: Coupling, label: str, elements: Sequence[Element], sizes: Sizes, found: Laws) -> None:
-    """Transformer f1 = n f2 or e1 = n e2; gyrator e1 = r f2.  The companion law makes e1 f1 + e2 f2 zero."""
+def _couple(
+    coupling: Coupling, part: Part, elements: Sequence[Element], sizes: Sizes, found: Laws, *, keep: bool
+) -> None:
+    """Transformer f1 = n f2 or e1 = n e2; gyrator e1 = r f2.  The companion law makes e1 f1 + e2 f2 zero.
+
+    keep: the efforts of a gyrator are unknowns.
+    """
+    label = part.name
     c = coupling
     first, second = (var(name, "bf", *c.at) for name in (c.first, c.second))
     domain = next(e.branch.domain for e in elements if e.name == c.first)
     if c.kind == "gyrator":
         efforts = mul(c.ratio, second), neg(mul(c.ratio, first))
+        if keep:
+            efforts = _kept(c, part, efforts, elements, found)
         for effort, name in zip(efforts, (c.first, c.second), strict=True):
             place = replace(c.place, element=_stem(c.first))
             found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, place))
@@ -265,6 +275,22 @@ def _couple(coupling: Coupling, label: str, elements: Sequence[Element], sizes: 
         for e in elements:
             if e.name == name and box_holds(held, e.named):
                 found.efforts[e.number] = _at_element(effort, places, e)
+
+
+def _kept(
+    coupling: Coupling, part: Part, efforts: tuple[Node, Node], elements: Sequence[Element], found: Laws
+) -> tuple[Node, Node]:
+    """Both efforts of a gyrator as unknowns, each closed by its gamma."""
+    c, made = coupling, []
+    for port, (effort, name) in enumerate(zip(efforts, (c.first, c.second), strict=True), start=1):
+        unit = next(e.branch.domain for e in elements if e.name == name).effort
+        unknown = f"{part.name.removesuffix('.ratio').replace('#1', '')}.e{port}"
+        found.unknowns.setdefault(unknown, Unknown(unknown, shape_of(part.box), unit, c.place))
+        own_effort = var(unknown, "e", *c.at)
+        equation = sub(own_effort, effort)
+        found.constraints.append(Constraint("gamma", f"{unknown}.law", c.at, equation, c.loops, unit, c.place))
+        made.append(own_effort)
+    return made[0], made[1]
 
 
 def _at_element(effort: Node, places: Sequence[Affine], element: Element) -> Node:
