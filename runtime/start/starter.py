@@ -173,7 +173,7 @@ class Starter:
         missed[self.missed] = True
         return np.asarray(missed[self.rows])
 
-    def _members(self) -> list[Ints]:
+    def _members(self) -> list[Places]:
         """Unknowns of y of each kind."""
         return [np.flatnonzero(self.kinds == kind) for kind in np.unique(self.kinds)]
 

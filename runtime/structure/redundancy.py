@@ -53,7 +53,8 @@ def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu
     """J from the reactions of the multipliers of those kinds (virtual displacements)."""
     pattern = system.pattern
     columns = pattern.columns_of()
-    multipliers, mine = system.once(("reacting", kinds, system.idle_multipliers().tobytes()), lambda: _of(system, kinds))
+    idle = system.idle_multipliers()
+    multipliers, mine = system.once(("reacting", kinds, idle.tobytes()), lambda: _of(system, kinds, idle))
     take = mine[jy[mine] != 0.0]
     which, value = np.searchsorted(multipliers, columns[take]), jy[take]
     largest = np.zeros(multipliers.size)
@@ -72,9 +73,8 @@ def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu
     return Reactions(which, place, value, multipliers, rows, scale)
 
 
-def _of(system: System, kinds: tuple[str, ...], idle: Ints | None = None) -> tuple[Longs, Longs]:
+def _of(system: System, kinds: tuple[str, ...], idle: Ints) -> tuple[Longs, Longs]:
     """Multipliers of those kinds but for the idle ones, and the places in the pattern of their reactions."""
-    idle = system.idle_multipliers() if idle is None else idle
     multipliers = np.setdiff1d(np.flatnonzero(system.are(*kinds)), idle)
     pattern, mine = system.pattern, np.zeros(system.unknowns, dtype=bool)
     mine[multipliers] = True
