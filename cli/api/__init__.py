@@ -336,7 +336,8 @@ _RUN = frozenset(("accuracy", "accuracy_check", "rtol", "atol", "method", "index
 def load(path: str | Path, *, model: str | None = None, scene: str | None = None, **options: Any) -> Model:
     """A model prepared once, for many runs; the options are those of `simulate`.
 
-    200 runs cost what their integrations cost, and a few milliseconds each for the consistent start.
+    A run costs its integrations and some milliseconds for its start and what is set up for it; what follows from the
+    structure is found once, and a run takes the structures of the one before it where the model has no events.
     """
     given = {"model": model, "scene": scene, **options}
     if given.get("formulation") == "auto":

@@ -7,6 +7,7 @@ one (an input, a text with names, a level) is elaborated and compiled once and t
 from __future__ import annotations
 
 import re
+import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -37,6 +38,8 @@ class Compiled:
     nodes: dict[Any, ex.Node]
     checked: list[bool] = field(default_factory=list)
     """Its module was compared with its text."""
+    lone: threading.Lock = field(default_factory=threading.Lock)
+    """Of the run whose structures the next one takes."""
 
 
 def _text_of(value: Any) -> str:
@@ -122,8 +125,16 @@ class Loaded:
         check_tolerances(request)
         prepared, compiled = self.bound(settings)
         network = prepared.network
-        if alone and not (network.events or network.switches or prepared.compiled.form.kinks):
-            prepared = replace(prepared, alone=True)
+        eventful = network.events or network.switches or prepared.compiled.form.kinks
+        # a run beside another one (threads) has structures of its own
+        if not alone or eventful or not compiled.lone.acquire(blocking=False):
+            return self._run(request, prepared, compiled, report)
+        try:
+            return self._run(request, replace(prepared, alone=True), compiled, report)
+        finally:
+            compiled.lone.release()
+
+    def _run(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
         with ex.fresh(compiled.nodes):
             options = options_of(request, self.target, prepared, report, time.monotonic(), None)
             if options is None:

@@ -284,11 +284,28 @@ def options_of(
 
 def stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
     """Instants at which the text jumps or has kinks in time, and those of pulses that steps would pass over."""
+    if _timeless(prepared):
+        return np.zeros(0)
     text = prepared.compiled.form, prepared.binding, options.t_start, options.t_end, prepared.network.tables
     found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
     if found.note:
         report.note("N608", found.note, prepared.network.place)
     return np.union1d(found.times, pulses(*text))
+
+
+def _timeless(prepared: Prepared) -> bool:
+    """`timeless`, asked once a text."""
+    if "timeless" not in prepared.layouts:
+        prepared.layouts["timeless"] = {"so": timeless(prepared)}
+    return bool(prepared.layouts["timeless"]["so"])
+
+
+def timeless(prepared: Prepared) -> bool:
+    """Nothing that is integrated, or that events read, depends on time of itself."""
+    form = prepared.compiled.form
+    rows = [row.expression for block in form.blocks for kernel in block.kernels for row in kernel.rows]
+    read = [o.expression for o in prepared.network.observations if not o.stored]
+    return not any(node.op == "time" for node in ex.topological([*rows, *read]))
 
 
 def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:

@@ -14,7 +14,7 @@ from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
 
 MOST = 24
-"""Instants at which runs are compared, at most twice that; of a long run a part of its steps, and at most twice MANY."""
+"""Instants at which runs are compared, at most twice that; of a long run this part of its steps, at most twice MANY."""
 PART, MANY = 16, 500
 GRID = 600
 """Rows of a trace with an interval that are compared at most: between steps errors differ from row to row."""

@@ -95,7 +95,7 @@ class Resting:
 
     def _use(self) -> Mask:
         """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
-        use = self.starter.groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda")
+        use = self.starter.groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda").copy()
         use[self.rows.held[0]] = True
         grows = quadratures(self.system, self.tangible) & (self.system.kinds[: self.n] == "s")
         for group, family, first in self.rows.form.groups:

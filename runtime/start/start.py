@@ -111,7 +111,7 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     What follows from the state moves alone where that is enough.
     """
     for groups, moving in STAGES:
-        rows, may = starter.groups(*groups), free & np.isin(starter.moving, moving)
+        rows, may = starter.groups(*groups), free & starter.moves(moving)
         for use in (rows | starter.between(moving), rows):
             if not use.any() or not may.any():
                 continue

@@ -62,14 +62,6 @@ def _given(system: System) -> _Given:
     return _Given(guess, fixed, written, label)
 
 
-def _of_groups(system: System, names: Sequence[str]) -> Mask:
-    mask = np.zeros(system.rows, dtype=bool)
-    for group, family, first in system.form.groups:
-        if group in names:
-            mask[first : first + system.description.rows[family].size] = True
-    return mask
-
-
 def _pairs(system: System) -> tuple[Ints, Ints]:
     """Places of momenta, and of the flows of the same coordinates."""
     families, at = system.description.families, system.form.at
@@ -126,7 +118,7 @@ class Starter:
         self.rates = rates_of(self.settled)
         self.given = _given(system)
         self.n = system.form.written
-        self._momenta = _of_groups(system, ("momentum",))
+        self._momenta = system.of_groups("momentum")
         self.guessed, self.unsaid = self._guessed()
         starting, measuring = measuring, measuring and bool(self.unsaid.any())
         self.missed = np.flatnonzero(self.guessed & measuring)
@@ -167,11 +159,23 @@ class Starter:
         self.idle = self._idle()
         self.moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
         self.moving[self.first :] = self._read()
+        self._of_kinds: dict[tuple[str, ...], Mask] = {}
 
     @functools.cached_property
     def _of_a_kind(self) -> NDArray[np.int64]:
         """Number of the row and the kind of its unknown, of each place [entries]."""
         return of_a_kind(self.rows, self.columns, self._alike)
+
+    @functools.cached_property
+    def _of_missed(self) -> Mask:
+        """Entries that stand in rows which may miss something [entries]."""
+        missed = np.zeros(self.settled.rows, dtype=bool)
+        missed[self.missed] = True
+        return np.asarray(missed[self.rows])
+
+    def _members(self) -> list[Places]:
+        """Unknowns of y of each kind."""
+        return [np.flatnonzero(self.kinds == kind) for kind in np.unique(self.kinds)]
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
@@ -214,12 +218,19 @@ class Starter:
         return self._sums is not None
 
     def groups(self, *names: str) -> Mask:
-        """Rows of the named groups."""
-        return _of_groups(self.settled, names)
+        """Rows of the named groups; read-only."""
+        return self.settled.of_groups(*names)
+
+    def moves(self, kinds: Sequence[str]) -> Mask:
+        """Unknowns of these kinds [unknowns]; read-only."""
+        key = tuple(kinds)
+        if key not in self._of_kinds:
+            self._of_kinds[key] = np.isin(self.moving, key)
+        return self._of_kinds[key]
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
-        outside = ~np.isin(self.moving, kinds)
+        outside = ~self.moves(kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
         mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
@@ -290,7 +301,7 @@ class Starter:
     def _measured(self) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
         mask = np.zeros(self.n, dtype=bool)
-        own = self._structural & np.isin(self.rows, self.missed) & (self.columns < self.n)
+        own = self._structural & self._of_missed & (self.columns < self.n)
         mask[self.columns[own]] = True
         mask[self._momentum] |= mask[self._flow]
         return mask
@@ -353,12 +364,12 @@ class Starter:
         The flow of a momentum counts as state: where neither is written, both begin at zero.
         """
         jy, jyd = self.system.jacobian(t, *self.expand(x))
-        carries = self.system.differential(jyd)[: self.n] & np.isin(self.kinds, STATE)
+        carries = self.system.differential(jyd)[: self.n] & self.system.are(*STATE)[: self.n]
         pattern = self.system.pattern
         inert = pattern.columns_of()[(jy != 0.0) & self._momenta[pattern.row]]
         carries[np.intersect1d(self._flow[carries[self._momentum]], inert)] = True
         carries &= ~self.measured
-        carries |= self.given.written & np.isin(self.kinds, STATE)
+        carries |= self.given.written & self.system.are(*STATE)[: self.n]
         return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool), np.zeros(self.missed.size, dtype=bool)])
 
     def carried(self) -> Ints:
@@ -388,15 +399,14 @@ class Starter:
         values = np.abs(self.jacobian(t, x))
         free = np.abs(self.residual(t, x))
         values, free = (np.where(np.isfinite(item), item, 0.0) for item in (values, free))
-        told = values * np.isin(self.rows, self.missed)
+        told = values * self._of_missed
         values = values - told
         # how fast what follows from the state moves says nothing of its size
         sizes = ~self.groups("dynamics_rate")[self.rows]
         of = self._of_a_kind
         own = self.rows[sizes], self.columns[sizes], values[sizes]
         found = propagate(known, *own, free, self._alike, group=of[sizes], largest=largest)
-        for kind in np.unique(self.kinds):
-            members = np.flatnonzero(self.kinds == kind)
+        for members in self.system.once("members", self._members):
             found[members] = np.maximum(found[members], 1e-3 * found[members].max(initial=0.0))
         found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
         found = propagate(found, self.rows, self.columns, values, free, self._alike, group=of, largest=largest)

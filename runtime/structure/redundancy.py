@@ -53,9 +53,9 @@ def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu
     """J from the reactions of the multipliers of those kinds (virtual displacements)."""
     pattern = system.pattern
     columns = pattern.columns_of()
-    multipliers = np.setdiff1d(np.flatnonzero(system.are(*kinds)), system.idle_multipliers())
-    dynamics = system.of_groups("dynamics")
-    take = np.flatnonzero(np.isin(columns, multipliers) & dynamics[pattern.row] & (jy != 0.0))
+    idle = system.idle_multipliers()
+    multipliers, mine = system.once(("reacting", kinds, idle.tobytes()), lambda: _of(system, kinds, idle))
+    take = mine[jy[mine] != 0.0]
     which, value = np.searchsorted(multipliers, columns[take]), jy[take]
     largest = np.zeros(multipliers.size)
     np.maximum.at(largest, which, np.abs(value))
@@ -71,6 +71,14 @@ def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu
             value = value * shrink[index]
             scale *= shrink if index is which else 1.0
     return Reactions(which, place, value, multipliers, rows, scale)
+
+
+def _of(system: System, kinds: tuple[str, ...], idle: Ints) -> tuple[Longs, Longs]:
+    """Multipliers of those kinds but for the idle ones, and the places in the pattern of their reactions."""
+    multipliers = np.setdiff1d(np.flatnonzero(system.are(*kinds)), idle)
+    pattern, mine = system.pattern, np.zeros(system.unknowns, dtype=bool)
+    mine[multipliers] = True
+    return multipliers, np.flatnonzero(mine[pattern.columns_of()] & system.of_groups("dynamics")[pattern.row])
 
 
 def dependent(found: Reactions) -> Ints:
@@ -167,9 +175,7 @@ def vanished(system: System, state: ConsistentState) -> Ints:
 def _sizes(system: System, jy: Floats) -> Floats:
     """The largest entry of each row of J, as written."""
     columns = system.pattern.columns_of()
-    multipliers = np.flatnonzero(system.are("kappa", "mu"))
-    dynamics = system.of_groups("dynamics")
-    take = np.flatnonzero(np.isin(columns, multipliers) & dynamics[system.pattern.row])
+    multipliers, take = system.once("reacting", lambda: _of(system, ("kappa", "mu"), np.zeros(0, dtype=np.int32)))
     found = np.zeros(multipliers.size)
     np.maximum.at(found, np.searchsorted(multipliers, columns[take]), np.abs(jy[take]))
     return found

@@ -55,6 +55,20 @@ def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
         assert all(mine[n].nominal == other[n].nominal and mine[n].units == other[n].units for n in mine.names)
 
 
+@pytest.mark.parametrize(("name", "scene"), [("seed/slider_crank", "reference"), ("gallery/lead_filter", "charges")])
+def test_a_run_depends_on_nothing_that_ran_before(name, scene):
+    """Structures of other runs, of other forms and of one that stopped, leave no trace in it."""
+    used, fresh = (load(MODELS / f"{name}.sd", scene=scene) for _ in range(2))
+    numbers = {k: float(v) for k, v in used.parameters.items() if np.ndim(v) == 0}
+    for factor, options in ((1.02, {}), (0.98, {"index": "2"}), (1.04, {"method": "bdf"}), (1.01, {"rtol": 1e-9})):
+        used.run({k: factor * v for k, v in numbers.items()}, **options)
+    with pytest.raises(SolverFailure):
+        used.run({}, max_steps=2)
+    one, other = (model.run({k: 1.03 * v for k, v in numbers.items()}) for model in (used, fresh))
+    assert all(np.array_equal(one[n], other[n], equal_nan=True) for n in (*one.names, "audit.energy"))
+    assert (one.statistics, one.attributes["judged"]) == (other.statistics, other.attributes["judged"])
+
+
 def test_settings_of_every_kind(masses):
     """Parameters by number or text, one element, an array, an input, a size: each against its closed form."""
     model = load(masses)

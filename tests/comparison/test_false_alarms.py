@@ -28,9 +28,7 @@ SLICE = {
     "seed/mass_spring.sd reference": 4,
     "seed/lead_filter.sd reference": 4,
     "seed/solenoid.sd reference": 2,
-    "seed/thermal_two_node.sd reference": 1,
     "gallery/diode_circuit.sd mains": 1,
-    "gallery/co_circuit.sd settle": 1,
     "gallery/slider_crank.sd drive": 1,
 }
 """Scenes and how many formulations each has at least: laws, constraints, quantities without rates."""

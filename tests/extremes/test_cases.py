@@ -12,7 +12,7 @@ from judged import judge
 
 LONG = os.environ.get("SYSDYN_LONG") == "1"
 FAMILIES = families()
-EACH = 5
+EACH = 4
 """Cases of a family in the slice: both ends and between."""
 FALSELY = {
     # the ranks of the structure are cut at 1e-12 of the largest entry: reported, E516 or E903 instead of a run
