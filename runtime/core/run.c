@@ -289,7 +289,7 @@ int sd_run_drain(sd_run *run)
             return 1;
         int asked = run->next < run->instants && run->instant[run->next] <= t;
         if (asked && run->instant[run->next] < t) {
-            if (run->instant[run->next] < run->t_row + fmin(run->apart, t - run->t_from)) {
+            if (run->instant[run->next] < run->t_row + run->apart * (t - run->t_from)) {
                 run->next++;
                 continue;
             }

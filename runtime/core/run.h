@@ -41,8 +41,8 @@ typedef struct sd_run {
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
     double rough;                     /* scaled residual that will do for rows by which runs are compared and nothing else */
-    double apart;                     /* of a draft: instants nearer than this to the row before, and in its step, are
-                                         passed over; 0: none is */
+    double apart;                     /* part of a step: instants within it that are nearer to the row before are passed
+                                       * over; 0: none is */
     const double *start_rate;         /* [unknowns] yd at the (re)start, also of what the stepper does not differentiate */
     double *row;                      /* [room][SD_ROW_HEAD + 2 observed] */
     int32_t room;

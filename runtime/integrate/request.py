@@ -34,7 +34,7 @@ class Request:
     stiff_steps: dopri and energy give up
     where stability holds it to more steps than these; settled_to: scaled residual that will do for rows
     by which runs are compared and nothing else, of a draft for all, 0: round-off;
-    apart [s]: instants nearer to the last row, and within a step of it, are passed over.
+    apart: part of a step; instants within it that are nearer to the row before are passed over.
     """
 
     t_end: float

@@ -14,7 +14,7 @@ import numpy as np
 from sysdyn.runtime.events.kinks import LIVE
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import Sampled
-from sysdyn.runtime.integrate.common_instants import MOST, Thinned, beside, common, drafted, joined, known
+from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, drafted, joined, known
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
@@ -35,6 +35,9 @@ STIFF = 1e5
 
 ROUGH = 1e-2
 """Of the tolerance: scaled residual of rows by which runs are compared."""
+APART = 0.25
+"""Of a step: rows of a draft are no nearer to each other.  With one a step the rows between the steps of others are not
+seen: an amplifier then was estimated 500 times too good."""
 FORETOLD = 0.01
 """Of the span: when a forecast is made."""
 BEHIND = 1.5
@@ -140,7 +143,7 @@ class Runs:
             stiff_steps=HELD if options.method == "auto" else STIFF,
             settled_to=ROUGH * rtol if self.controlled else 0.0,
             draft=draft,
-            apart=(options.t_end - options.t_start) / MOST if draft and self.open else 0.0,
+            apart=APART if draft and self.open else 0.0,
             events=options.events or None,
             begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
