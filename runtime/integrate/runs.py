@@ -46,6 +46,9 @@ BEHIND = 1.5
 BEYOND = 100.0
 """Times its magnitude at steps: an unknown that is more within a step shows that the step passed over something."""
 
+PURE = 1e-8
+"""Angles and other pure numbers: what is round-off beside this is nothing, whatever the largest that occurs."""
+
 METERS = {
     "audit.kinetic": 2, "audit.potential": 3, "audit.dissipated": 4, "audit.supplied": 5, "audit.energy": 6,
     "audit.constraints": 7,
@@ -257,7 +260,7 @@ class Runs:
 
     def beside(self, largest: Floats, magnitude: Floats) -> Floats:
         """The largest of the unit of each stored quantity [columns], unknowns among them."""
-        of_unit: dict[str, float] = {}
+        of_unit = {"1": PURE}
         for family, first in zip(self.system.description.families, self.system.form.at, strict=False):
             if family.size and first + family.size <= magnitude.size:
                 size = float(magnitude[first : first + family.size].max())

@@ -37,3 +37,35 @@ def test_a_chain_of_twenty_comes_to_rest(formulation, tmp_path):
     assert np.abs(50.0 * np.diff(pull)).max() <= 0.05 * (1.0 + 1e-3)  # what the springs leave, friction holds
     assert np.abs(trace["audit.energy"].values).max() < 1e-4 * 0.05
     assert len(trace.events) < 400
+
+
+BOX = """
+model box {
+  param w = 0.5 m
+  coord x: translation = 0 m
+  coord y: translation = 0.1 m
+  coord th: rotation = 0 rad
+  energy T* = 1/2*2 kg*(x'^2 + y'^2) + 1/2*0.1 kg.m^2*th'^2
+  energy V = 2 kg*g0*y
+  phi f1: y - w*sin(th) >= 0 m restitution 0
+  phi f2: y - w/3*sin(th) >= 0 m restitution 0
+  phi f3: y + w/3*sin(th) >= 0 m restitution 0
+  phi f4: y + w*sin(th) >= 0 m restitution 0
+}
+scene drop of box {
+  time 0 s to 1 s
+  trace y, th, y' as v every 10 ms
+  accuracy 1e-6
+}
+"""
+
+
+def test_a_box_drops_on_four_feet_and_stays_level(tmp_path):
+    file = tmp_path / "box.sd"
+    file.write_text(BOX)
+    trace = simulate(file, output=tmp_path / "box.h5")
+    assert trace.attributes["met"] == 1
+    landed = np.sqrt(0.2 / 9.80665)
+    y = np.where(trace.time < landed, 0.1 - 0.5 * 9.80665 * trace.time**2, 0.0)
+    assert np.abs(np.asarray(trace["y"]) - y).max() < 1e-12
+    assert np.abs(np.asarray(trace["th"])).max() < 1e-30
