@@ -23,6 +23,8 @@ Values = NDArray[np.complex128]
 DIGITS = 120
 NOTHING = 1e-80
 """A pivot, in DIGITS: what is below is zero."""
+DEPENDENT = 1e-60
+"""Of a row, in DIGITS: what is left of it is round-off."""
 ZERO = 1e-40
 """An eigenvalue relative to the largest entry, in DIGITS."""
 STEADY = 1e-11
@@ -100,6 +102,30 @@ def solved(matrix: Wide, aim: Wide) -> Wide | None:
     if not all(size):
         return None
     return _eliminated(np.hstack([matrix, aim]) / np.array(size, dtype=object)[:, None], matrix.shape[1])
+
+
+def independent(columns: Wide, groups: tuple[NDArray[np.int64], ...]) -> NDArray[np.int64]:
+    """Rows of a matrix [m, k] that are independent, as many as there are of the first group first; of a
+    group the one of which most is left of its own, relative to its size; ascending within a group.
+    """
+    left = columns.copy()
+    size = np.array([max((abs(x) for x in row), default=0) for row in left], dtype=object)
+    kept: list[int] = []
+    for group in groups:
+        first = len(kept)
+        members = [int(k) for k in group if size[k] > 0]
+        while members and len(kept) < left.shape[1]:
+            share = [max(abs(x) for x in left[k]) / size[k] for k in members]
+            if max(share) < DEPENDENT:
+                break
+            row = members.pop(int(np.argmax(share)))
+            column = int(np.argmax(np.abs(left[row])))
+            left = left - np.outer(left[:, column], left[row] / left[row, column])
+            # what is eliminated is zero to the last digit, and the column stands for this row
+            left[:, column] = 0
+            kept.append(row)
+        kept[first:] = sorted(kept[first:])
+    return np.array(kept, dtype=np.int64)
 
 
 def decompose(matrix: Wide) -> Decomposed:
