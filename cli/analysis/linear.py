@@ -41,8 +41,9 @@ from sysdyn.runtime.linear.tangent import (
     quadratures,
     reduced,
     rows_at,
+    widely_reduced,
 )
-from sysdyn.runtime.linear.witness import CONTRAST, Witness, spread, witness
+from sysdyn.runtime.linear.witness import CONTRAST, Witness, agrees, spread, witness
 from sysdyn.runtime.model.forms import FORMS, Form
 from sysdyn.runtime.model.system import System
 
@@ -164,9 +165,13 @@ def _witnessed(
     if seen is not None and pencil is not None and (small is None or seen.contradicts(_values(small))):
         if seen.certain:
             small = _in_many_digits(found, pencil, loose, seen.states)
-            if small is None or seen.contradicts(_values(small)):
-                raise why or _contradicted(seen)
-        elif spread(pencil.e, pencil.a) > CONTRAST:
+            lasting = small is not None and not seen.contradicts(_values(small))
+        else:
+            other = _chosen_in_many_digits(found, rows, by_input, out, labels)
+            held = [part for part in (small, other) if part is not None and agrees(pencil.e, pencil.a, _values(part))]
+            doubtful = spread(pencil.e, pencil.a) > CONTRAST or not _singular(pencil)
+            small, lasting = held[0] if held else small, bool(held) or not doubtful
+        if not lasting:
             raise why or _contradicted(seen)
     if small is None:
         assert why is not None
@@ -183,6 +188,25 @@ def _contradicted(seen: Witness) -> NoLinearisation:
         f"{cause}: sizes of elements are too many decades apart; another --formulation may hold them, "
         "or leave out the elements whose time constants are farthest from the rest"
     )
+
+
+def _chosen_in_many_digits(
+    found: Found, rows: Rows, by_input: tuple[Array, ...], out: Outputs, labels: tuple[str, ...]
+) -> Reduced | None:
+    """The reduction by the rows that hold, its states chosen in many digits; None where there is none."""
+    try:
+        return widely_reduced(rows, found.system, found.state, by_input, out, labels, loose_of(found))
+    except NoLinearisation:
+        return None
+
+
+def _singular(form: Descriptor) -> bool:
+    """Whether the pencil leaves unknowns open, in double precision."""
+    try:
+        motions(form.e, form.a)
+    except NoLinearisation:
+        return True
+    return False
 
 
 def _values(small: Reduced) -> NDArray[np.complex128]:

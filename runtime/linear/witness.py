@@ -3,8 +3,8 @@
     det(s E - A) = c_m s^m + ... + c_k s^k
 
 has as many roots as its degree m, k of them at zero, and the product of the others is (-1)^(m - k) c_k/c_m: far out the
-determinant is its first term, near zero its last one.  Taken in DIGITS no state is chosen and no small entry lost beside
-a large one: a reduction that lost a mode contradicts it.  Where it moves with the round-off of the entries themselves,
+determinant is its first term, near zero its last one.  Taken in DIGITS no state is chosen, no small entry lost beside a
+large one: a reduction that lost a mode contradicts it.  Where it moves with the round-off of the entries themselves,
 these do not hold the modes: sums at a node are rounded before anything is asked of them.
 """
 
@@ -15,7 +15,7 @@ from typing import Any
 
 import mpmath
 import numpy as np
-from sysdyn.runtime.linear.precise import DETERMINED, Values, shaken
+from sysdyn.runtime.linear.precise import DETERMINED, Values, shaken, subtract
 from sysdyn.runtime.model.description import Floats
 
 LARGEST = 120
@@ -27,6 +27,9 @@ CANCELLED = 1e-200
 """Of the terms of a difference: it is zero.  A pencil of index 4 cancels to the fourth power of FAR."""
 AGREE = 1e-6
 """Relative difference of the products of eigenvalues."""
+BEYOND, SHIFT = 3, 0.7391
+"""Decades beyond the eigenvalues in which determinants are compared at each, and their distance farther out; of the
+points, so that none is an eigenvalue."""
 CONTRAST = 1e10
 """Ratio of entries from which a sum of them (the conductances at a node) loses one to round-off."""
 
@@ -52,7 +55,8 @@ class Witness:
         moving = values[values != 0.0]
         if values.size != self.states or values.size - moving.size != self.zeros:
             return True
-        return abs(float(np.log(np.abs(moving)).sum()) - self.size) > AGREE + (10.0 * self.loose if self.certain else 0.0)
+        close = AGREE + (10.0 * self.loose if self.certain else 0.0)
+        return abs(float(np.log(np.abs(moving)).sum()) - self.size) > close
 
 
 def witness(e: Floats, a: Floats) -> Witness | None:
@@ -66,6 +70,32 @@ def witness(e: Floats, a: Floats) -> Witness | None:
         return None
     same = (one.states, one.zeros) == (other.states, other.zeros)
     return replace(one, loose=abs(one.size - other.size) if same else np.inf)
+
+
+def agrees(e: Floats, a: Floats, values: Values) -> bool:
+    """Whether det(s E - A) is a constant times the product of s - values, wherever round-off of the entries leaves it
+    certain, and that is so beyond the fastest and below the slowest of them that is not zero.
+    """
+    moving = np.abs(values[values != 0.0])
+    if not moving.size:
+        return False
+    first, last = (int(np.floor(np.log10(x))) for x in (moving.min(), moving.max()))
+    with mpmath.workdps(DIGITS):
+        points = range(first - BEYOND, last + BEYOND + 1)
+        outside = (*range(-FAR, points[0], BEYOND), *range(FAR, points[-1], -BEYOND))
+        found = {s: part for s in (*points, *outside) if (part := _certain(e, a, s, values)) is not None}
+    constant = list(found.values())
+    outer = min(found, default=0) < first and max(found, default=0) > last + 1
+    return outer and sum(s in points for s in found) > len(points) // 2 and max(constant) - min(constant) <= DETERMINED
+
+
+def _certain(e: Floats, a: Floats, power: int, values: Values) -> float | None:
+    """Logarithm of |det(s E - A)| less those of |s - values| near s = 10^power; None where round-off moves it."""
+    s = SHIFT * mpmath.mpf(10) ** power
+    one, other = (_log_determinant(*part, s) for part in ((e, a), (shaken(e), shaken(a, 4))))
+    if one is None or other is None or abs(one - other) > DETERMINED:
+        return None
+    return float(one - sum(mpmath.log(abs(s - mpmath.mpmathify(complex(value)))) for value in values))
 
 
 def spread(e: Floats, a: Floats) -> float:
@@ -82,7 +112,7 @@ def _witness(e: Floats, a: Floats) -> Witness | None:
 
 
 def _term(e: Floats, a: Floats, power: int) -> tuple[int, Any] | None:
-    """Exponent of the term of the determinant that stands alone at 10^power and beyond, logarithm of its coefficient."""
+    """Exponent of the term of the determinant that is alone at 10^power and beyond, logarithm of its coefficient."""
     near, beyond = (_log_determinant(e, a, mpmath.mpf(10) ** p) for p in (power, power + np.sign(power)))
     if near is None or beyond is None:
         return None
@@ -92,9 +122,11 @@ def _term(e: Floats, a: Floats, power: int) -> tuple[int, Any] | None:
 
 
 def _log_determinant(e: Floats, a: Floats, s: Any) -> Any:
-    """log |det(s E - A)| by Gauss's elimination of the shortest row by its largest entry; None where it is zero."""
-    rows = {i: {int(j): s * float(e[i, j]) - float(a[i, j]) for j in np.flatnonzero((e[i] != 0) | (a[i] != 0))}
-            for i in range(e.shape[0])}
+    """Logarithm of |det(s E - A)| by Gauss's elimination of the shortest row by its largest entry; None if zero."""
+    places = (e != 0.0) | (a != 0.0)
+    rows = {
+        i: {int(j): s * float(e[i, j]) - float(a[i, j]) for j in np.flatnonzero(places[i])} for i in range(len(e))
+    }
     total = mpmath.mpf(0)
     while rows:
         row = rows.pop(min(rows, key=lambda i: len(rows[i])))
@@ -105,17 +137,6 @@ def _log_determinant(e: Floats, a: Floats, s: Any) -> Any:
         total += mpmath.log(abs(pivot))
         for other in rows.values():
             if column in other:
-                _subtract(other, row, other.pop(column) / pivot)
+                subtract(other, row, other.pop(column) / pivot, CANCELLED)
     return total
 
-
-def _subtract(row: dict[int, Any], pivots: dict[int, Any], factor: Any) -> None:
-    """row := row - factor pivots, without what cancels."""
-    for j, value in pivots.items():
-        term = factor * value
-        old = row.get(j, mpmath.mpf(0))
-        new = old - term
-        if abs(new) > CANCELLED * max(abs(old), abs(term)):
-            row[j] = new
-        else:
-            row.pop(j, None)
