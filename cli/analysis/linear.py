@@ -25,11 +25,12 @@ from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
-from sysdyn.runtime.linear.pencil import motions, surely_parted
+from sysdyn.runtime.linear.pencil import motions, surely_parted, widely_parted
 from sysdyn.runtime.linear.tangent import (
     NoLinearisation,
     Outputs,
     Reduced,
+    Rows,
     Wide,
     candidates_of,
     chosen_states,
@@ -40,7 +41,9 @@ from sysdyn.runtime.linear.tangent import (
     quadratures,
     reduced,
     rows_at,
+    widely_reduced,
 )
+from sysdyn.runtime.linear.witness import CONTRAST, Witness, agrees, spread, witness
 from sysdyn.runtime.model.forms import FORMS, Form
 from sysdyn.runtime.model.system import System
 
@@ -128,21 +131,7 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     by_input = tuple(
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
-    loose = loose_of(found)
-    still = constant(system, state) or not moving(system, state)  # the pencil of the form as written is right too
-    try:
-        small = reduced(rows, system, state, by_input, out, labels, loose)
-    except NoLinearisation:
-        if not still:
-            raise
-        small = None
-    if still and (small is None or _fewer(found, small)):
-        small = _of_pencil(found, _descriptor(system, found, slopes, out, labels), loose)
-    assert small is not None
-    if small.unsure is not None and still:  # the pencil may know it better
-        small = _surer(small, found, _descriptor(system, found, slopes, out, labels), loose)
-    if small.unsure is not None:
-        precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), lost)
+    small = _witnessed(found, rows, slopes, by_input, out, labels)
     own = modes(small.a, small.decomposed)
     stores, energies = _energies(found, small, own, names)
     kept = _asked(found, names)
@@ -153,6 +142,118 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     transfers = tuple(_transfer(small, i, j) for i, j in pairs)
     moves = _felt_moves(system, small, found)
     return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves, stores, energies)
+
+
+def _witnessed(
+    found: Found,
+    rows: Rows,
+    slopes: Sequence[Sensitivity],
+    by_input: tuple[Array, ...],
+    out: Outputs,
+    labels: tuple[str, ...],
+) -> Reduced:
+    """The reduction; of linear equations one that the pencil's determinant does not contradict.  NoLinearisation."""
+    system, loose, small, why = found.system, loose_of(found), None, None
+    fixed = constant(system, found.state)
+    still = fixed or not moving(system, found.state)  # the pencil of the form as written is right too
+    pencil = _descriptor(system, found, slopes, out, labels) if still else None
+    try:
+        small = _reduced(found, rows, by_input, out, labels, loose, pencil)
+    except NoLinearisation as error:
+        why = error
+    seen = witness(pencil.e, pencil.a) if fixed and pencil is not None else None
+    if seen is not None and pencil is not None and (small is None or seen.contradicts(_values(small))):
+        if seen.certain:
+            small = _in_many_digits(found, pencil, loose, seen.states)
+            lasting = small is not None and not seen.contradicts(_values(small))
+        else:
+            other = _chosen_in_many_digits(found, rows, by_input, out, labels)
+            held = [part for part in (small, other) if part is not None and agrees(pencil.e, pencil.a, _values(part))]
+            doubtful = spread(pencil.e, pencil.a) > CONTRAST or not _singular(pencil)
+            small, lasting = held[0] if held else small, bool(held) or not doubtful
+        if not lasting:
+            raise why or _contradicted(seen)
+    if small is None:
+        assert why is not None
+        raise why
+    return small
+
+
+def _contradicted(seen: Witness) -> NoLinearisation:
+    """What is said where the modes found are not those of the equations."""
+    cause = "the modes found are not those of the equations"
+    if not seen.certain:
+        cause = "the entries of the equations, rounded, do not hold all modes"
+    return NoLinearisation(
+        f"{cause}: sizes of elements are too many decades apart; another --formulation may hold them, "
+        "or leave out the elements whose time constants are farthest from the rest"
+    )
+
+
+def _chosen_in_many_digits(
+    found: Found, rows: Rows, by_input: tuple[Array, ...], out: Outputs, labels: tuple[str, ...]
+) -> Reduced | None:
+    """The reduction by the rows that hold, its states chosen in many digits; None where there is none."""
+    try:
+        return widely_reduced(rows, found.system, found.state, by_input, out, labels, loose_of(found))
+    except NoLinearisation:
+        return None
+
+
+def _singular(form: Descriptor) -> bool:
+    """Whether the pencil leaves unknowns open, in double precision."""
+    try:
+        motions(form.e, form.a)
+    except NoLinearisation:
+        return True
+    return False
+
+
+def _values(small: Reduced) -> NDArray[np.complex128]:
+    return np.array([mode.eigenvalue for mode in modes(small.a, small.decomposed)], dtype=np.complex128)
+
+
+def _in_many_digits(found: Found, form: Descriptor, loose: NDArray[np.bool_], states: int) -> Reduced | None:
+    """The reduction of the pencil with its states chosen in many digits; None where it is too large for that."""
+    system, n = found.system, found.system.form.written
+    known = candidates_of(system, found.state, n)
+    shown = system.kinds[known] == "q"
+    groups = (known[shown & ~loose[known]], known[~shown & ~loose[known]], known[loose[known]])
+    matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
+    try:
+        small = widely_parted(matrices, (*groups, np.arange(n, len(form.states))), states)
+    except NoLinearisation:
+        return None
+    if small is None:
+        return None
+    names = tuple(form.states[int(k)] for k in small.places)
+    return replace(small, names=names, places=np.where(small.places < n, small.places, -1))
+
+
+def _reduced(
+    found: Found,
+    rows: Rows,
+    by_input: tuple[Array, ...],
+    out: Outputs,
+    labels: tuple[str, ...],
+    loose: NDArray[np.bool_],
+    pencil: Descriptor | None,
+) -> Reduced:
+    """The reduction by the rows that hold, or by the pencil where that holds too and knows more.  NoLinearisation."""
+    system, small = found.system, None
+    try:
+        small = reduced(rows, system, found.state, by_input, out, labels, loose)
+    except NoLinearisation:
+        if pencil is None:
+            raise
+    if pencil is not None and (small is None or _fewer(found, small)):
+        small = _of_pencil(found, pencil, loose)
+    assert small is not None
+    if small.unsure is not None and pencil is not None:  # the pencil may know it better
+        small = _surer(small, found, pencil, loose)
+    if small.unsure is not None:
+        precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), lost)
+    return small
 
 
 def _asked(found: Found, names: Sequence[str]) -> list[int]:

@@ -9,6 +9,8 @@ from inputs alone.  With S = [E V, A W]^-1 the pencil falls apart (Berger, Ilchm
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.linear import precise
@@ -138,16 +140,60 @@ def surely_parted(
     values, others = (precise.eigenvalues(part.a) for part in (small, again))
     if precise.steady(values, others):
         return small
-    if 0 < chosen.size <= precise.MOST and e.shape[0] <= WIDEST:
-        with precise.digits():
-            found, beside = (_parted_widely(part, chosen) for part in (matrices, (*other, *rest)))
-            if found is not None and beside is not None:
-                seen = precise.settled(precise.decompose(found[0]), precise.decompose(beside[0]).values, lost)
-                a, b, c, d, d1, d2 = (precise.narrow(part) for part in found)
-                wide = Wide(found[0], found[1], found[2], found[3], Wide(beside[0], beside[1], beside[2], beside[3]))
-                return Reduced(a, b, c, d, d1, d2, chosen, names, wide, seen)
+    found = _decided(matrices, (*other, *rest), chosen)
+    if found is not None:
+        return replace(found, names=names)
     precise.refuse_lost(values, others, lost)
     return small
+
+
+def widely_parted(matrices: tuple[Floats, ...], groups: tuple[Choice, ...], states: int) -> Reduced | None:
+    """The same in many digits alone, states among the unknowns of the groups [k], the first group first; without names.
+
+    None where it is too large, or the groups do not hold as many.  Raises NoLinearisation as above.
+    """
+    if not 0 < states <= precise.MOST or matrices[0].shape[0] > WIDEST:
+        return None
+    with precise.digits():
+        if (powers := _powers(matrices)) is None:
+            return None
+        spanned = powers[2] @ precise.wide(np.random.default_rng(1).standard_normal((powers[2].shape[0], states)))
+        chosen = precise.independent(spanned, groups)
+    e, a, *rest = matrices
+    return _decided(matrices, (precise.shaken(e), precise.shaken(a), *rest), chosen) if chosen.size == states else None
+
+
+def _decided(matrices: tuple[Floats, ...], other: tuple[Floats, ...], chosen: Choice) -> Reduced | None:
+    """The reduction in many digits, where it can be taken; other: the matrices with their round-off changed."""
+    if not 0 < chosen.size <= precise.MOST or matrices[0].shape[0] > WIDEST:
+        return None
+    with precise.digits():
+        found, beside = (_parted_widely(part, chosen) for part in (matrices, other))
+        if found is None or beside is None:
+            return None
+        seen = precise.settled(precise.decompose(found[0]), precise.decompose(beside[0]).values, lost)
+        a, b, c, d, d1, d2 = (precise.narrow(part) for part in found)
+        wide = Wide(found[0], found[1], found[2], found[3], Wide(beside[0], beside[1], beside[2], beside[3]))
+        return Reduced(a, b, c, d, d1, d2, chosen, (), wide, seen)
+
+
+def _powers(matrices: tuple[Floats, ...]) -> tuple[precise.Wide, precise.Wide, precise.Wide] | None:
+    """M, N and the power of M of `_parted_widely`; None where the pencil is singular."""
+    e, a, b = (precise.wide(part) for part in matrices[:3])
+    column = _units(matrices)
+    e, a = e * column, a * column
+    if (both := precise.solved(a - SHIFT * _size(matrices) * e, np.hstack([e, b]))) is None:
+        return None
+    m, nu = both[:, : e.shape[0]], both[:, e.shape[0] :]
+    power = m
+    for _ in range(DOUBLINGS):
+        power = power @ power
+    return m, nu, power
+
+
+def _units(matrices: tuple[Floats, ...]) -> Floats:
+    """Of the unknowns [n]: powers of two, which change no digit."""
+    return np.asarray(2.0 ** np.round(np.log2(factors(matrices[0], matrices[1])[1])), dtype=np.float64)
 
 
 def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precise.Wide, ...] | None:
@@ -158,17 +204,13 @@ def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precis
 
     where X is 1 in the chosen places.  None where round-off hides how many motions there are.
     """
-    e, a, b, c, cd, d = (precise.wide(part) for part in matrices)
-    column = 2.0 ** np.round(np.log2(factors(matrices[0], matrices[1])[1]))  # powers of two change no digit
-    e, a, c, cd = (part * column for part in (e, a, c, cd))
-    n, states = e.shape[0], chosen.size
-    shift = SHIFT * _size(matrices)
-    if (both := precise.solved(a - shift * e, np.hstack([e, b]))) is None:
+    c, cd, d = (precise.wide(part) for part in matrices[3:])
+    column, shift = _units(matrices), SHIFT * _size(matrices)
+    c, cd = (part * column for part in (c, cd))
+    n, states = matrices[0].shape[0], chosen.size
+    if (powers := _powers(matrices)) is None:
         return None
-    m, nu = both[:, :n], both[:, n:]
-    power = m
-    for _ in range(DOUBLINGS):
-        power = power @ power
+    m, nu, power = powers
     random = np.random.default_rng(1)
     spanned = power @ precise.wide(random.standard_normal((n, states)))
     seen = precise.wide(random.standard_normal((states, n))) @ power

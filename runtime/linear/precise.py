@@ -23,6 +23,10 @@ Values = NDArray[np.complex128]
 DIGITS = 120
 NOTHING = 1e-80
 """A pivot, in DIGITS: what is below is zero."""
+UNCERTAIN = 1e-2
+"""Relative change with the round-off of G (ten times a true one) from which a difference is round-off."""
+DEPENDENT = 1e-60
+"""Of a row, in DIGITS: what is left of it is round-off."""
 ZERO = 1e-40
 """An eigenvalue relative to the largest entry, in DIGITS."""
 STEADY = 1e-11
@@ -100,6 +104,103 @@ def solved(matrix: Wide, aim: Wide) -> Wide | None:
     if not all(size):
         return None
     return _eliminated(np.hstack([matrix, aim]) / np.array(size, dtype=object)[:, None], matrix.shape[1])
+
+
+def free(
+    matrix: Floats, again: Floats, units: NDArray[np.float64], groups: tuple[NDArray[np.int64], ...]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Columns of a matrix [m, n] that its null space leaves free, and rows that determine the others; again: with its
+    round-off changed, units [n]: of the unknowns.  Of columns in no group as few are free as can be, then of each
+    group, the last one's first to be free.  What the change of round-off moves in its first digits is no pivot.
+    """
+    rows = {i: _pairs(one, other, units) for i, (one, other) in enumerate(zip(matrix, again, strict=True))}
+    rest = np.setdiff1d(np.arange(matrix.shape[1]), np.concatenate(groups))
+    left: list[int] = []
+    used: list[int] = []
+    for group in (rest, *groups):
+        members = {int(k) for k in group}
+        while (found := _largest(rows, members)) is not None:
+            place, column = found
+            used.append(place)
+            pivots = rows.pop(place)
+            pivot = pivots.pop(column)
+            for row in rows.values():
+                if column in row:
+                    _subtract_pairs(row, pivots, row.pop(column), pivot)
+            members.remove(column)
+        left += members
+    return np.array(sorted(left), dtype=np.int64), np.array(sorted(used), dtype=np.int64)
+
+
+Pair = tuple[Any, Any]
+
+
+def _pairs(one: Floats, other: Floats, units: NDArray[np.float64]) -> dict[int, Pair]:
+    """The entries of a row that are not zero, and what they are with the round-off changed."""
+    pair = np.stack([one, other]) * units
+    return {int(j): (mpmath.mpf(float(pair[0, j])), mpmath.mpf(float(pair[1, j]))) for j in np.flatnonzero(one)}
+
+
+def _largest(rows: dict[int, dict[int, Pair]], columns: set[int]) -> tuple[int, int] | None:
+    """Row and column of the entry in these columns that is largest beside the others of its row, of all rows."""
+    best, found = 0.0, None
+    for i, row in rows.items():
+        inside = [j for j in row if j in columns]
+        if inside:
+            column = max(inside, key=lambda j: abs(row[j][0]))
+            share = float(abs(row[column][0]) / max(abs(x[0]) for x in row.values()))
+            if share > best:
+                best, found = share, (i, column)
+    return found
+
+
+def _subtract_pairs(row: dict[int, Pair], pivots: dict[int, Pair], above: Pair, pivot: Pair) -> None:
+    """Row := row - above/pivot pivots, without what round-off decides."""
+    factor = above[0] / pivot[0], above[1] / pivot[1]
+    none = mpmath.mpf(0), mpmath.mpf(0)
+    for j, value in pivots.items():
+        old = row.get(j, none)
+        one, other = (old[k] - factor[k] * value[k] for k in (0, 1))
+        if abs(one - other) < UNCERTAIN * abs(one) and abs(one) > NOTHING * abs(old[0]):
+            row[j] = one, other
+        else:
+            row.pop(j, None)
+
+
+def subtract(row: dict[int, Any], pivots: dict[int, Any], factor: Any, nothing: float) -> None:
+    """Row := row - factor pivots, without what cancels to this part of its terms."""
+    for j, value in pivots.items():
+        term = factor * value
+        old = row.get(j, mpmath.mpf(0))
+        new = old - term
+        if abs(new) > nothing * max(abs(old), abs(term)):
+            row[j] = new
+        else:
+            row.pop(j, None)
+
+
+def independent(columns: Wide, groups: tuple[NDArray[np.int64], ...]) -> NDArray[np.int64]:
+    """Rows of a matrix [m, k] that are independent, as many as there are of the first group first; of a
+    group the one of which most is left of its own, relative to its size; ascending within a group.
+    """
+    left = columns.copy()
+    size = np.array([max((abs(x) for x in row), default=0) for row in left], dtype=object)
+    kept: list[int] = []
+    for group in groups:
+        first = len(kept)
+        members = [int(k) for k in group if size[k] > 0]
+        while members and len(kept) < left.shape[1]:
+            share = [max(abs(x) for x in left[k]) / size[k] for k in members]
+            if max(share) < DEPENDENT:
+                break
+            row = members.pop(int(np.argmax(share)))
+            column = int(np.argmax(np.abs(left[row])))
+            left = left - np.outer(left[:, column], left[row] / left[row, column])
+            # what is eliminated is zero to the last digit, and the column stands for this row
+            left[:, column] = 0
+            kept.append(row)
+        kept[first:] = sorted(kept[first:])
+    return np.array(kept, dtype=np.int64)
 
 
 def decompose(matrix: Wide) -> Decomposed:

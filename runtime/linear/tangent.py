@@ -35,6 +35,8 @@ from sysdyn.runtime.start.starter import Starter
 
 LARGEST = 1500
 """Unknowns and rates up to which full matrices are taken."""
+WIDEST = 150
+"""Unknowns and rates up to which states are chosen in many digits."""
 NOISE = 1e-13
 """Of the largest variation, in equilibrated unknowns: what is smaller is round-off of the solution."""
 PASSES, MOVES = 2, 1e-13
@@ -237,28 +239,85 @@ def reduced(
     values, others = (np.linalg.eigvals(part) for part in (small.a, made(_moved(again, right, chosen, moves)).a))
     if precise.steady(values[values != 0.0], others[others != 0.0]):
         return small
-    return _widened(small, made, (g, again, right, chosen, moves))
+    if small.names and (found := _widened(len(small.names), made, (g, again, right, chosen, moves))) is not None:
+        return found
+    return replace(small, unsure=made(_moved(again, right, chosen, moves), NOISE).a)
+
+
+def widely_reduced(
+    rows: Rows,
+    system: System,
+    state: ConsistentState,
+    by_input: tuple[Floats, ...],
+    out: Outputs,
+    names: tuple[str, ...],
+    loose: Mask,
+) -> Reduced | None:
+    """The same with the states chosen in many digits too; None where it is too large or round-off decides their number.
+
+    Raises NoLinearisation.
+    """
+    starter = rows.starter
+    g = rows.jacobian[rows.holds]
+    if g.shape[1] > WIDEST:
+        return None
+    known = candidates_of(system, state, starter.n)
+    shown = system.kinds[known] == "q"
+    groups = (known[loose[known]], known[~shown & ~loose[known]], known[shown & ~loose[known]])
+    units = factors(g)[1]
+    again = precise.shaken(g)
+    with precise.digits():
+        left, used = precise.free(g, again, units, groups)
+    states = np.isin(left, known)
+    chosen, held = left[states], left[~states]
+    if _follow(g[used], left, states, units, _rates(starter, system, chosen)):
+        return None
+    # what the rows leave open beside the states (redundant multipliers) is held
+    still = np.zeros((held.size, g.shape[1]))
+    still[np.arange(held.size), held] = 1.0
+    g, again = (np.vstack([part[used], still]) for part in (g, again))
+    right = np.zeros((g.shape[0], chosen.size + ORDERS * len(names)))
+    right[: used.size, chosen.size :] = -starter.with_sums(np.hstack(by_input))[rows.holds][used]
+    rates = _rates(starter, system, chosen)
+
+    def made(moved: NDArray[Any], noise: float) -> Reduced:
+        return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose, noise)
+
+    return _widened(chosen.size, made, (g, again, right, chosen, units))
+
+
+def _follow(g: Floats, left: NDArray[np.int64], states: Mask, units: Floats, rates: NDArray[np.int64]) -> bool:
+    """Whether the rates of states [k] move with what is free [left] and no state: constraints are hidden deeper."""
+    if states.all():
+        return False
+    with precise.digits():
+        found = _moved_widely(g, np.zeros((g.shape[0], left.size)), left, units)
+    if found is None:
+        return True
+    moved = np.abs(precise.narrow(found)[rates][:, ~states]) * units[left[~states]] / units[rates][:, None]
+    return bool((moved > TOLERANCE).any())
 
 
 def _widened(
-    small: Reduced,
+    states: int,
     made: Callable[[NDArray[Any], float], Reduced],
     given: tuple[Floats, Floats, Floats, NDArray[np.int64], Floats],
-) -> Reduced:
-    """The reduction in many digits, where its states are few and the rows determine all; else as it is, unsure."""
+) -> Reduced | None:
+    """The reduction in many digits, where its states are few and the rows determine all."""
     g, again, right, chosen, moves = given
-    if small.names and len(small.names) <= precise.MOST:
-        with precise.digits():
-            one, other = (_moved_widely(part, right, chosen, moves) for part in (g, again))
-            if one is not None and other is not None:
-                found, beside = (made(part, precise.NOTHING) for part in (one, other))
-                parts = _wide(found, _wide(beside))
-                values = precise.decompose(np.asarray(beside.a, dtype=object)).values
-                seen = precise.settled(precise.decompose(parts.a), values, lost)
-                matrices = (found.a, found.b, found.c, found.d, found.d1, found.d2)
-                a, b, c, d, d1, d2 = map(precise.narrow, matrices)
-                return Reduced(a, b, c, d, d1, d2, found.places, found.names, parts, seen)
-    return replace(small, unsure=made(_moved(again, right, chosen, moves), NOISE).a)
+    if not 0 < states <= precise.MOST:
+        return None
+    with precise.digits():
+        one, other = (_moved_widely(part, right, chosen, moves) for part in (g, again))
+        if one is None or other is None:
+            return None
+        found, beside = (made(part, precise.NOTHING) for part in (one, other))
+        parts = _wide(found, _wide(beside))
+        values = precise.decompose(np.asarray(beside.a, dtype=object)).values
+        seen = precise.settled(precise.decompose(parts.a), values, lost)
+        matrices = (found.a, found.b, found.c, found.d, found.d1, found.d2)
+        a, b, c, d, d1, d2 = map(precise.narrow, matrices)
+        return Reduced(a, b, c, d, d1, d2, found.places, found.names, parts, seen)
 
 
 def _wide(small: Reduced, beside: Wide | None = None) -> Wide:

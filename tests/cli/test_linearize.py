@@ -444,6 +444,32 @@ def test_random_networks_have_the_eigenvalues_of_a_nodal_tableau(formulation, tm
     assert worst < CLOSE, worst
 
 
+LOST = """
+model contrasts {
+  node n1, n2, n3: electrical
+  l0: kinetic(p = 38103.838624862277 H*f) n1 -> ground
+  r1: dissipator(e = 376797.26089776639 ohm*f) n2 -> ground
+  c2: potential(q = 1.3060954446401942 F*e) n3 -> n2
+  r3: dissipator(e = 1.2050549116913142e-07 ohm*f) n1 -> n3
+  c4: potential(q = 31.936590008723126 F*e) n1 -> n3
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ALL)
+def test_no_mode_is_lost_where_elements_are_twelve_decades_apart(formulation, tmp_path, capsys):
+    """Eigenvalues of its nodal pencil in 120 digits; co_ forms add up what is at a node in doubles, and may refuse."""
+    path = str(write(tmp_path, LOST))
+    code, found = run_json(capsys, "linearize", path, "--formulation", formulation, "--backend", "numpy")
+    if code:
+        assert formulation.startswith("co_")
+        assert [d["code"] for d in found["diagnostics"] if d["severity"] == "error"] == ["E607"]
+        return
+    expected = np.array([-259839.1696955404, -9.88869355609092, -2.0319706817345224e-06])
+    ours = np.sort([v.real for v in values(found["result"]["eigenvalues"]) if v != 0])
+    assert ours == pytest.approx(expected, rel=1e-7)
+
+
 # -- the command -------------------------------------------------------------------------------------------------------
 
 
