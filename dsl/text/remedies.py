@@ -91,7 +91,7 @@ REMEDIES = {
     "E604": "one family of statements: sysdyn help formulations",
     "E605": "the law solved for the other variable",
     "E606": "leave the formulation to 'auto'",
-    "E607": "leave it to 'auto'",
+    "E607": "leave it to 'auto', or what the reason names",
     "E608": "sysdyn explain E608",
     "E701": "a comparison of something that moves: when x >= a { ... }",
     "E702": "a discrete variable, a state, or the rate x' of a coordinate",

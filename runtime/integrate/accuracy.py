@@ -1,9 +1,10 @@
 """An accuracy asked for, met by an estimate of the global error.
 
-A draft is followed by a run at the tolerance that should do, a tenth of the draft's, and both are compared at instants
-of the draft's own rows; a run behind them at instants of the last one's.  With error ~ tolerance^p the error of the
-finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as measured over three runs, at most what the
-method's law credits.  Where the estimate misses what was asked, a finer run follows and is compared with the last one.
+A draft is followed by a run at the tolerance that should do, a tenth of the draft's or, where that took many steps,
+less, and both are compared at instants of the draft's own rows; a run behind them at instants of the last one's.
+With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
+measured over three runs, at most what the method's law credits.  Where the estimate misses what was asked, a finer run
+follows and is compared with the last one.
 The finest run is handed back with its estimate.
 Each run finds the magnitudes of its unknowns for itself: those that an earlier run met late would hide what is small
 early and grows.  Two runs that took the same steps say nothing: a third takes steps of half the length elsewhere.
@@ -318,8 +319,9 @@ def _finer(run: Run, last: Sampled, tolerance: float, longest: float, *, compare
             tried += 1
             if _limited(failure) or (not compared and tried == len(RETRIED)):
                 raise
-        if not compared:  # there is nothing to hand back yet: a little finer, where luck is another
-            tolerance *= WORTH
+        if not compared:  # there is nothing to hand back yet: as coarse as will do, else a little finer
+            coarse = RATIO * last.tolerance
+            tolerance = coarse if tolerance < WORTH * coarse and tried == 1 else WORTH * tolerance
             continue
         tolerance = float(np.sqrt(tolerance * last.tolerance))
         if tolerance > WORTH * last.tolerance:

@@ -10,9 +10,10 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern
 
-DENSE = 8
+DENSE = 16
 """Largest dense matrix: above, the matrices of models are so sparse that the sparse LU is the cheaper one (measured on
-twelve models of 8 to 150 unknowns: steps of radau by up to 46 %, of the bdf by up to 23 %)."""
+twelve models of 8 to 150 unknowns: steps of radau by up to 46 %, of the bdf by up to 23 %); below, little is
+gained, and full pivoting is the safer one near singular positions."""
 LEAVING = 50
 """The same of matrices whose columns may be left without a pivot, which the dense LU alone does."""
 SMALL = 200

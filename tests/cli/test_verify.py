@@ -152,6 +152,8 @@ REFUSED = ("benchmark/ring.sd",)
 UNMET = ("benchmark/tube.sd",)
 """Scenes at which one of the methods says that it has not reached the accuracy: roots at flows through zero, in bdf."""
 
+WARNED = ("gallery/piston_pump.sd",)
+"""Models whose index kane cannot tell at the start, where both valves are closed and nothing flows."""
 SINGULAR = ("benchmark/fourbar.sd",)
 """Scenes that pass positions in which constraints lose rank: radau stops there and says so, bdf passes."""
 
@@ -192,7 +194,7 @@ def test_every_scene_agrees(file, scene, capsys):
     else:
         assert code == 0, errors
     assert found["result"]["horizon"] == found["result"]["runs"][0]["reached"]
-    assert all(not r["warnings"] for r in found["result"]["runs"])
+    assert file in WARNED or all(not r["warnings"] for r in found["result"]["runs"])
 
 
 # --- what is wrong is found -------------------------------------------------------------------------------------------
