@@ -26,18 +26,19 @@ CONTINUES = frozenset(
 )
 """Terminals after which a line may end without ending the statement."""
 
-_NUMBER = r"[0-9]++(?:\.[0-9]++)?+(?:[eE][+-]?[0-9]++)?+"
+# groups are not possessive: Python up to 3.11.4 loses its place where such a group begins and fails (gh-106052)
+_NUMBER = r"[0-9]++(?:\.[0-9]++)?(?:[eE][+-]?[0-9]++)?"
 _NAME = r"[^\W\d]\w*+"
-_FACTOR = rf"{_NAME}(?:\^-?[0-9]++)?+"
+_FACTOR = rf"{_NAME}(?:\^-?[0-9]++)?"
 _TOKEN = re.compile(
     rf"[ \t]*+(?:({_NAME})|({_NUMBER})|(;|[\r\n][ \t\r\n]*+)|(#[^\r\n]*+)|(\"[^\"\r\n]*+\")"
     r"|(->|:=|==|!=|<=|>=|\.\.|[-+*/^=<>~:,.()\[\]{}'$]))"
 )
 _UNIT = re.compile(
     r"[ \t]++(?!(?:then|else|and|or|not|in|for|to|at|on|of|as|within|while|restitution|every)\b)"
-    rf"({_FACTOR}(?:[./]{_FACTOR})*+)"
+    rf"({_FACTOR}(?:[./]{_FACTOR})*)"
 )
-_GLUED = re.compile(rf"{_FACTOR}(?:[./]{_FACTOR})*+")
+_GLUED = re.compile(rf"{_FACTOR}(?:[./]{_FACTOR})*")
 _FUNCTION = re.compile(r"(?:T\*|V\*|T|V|D|G)(?![\w*])")
 _BLANK = re.compile(r"[ \t]*+")
 _WORDS = (

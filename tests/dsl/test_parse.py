@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gc
 import math
+import re
 import subprocess
 import sys
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
+from sysdyn.dsl.parser import lexing, recovery
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import ModelError
 from sysdyn.dsl.text.source import SourceText, Span
@@ -290,3 +292,11 @@ def test_parsing_needs_neither_lark_nor_time():
     program = "import sys, sysdyn.dsl.parser.parse; print('lark' in sys.modules, 'numpy' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["False", "False"]
+
+
+@pytest.mark.parametrize("module", [lexing, recovery])
+def test_no_group_of_a_pattern_is_possessive(module):
+    """Python 3.11.2 of Debian 12 loses its place where such a group begins and fails: `1..n` was an error there."""
+    patterns = [item.pattern for item in vars(module).values() if isinstance(item, re.Pattern)]
+    assert patterns
+    assert not [pattern for pattern in patterns if re.search(r"[^\\]\)[?*+]\+", pattern)]
