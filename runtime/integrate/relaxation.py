@@ -20,13 +20,7 @@ RUNGS, RATIO = 4, 1e-3
 
 def order(system: System, values: Floats) -> Ints | None:
     """Elimination order of a form's matrices [unknowns], found once a description; values [entries]: a typical one."""
-    known, key = system.description.orders, (system.form.name, system.left_out)
-    found = known.get(key)
-    if found is None:
-        found = column_order(system.pattern, values, leaving=bool(system.form.scales))
-        if found is not None:
-            known[key] = found
-    return found
+    return system.once("order", lambda: column_order(system.pattern, values, leaving=bool(system.form.scales)))
 
 
 def displacement(system: System, jy: Floats, jyd: Floats, yd: Floats) -> Callable[[float], Floats]:

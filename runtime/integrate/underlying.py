@@ -66,7 +66,7 @@ class Underlying:
             self._in_matrix, self._source, self._from_rate, self.pattern
         ) = system.once("selection", self._select)  # fmt: skip
         self._systems()
-        order = column_order(self.pattern, self.values(jy, jyd))
+        order = system.once("order of accelerations", lambda: column_order(self.pattern, self.values(jy, jyd)))
         self._order = order
         self.linear = lib.core.sd_linear_new(
             self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))

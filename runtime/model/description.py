@@ -133,8 +133,8 @@ class Initial:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts, orders: of the index
-    forms made so far (model/system.py, integrate/relaxation.py), which need be found once; branches: places in p of
+    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts: what follows from
+    the structure of the index forms made so far, found once (System.once); branches: places in p of
     laws that may slide (events/kinks.py); systems: those of runs one after the other that share p, by index form.
     """
 
@@ -148,7 +148,6 @@ class Description:
     branches: tuple[int, ...] = ()
     systems: dict[Any, Any] | None = field(default=None, compare=False)
     layouts: dict[Any, Any] = field(default_factory=dict, compare=False)
-    orders: dict[Any, Ints] = field(default_factory=dict, compare=False, init=False)
 
     def families_of(self, kind: str) -> tuple[int, ...]:
         """Numbers of the families of one kind."""
@@ -271,9 +270,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
     before: Description | None = layouts.get("last") if binding.get("alone") else None
     if before is not None:
         before.p[:] = binding["p"]
-        found = replace(before, initial=initial)
-        found.orders.update(before.orders)
-        return found
+        return replace(before, initial=initial)
     found = Description(
         families=own_families,
         rows=own_rows,

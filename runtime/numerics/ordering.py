@@ -35,9 +35,10 @@ def least_degree(pattern: Pattern) -> Ints:
     """The columns [unknowns], each that whose elimination can fill least; sets of columns are bits of integers."""
     n, columns = pattern.unknowns, pattern.columns_of()
     rows: dict[int, int] = {}
+    holding: list[set[int]] = [set() for _ in range(n)]
     for row, column in zip(pattern.row.tolist(), columns.tolist(), strict=True):
         rows[row] = rows.get(row, 0) | 1 << column
-    holding = [{row for row, mask in rows.items() if mask >> c & 1} for c in range(n)]
+        holding[column].add(row)
 
     def degree(c: int) -> int:
         reached = 0

@@ -138,7 +138,7 @@ class Settler:
         return values
 
     def _allocate(self) -> None:
-        order = column_order(self.pattern, self._typical())
+        order = self.system.once("saddle order", lambda: column_order(self.pattern, self._typical()))
         self._order = order
         self.linear = lib.core.sd_linear_new(
             self.pattern.unknowns,

@@ -76,6 +76,7 @@ def test_sparse_and_dense_give_the_same(library, monkeypatch):
     dense, _, integration = end(system, rtol=1e-8)
     assert integration.linear.contents.dense
     monkeypatch.setattr(ordering, "DENSE", 0)
+    system = System(MANIFEST, chain.binding(8), library, "2")
     sparse, _, integration = end(system, rtol=1e-8)
     assert integration.linear.contents.sparse
     assert integration.linear.contents.pivotings >= 1
