@@ -30,6 +30,7 @@ static inline double sd_size(sd_number x)
 #define sd_sparse_pivot sd_sparse_z_pivot
 #define sd_sparse_refactor sd_sparse_z_refactor
 #define sd_sparse_solve sd_sparse_z_solve
+#define sd_sparse_basic sd_sparse_z_basic
 #else
 
 typedef double sd_number;

@@ -8,6 +8,7 @@
 
 #define ITERATIONS 7       /* of Newton a step */
 #define PATIENT 30         /* the same where the step is fixed: nothing is gained by giving up early */
+#define TRIES 2            /* failures in a step behind which corrections are shortened: a smaller step is the cheaper remedy */
 #define DAMPED 15          /* with corrections shortened */
 #define WALK 45            /* with whole ones: back down an exponential of all digits, one 1/a each, and a few more */
 #define SAFETY 0.9
@@ -596,7 +597,7 @@ int sd_radau_step(sd_radau *radau)
             cause = iterate(radau, failures > 1 || leap == 1, &iterations, &retry);
         }
         int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
-        if (stuck && leap != 1 && radau->system->scales > 0) {
+        if (stuck && leap != 1 && radau->system->scales > 0 && failures >= TRIES) {
             sd_radau_extrapolate(radau, radau->h);
             cause = iterate_damped(radau, &iterations);
             fresh = 1;

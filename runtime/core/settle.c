@@ -14,7 +14,12 @@
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define HELD 1e8        /* weight of the state in a second attempt */
 #define DRAWN 1e-7      /* weight from which an unknown is drawn to where it came from */
+#define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
+#define STILL 1e-12     /* move of the state, in magnitudes, that is none */
+#define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
+
+enum { NONE, MATRIX, BASIS };
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
 {
@@ -49,8 +54,34 @@ void sd_settle_free(sd_settle *settle)
 {
     if (!settle)
         return;
+    sd_sparse_free(settle->basis);
+    free(settle->lift);
     free(settle->memory);
     free(settle);
+}
+
+int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
+                    const int32_t *place_y, const int32_t *place_yd)
+{
+    int32_t n = settle->unknowns + settle->rates;
+    settle->basis = sd_sparse_new(n, settle->rows, column, row, order);
+    settle->lift = calloc((size_t)n + (size_t)column[settle->rows] + 1, sizeof(double));
+    if (!settle->basis || !settle->lift)
+        return 2;
+    settle->basis->null_pivot = LEAST_PIVOT;
+    settle->basis_column = column;
+    settle->basis_row = row;
+    settle->basis_y = place_y;
+    settle->basis_yd = place_yd;
+    settle->basis_value = settle->lift + n;
+    for (int32_t j = 0; j < n; j++)
+        settle->lift[j] = 1.0 / settle->weight[j];
+    return 0;
+}
+
+int *sd_settle_pivoted(sd_settle *settle)
+{
+    return settle->basis ? &settle->basis->pivoted : NULL;
 }
 
 /* largest scaled residual at (t, x) */
@@ -73,15 +104,14 @@ static double measure(sd_settle *settle, double t, const double *y, const double
     return worst;
 }
 
-/* row scales from the magnitudes of the terms, the saddle-point matrix and its factors at (t, y, yd) */
-static int factorise(sd_settle *settle, double t, const double *y, const double *yd)
+/* slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms */
+static void slopes(sd_settle *settle, double t, const double *y, const double *yd)
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
     sd_jacobian(system, t, y, yd, settle->jy, settle->jyd);
     memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
-    memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
-    settle->ready = 0;
+    settle->ready = NONE;
     for (int32_t j = 0; j < n + rates; j++) { /* magnitudes grow with what is met */
         double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
         if (size > settle->scale[j] && isfinite(size))
@@ -101,6 +131,15 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
         settle->row_scale[i] = settle->sort[i] == SD_LEFT_OUT   ? 0.0
                                : settle->row_scale[i] > 0.0 ? 1.0 / settle->row_scale[i]
                                                             : 1.0;
+}
+
+/* the saddle-point matrix and its factors at (t, y, yd) */
+static int factorise(sd_settle *settle, double t, const double *y, const double *yd)
+{
+    sd_system *system = settle->system;
+    int32_t n = settle->unknowns, rates = settle->rates;
+    slopes(settle, t, y, yd);
+    memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
     for (int32_t e = 0; e < system->entries; e++) {
         double scale = settle->row_scale[system->row[e]];
         double a = settle->jy[e] * scale, b = settle->jyd[e] * scale;
@@ -120,7 +159,91 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
     if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
         sd_linear_factor(settle->linear, settle->matrix, NULL))
         return 1;
-    settle->ready = 1;
+    settle->ready = MATRIX;
+    return 0;
+}
+
+/* the basis at (t, y, yd) */
+static int choose(sd_settle *settle, double t, const double *y, const double *yd)
+{
+    const sd_system *system = settle->system;
+    int32_t entries = settle->basis_column[settle->rows];
+    double *value = settle->basis_value;
+    slopes(settle, t, y, yd);
+    memset(value, 0, (size_t)entries * sizeof *value);
+    for (int32_t e = 0; e < system->entries; e++) {
+        double scale = settle->row_scale[system->row[e]];
+        int32_t a = settle->basis_y[e], b = settle->basis_yd[e];
+        if (a >= 0)
+            value[a] += settle->jy[e] * scale * settle->lift[settle->basis_row[a]];
+        if (b >= 0)
+            value[b] += settle->jyd[e] * scale * settle->lift[settle->basis_row[b]];
+    }
+    if (sd_first_bad(entries, value) >= 0)
+        return 1;
+    sd_sparse *lu = settle->basis;
+    if ((!lu->pivoted || sd_sparse_refactor(lu, settle->basis_column, settle->basis_row, value)) &&
+        sd_sparse_pivot(lu, settle->basis_column, settle->basis_row, value))
+        return 1;
+    settle->ready = BASIS;
+    return 0;
+}
+
+/* One Newton step within the basis; the largest moves of all and of the state, in magnitudes. */
+static double move_basic(sd_settle *settle, double *y, double *yd, double *state)
+{
+    int32_t n = settle->unknowns, moves = n + settle->rates;
+    double largest = 0.0, *b = settle->matrix; /* the matrix is made anew where it is wanted */
+    for (int32_t i = 0; i < settle->rows; i++)
+        b[i] = -settle->r[i] * settle->row_scale[i];
+    sd_sparse_basic(settle->basis, b, settle->step, b + settle->rows);
+    for (int32_t j = 0; j < moves; j++) {
+        double move = settle->step[j] *= settle->lift[j];
+        largest = fmax(largest, fabs(move));
+        if (settle->weight[j] >= DRAWN)
+            *state = fmax(*state, fabs(move));
+    }
+    for (int32_t j = 0; j < n; j++)
+        y[j] += settle->step[j] * settle->scale[j];
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
+    return largest;
+}
+
+/* The iteration within the basis from (y, yd) = x0: 1 where it settled and the state stayed, the residual in `best`;
+ * else the point is as it was. */
+static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
+{
+    double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
+    int fresh = settle->ready != BASIS, failed = fresh && choose(settle, t, y, yd);
+    double before = failed ? INFINITY : measure(settle, t, y, yd);
+    settle->drift = settle->constraints;
+    for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
+        if (before <= limit && (m == 0 || moved < SMALL))
+            break;
+        double pulled = 0.0;
+        moved = move_basic(settle, y, yd, &pulled);
+        state += pulled;
+        double now = measure(settle, t, y, yd);
+        failed = !isfinite(now) || state > still;
+        if (!failed && moved < SMALL && now > 0.5 * before && now <= (fresh ? CLOSE : FINE)) {
+            before = now; /* round-off is what is left */
+            break;
+        }
+        if (!failed && now > CONTRACTS * before && now > fmax(FINE, limit)) {
+            failed = choose(settle, t, y, yd);
+            fresh = 1;
+        }
+        before = now;
+    }
+    *best = before;
+    if (!failed && before <= fmax(FINE, settle->enough)) {
+        settle->refused = 0;
+        return 1;
+    }
+    settle->basis->pivoted = 0; /* another one may do */
+    settle->refused++;
+    settle->ready = NONE;
     return 0;
 }
 
@@ -153,7 +276,7 @@ static double move(sd_settle *settle, double *y, double *yd)
 static void iterate(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
     int32_t n = settle->unknowns;
-    int fresh = !settle->ready, failed = fresh && factorise(settle, t, y, yd);
+    int fresh = settle->ready != MATRIX, failed = fresh && factorise(settle, t, y, yd);
     double moved = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     *best = before;
     settle->drift = settle->constraints;
@@ -189,6 +312,16 @@ static void put(const sd_settle *settle, const double *x, double *y, double *yd)
         yd[settle->rate[k]] = x[settle->unknowns + k];
 }
 
+/* what the point makes of other unknowns, and its residuals */
+static void finish(sd_settle *settle, double t, double *y, double *yd, int done)
+{
+    for (int32_t i = 0; done && i < settle->system->held; i++)
+        y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    measure(settle, t, y, yd);
+}
+
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
 {
     int32_t n = settle->unknowns;
@@ -197,6 +330,13 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
     memcpy(settle->x0, y, (size_t)n * sizeof *y);
     for (int32_t k = 0; k < settle->rates; k++)
         settle->x0[n + k] = yd[settle->rate[k]];
+    if (settle->basis && settle->hold == 1.0 && settle->refused < REFUSALS) {
+        if (follow(settle, t, y, yd, &best)) {
+            finish(settle, t, y, yd, 1);
+            return 0;
+        }
+        put(settle, settle->x0, y, yd);
+    }
     iterate(settle, t, y, yd, &best);
     if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
@@ -212,10 +352,6 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
     if (!done)
         put(settle, settle->x0, y, yd);
     settle->failures += !done;
-    for (int32_t i = 0; done && i < settle->system->held; i++)
-        y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
-    for (int32_t i = 0; i < settle->kinematics; i++)
-        yd[settle->k_q[i]] = y[settle->k_f[i]];
-    measure(settle, t, y, yd);
+    finish(settle, t, y, yd, done);
     return !done;
 }

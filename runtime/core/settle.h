@@ -7,12 +7,16 @@
  *      [ G  -eps ] [ lambda ] = [ -r          ]
  * in scaled unknowns z and rows): unknowns that carry the state have weight 1, those that follow from it almost
  * none.  eps makes redundant rows harmless.  The factors are kept from point to point while the iteration contracts.
+ * Where the state meets its own rows already, nothing of it has to move, and a basic solution of G z = -r is the same
+ * thing at a fraction of the cost: the unknowns that follow pivot first (`basis`).  One that moves the state by more
+ * than is asked is not taken.
  */
 #ifndef SYSDYN_SETTLE_H
 #define SYSDYN_SETTLE_H
 
 #include "assembly.h"
 #include "linear.h"
+#include "sparse.h"
 
 enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
 
@@ -31,9 +35,15 @@ typedef struct sd_settle {
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;
     double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;
+    sd_sparse *basis;                /* of G^T, its rows over the weights: what follows pivots first; or NULL */
+    const int32_t *basis_column, *basis_row;      /* its pattern: [rows + 1], unknowns and rates of each row */
+    const int32_t *basis_y, *basis_yd;            /* [entries] places of dF/dy, dF/dyd in it, -1: none */
+    double *lift, *basis_value;      /* [unknowns + rates] 1 / weight; [entries of the pattern] */
     double hold;                     /* weight of the state; 1 but in a second attempt */
     double enough;                   /* scaled residual with which a draft is content; 0: round-off */
-    int32_t ready;
+    double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ */
+    int32_t ready;                   /* whose factors stand: 0 none, else of the matrix or the basis */
+    int32_t refused;                 /* attempts by the basis that led nowhere */
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
                                         rate of another; norm of the constraint rows */
     int64_t calls, failures;
@@ -41,6 +51,11 @@ typedef struct sd_settle {
 } sd_settle;
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);
+/* The basis: pattern of G^T, order of its columns, the rows; places as above.  2: no memory. */
+int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
+                    const int32_t *place_y, const int32_t *place_yd);
+/* whether a pattern of the basis exists; NULL without one */
+int *sd_settle_pivoted(sd_settle *settle);
 void sd_settle_free(sd_settle *settle);
 /* y, yd [unknowns] moved in place; 0 done, 1 it did not converge (they are unchanged) */
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);

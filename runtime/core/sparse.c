@@ -22,17 +22,18 @@ void sd_sparse_free(sd_sparse *lu)
     free(lu);
 }
 
-sd_sparse *sd_sparse_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order)
+sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const int32_t *row, const int32_t *order)
 {
     sd_sparse *lu = calloc(1, sizeof *lu);
     if (!lu)
         return NULL;
-    size_t m = (size_t)n;
+    size_t m = (size_t)n, all = (size_t)rows;
     lu->n = n;
+    lu->rows = rows;
     lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
-    lu->order = calloc(7 * m + 1, sizeof(int32_t));
+    lu->order = calloc(2 * m + 5 * all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    lu->diagonal = calloc(2 * m + 1, sizeof(sd_number));
+    lu->diagonal = calloc(m + all + 1, sizeof(sd_number));
     lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
     lu->u_row = malloc((size_t)lu->u_room * sizeof(int32_t));
     lu->l_value = malloc((size_t)lu->l_room * sizeof(sd_number));
@@ -41,12 +42,12 @@ sd_sparse *sd_sparse_new(int32_t n, const int32_t *column, const int32_t *row, c
         sd_sparse_free(lu);
         return NULL;
     }
-    lu->place = lu->order + m;
-    lu->source = lu->order + 2 * m;
-    lu->stack = lu->order + 3 * m;
-    lu->head = lu->order + 4 * m;
-    lu->mark = lu->order + 5 * m;
-    lu->count = lu->order + 6 * m;
+    lu->source = lu->order + m;
+    lu->place = lu->source + m;
+    lu->stack = lu->place + all;
+    lu->head = lu->stack + all;
+    lu->mark = lu->head + all;
+    lu->count = lu->mark + all;
     lu->u_start = lu->l_start + m + 1;
     lu->x = lu->diagonal + m;
     memcpy(lu->order, order, m * sizeof *order);
@@ -58,7 +59,7 @@ sd_sparse *sd_sparse_new(int32_t n, const int32_t *column, const int32_t *row, c
 /* rows reached from column c through the columns of L found so far: stack[top..n) in the order of elimination */
 static int32_t reach(sd_sparse *lu, const int32_t *column, const int32_t *row, int32_t c, int32_t stamp)
 {
-    int32_t top = lu->n;
+    int32_t top = lu->rows;
     for (int32_t e = column[c]; e < column[c + 1]; e++) {
         int32_t depth = 0;
         if (lu->mark[row[e]] == stamp)
@@ -113,10 +114,10 @@ static int32_t choose(const sd_sparse *lu, int32_t top, double *largest)
 {
     int32_t best = -1;
     *largest = 0.0;
-    for (int32_t i = top; i < lu->n; i++)
+    for (int32_t i = top; i < lu->rows; i++)
         if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
             *largest = sd_size(lu->x[lu->stack[i]]);
-    for (int32_t i = top; i < lu->n && *largest > 0.0; i++) {
+    for (int32_t i = top; i < lu->rows && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
         if (lu->place[r] >= 0 || sd_size(lu->x[r]) < THRESHOLD * *largest)
             continue;
@@ -128,18 +129,18 @@ static int32_t choose(const sd_sparse *lu, int32_t top, double *largest)
 
 int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
-    int32_t n = lu->n;
+    int32_t n = lu->n, rows = lu->rows;
     int64_t nl = 0, nu = 0;
     lu->pivoted = 0;
     lu->smallest = 1.0;
-    for (int32_t i = 0; i < n; i++) {
+    for (int32_t i = 0; i < rows; i++) {
         lu->place[i] = -1;
         lu->mark[i] = -1;
         lu->x[i] = 0.0;
     }
     for (int32_t k = 0; k < n; k++) {
         int32_t c = lu->order[k];
-        if (grow(nl + n - k, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
+        if (grow(nl + rows - k, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
             return 2;
         lu->l_start[k] = (int32_t)nl;
         lu->u_start[k] = (int32_t)nu;
@@ -150,7 +151,7 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
             size = fmax(size, sd_size(value[e]));
         }
         /* eliminate with the finished columns, in order */
-        for (int32_t i = top; i < n; i++) {
+        for (int32_t i = top; i < rows; i++) {
             int32_t r = lu->stack[i], j = lu->place[r];
             if (j < 0)
                 continue;
@@ -163,13 +164,23 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         double largest;
         int32_t pivot = choose(lu, top, &largest);
         double relative = size > 0.0 ? largest / size : 0.0;
+        if (relative < lu->null_pivot) { /* it follows from the others */
+            for (int32_t i = top; i < rows; i++)
+                lu->x[lu->stack[i]] = 0.0;
+            nu = lu->u_start[k];
+            lu->source[k] = -1;
+            lu->diagonal[k] = INFINITY;
+            lu->l_start[k + 1] = (int32_t)nl;
+            lu->u_start[k + 1] = (int32_t)nu;
+            continue;
+        }
         if (relative < lu->smallest) {
             lu->smallest = relative;
             lu->bad_column = c;
             lu->bad_row = pivot;
         }
         if (pivot < 0 || !isfinite(largest)) {
-            for (int32_t r = 0; r < n && pivot < 0; r++)
+            for (int32_t r = 0; r < rows && pivot < 0; r++)
                 if (lu->place[r] < 0)
                     lu->bad_row = pivot = r;
             lu->bad_column = c;
@@ -179,7 +190,7 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         lu->diagonal[k] = diagonal;
         lu->place[pivot] = k;
         lu->source[k] = pivot;
-        for (int32_t i = top; i < n; i++) {
+        for (int32_t i = top; i < rows; i++) {
             int32_t r = lu->stack[i];
             if (lu->place[r] < 0) {
                 lu->l_row[nl] = r;
@@ -190,8 +201,18 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         lu->l_start[k + 1] = (int32_t)nl;
         lu->u_start[k + 1] = (int32_t)nu;
     }
-    for (int64_t p = 0; p < nl; p++)
-        lu->l_row[p] = lu->place[lu->l_row[p]];
+    for (int32_t r = 0; r < rows && rows > n; r++)
+        if (lu->place[r] < 0)
+            lu->place[r] = n;
+    int64_t kept = 0, p = 0;
+    for (int32_t k = 0; k < n; k++) { /* in the numbers of the pivots, without rows that have none */
+        for (; p < lu->l_start[k + 1]; p++) {
+            lu->l_row[kept] = lu->place[lu->l_row[p]];
+            lu->l_value[kept] = lu->l_value[p];
+            kept += lu->l_row[kept] < n;
+        }
+        lu->l_start[k + 1] = (int32_t)kept;
+    }
     lu->pivoted = 1;
     return 0;
 }
@@ -202,6 +223,8 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     lu->smallest = 1.0;
     for (int32_t k = 0; k < lu->n; k++) {
         int32_t c = lu->order[k];
+        if (lu->source[k] < 0)
+            continue;
         for (int32_t e = column[c]; e < column[c + 1]; e++)
             x[lu->place[row[e]]] += value[e];
         for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++) {
@@ -225,11 +248,12 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
         double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
         lu->smallest = fmin(lu->smallest, relative);
         if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
-            memset(x, 0, (size_t)lu->n * sizeof *x);
+            memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);
             lu->pivoted = 0;
             return 1;
         }
     }
+    x[lu->n] = 0.0;
     return 0;
 }
 
@@ -245,5 +269,22 @@ void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work)
         x[lu->order[k]] = v;
         for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
             work[lu->u_row[p]] -= lu->u_value[p] * v;
+    }
+}
+
+void sd_sparse_basic(const sd_sparse *lu, const sd_number *b, sd_number *x, sd_number *work)
+{
+    memset(x, 0, (size_t)lu->rows * sizeof *x);
+    for (int32_t k = 0; k < lu->n; k++) {
+        sd_number v = b[lu->order[k]];
+        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
+            v -= lu->u_value[p] * work[lu->u_row[p]];
+        work[k] = v / lu->diagonal[k];
+    }
+    for (int32_t k = lu->n - 1; k >= 0; k--) {
+        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
+            work[k] -= lu->l_value[l] * work[lu->l_row[l]];
+        if (lu->source[k] >= 0)
+            x[lu->source[k]] = work[k];
     }
 }

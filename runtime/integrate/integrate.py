@@ -43,6 +43,9 @@ PROJECTED = ("1", "0")
 CRAWL = 200_000
 """Steps after which a run must have got CREPT of the span further: else it would take for ever."""
 CREPT = 1e-7
+SLACK = 0.1
+"""Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change:
+unknowns of one constraint are interpolated differently (core/radau_dense.c)."""
 UNRESOLVED = 8.0
 """Times what round-off leaves open of an unknown: the least that its error test asks for."""
 ROOM = 4096
@@ -83,6 +86,7 @@ class Integration:
         contacts = request.events.contacts if request.events is not None else ()
         rated = bool(contacts) and "dynamics_rate" in system.description.blocks
         self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
+        self.settler.core.contents.slack = SLACK * request.tolerance
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         stops = None if request.fixed_step else request.stops
         self.segments = segments(start.t, request.t_end, stops)

@@ -60,6 +60,11 @@ class Request:
     draft: bool = False
     apart: float = 0.0
 
+    @property
+    def tolerance(self) -> float:
+        """What the error test compares with: radau's estimate is of a lower order (core/radau.h)."""
+        return 0.1 * self.rtol ** (2.0 / 3.0) if self.method == "radau" else self.rtol
+
 
 @dataclass(frozen=True, slots=True)
 class Statistics:

@@ -238,7 +238,7 @@ class Batch:
         zero = [lib.core.sd_linear_pivoted(made.linear)]
         for settler in settlers:
             states += self._settled(settler)
-            zero.append(lib.core.sd_linear_pivoted(settler.linear))
+            zero += [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
         if made.underlying is not None:
             states.append((c.addressof(made.underlying.core.contents), c.sizeof(lib.Underlying)))
         if made.method._complex:
@@ -283,7 +283,8 @@ class Batch:
         jy, jyd = settled.jacobian(self.start.t, a[:n], b[:n])
         core.hold, core.ready = HELD, 0
         many.smallest = settler.linear.contents.smallest
-        regions, number = self._regions(self._settled(settler), [lib.core.sd_linear_pivoted(settler.linear)])
+        factors = [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
+        regions, number = self._regions(self._settled(settler), factors)
         many.start, many.region, many.regions = c.addressof(core), c.addressof(regions), number
         self._alive += [settler, settled]
         many.y0, many.yd0 = self._kept(y.copy()), self._kept(yd.copy())

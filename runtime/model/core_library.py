@@ -134,6 +134,8 @@ def _load() -> Any:
         "sd_energy_stepper": (_P, [_P]),
         "sd_energy_start": (None, [_P, _D, _P, _P, _D]),
         "sd_settle_new": (c.POINTER(Settle), [_P, _P, _I]),
+        "sd_settle_widen": (c.c_int, [_P] * 6),
+        "sd_settle_pivoted": (_P, [_P]),
         "sd_settle_free": (None, [_P]),
         "sd_settle_point": (c.c_int, [_P, _D, _P, _P]),
         "sd_least_norm_new": (c.POINTER(LeastNorm), [_P, _P, _I, _I]),

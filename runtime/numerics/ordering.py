@@ -68,6 +68,21 @@ def least_degree(pattern: Pattern) -> Ints:
     return np.array(found, dtype=np.int32)
 
 
+def tall_order(pattern: Pattern) -> Ints:
+    """Elimination order [unknowns] of the columns of a matrix that has more rows than columns."""
+    if pattern.unknowns <= SMALL:
+        return least_degree(pattern)
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    shape = (pattern.rows, pattern.unknowns)
+    matrix = csc_array((np.ones(pattern.entries), pattern.row, pattern.column), shape=shape)
+    squares = csc_array(matrix.T @ matrix)
+    squares.setdiag(squares.sum(axis=0) + 1.0)  # dominant: no pivoting spoils the order
+    found = splu(squares, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return np.argsort(found.perm_c).astype(np.int32)
+
+
 def _library(pattern: Pattern, values: Floats) -> Ints:
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu

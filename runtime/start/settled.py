@@ -13,7 +13,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.ordering import column_order
+from sysdyn.runtime.numerics.ordering import column_order, tall_order
 
 LIGHT = 1e-3
 """Weight (of squares) of displacements without inertia: they follow those that have some."""
@@ -150,15 +150,36 @@ class Settler:
         if not self.core:
             raise MemoryError
         core = self.core.contents
+        core.weight = lib.pointer(self._weight)
+        self._widen()
         core.rate = lib.pointer(self.rates)
         names = ("slot_y", "slot_y_t", "slot_yd", "slot_yd_t", "slot_x", "slot_r")
         for name, slot in zip(names, self._slots, strict=True):
             setattr(core, name, lib.pointer(slot))
-        core.weight = lib.pointer(self._weight)
         core.sort = lib.pointer(self._sort)
         core.k_q, core.k_f = (lib.pointer(item) for item in self._k)
         core.kinematics = self._k[0].size
         lib.reader(core.scale, self._moves)[:] = self.scale
+
+    def _basis(self) -> tuple[Pattern, list[Ints], Ints]:
+        """Pattern of G^T, the places of dF/dy and dF/dyd in it, the order of its columns."""
+        pattern = self.system.pattern
+        columns, rows = pattern.columns_of(), pattern.row.astype(np.int64)
+        rate_at = np.full(self._n, -1, dtype=np.int64)
+        rate_at[self.rates] = self._n + np.arange(self.rates.size)
+        with_rate = rate_at[columns] >= 0
+        parts = [Places(columns, rows), Places(rate_at[columns[with_rate]], rows[with_rate])]
+        found, slots = compress(self._moves, self.system.rows, parts)
+        full = np.full(pattern.entries, -1, dtype=np.int32)
+        full[with_rate] = slots[1]
+        return found, [slots[0], full], tall_order(found)
+
+    def _widen(self) -> None:
+        self._wide = self.system.once("basis", self._basis)
+        pattern, slots, order = self._wide
+        arrays = (pattern.column, pattern.row, order, *slots)
+        if lib.core.sd_settle_widen(self.core, *(lib.pointer(item) for item in arrays)):
+            raise MemoryError
 
     @property
     def address(self) -> int:

@@ -1,0 +1,63 @@
+"""A point settles onto its rows: by a basis where the state may stay, by the least change where it has to move."""
+
+import chain_model as chain
+import numpy as np
+import pytest
+from sysdyn.runtime.integrate.integrate import Integration, Request
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import consistent_start
+
+MANIFEST = {"structure": chain.structure()}
+NEVER = 1 << 20
+
+
+@pytest.fixture
+def settler():
+    """Of a chain of four links, and its consistent start (y, yd)."""
+    system = System(MANIFEST, chain.binding(4), load(chain.Chain), "2")
+    state = consistent_start(system, 0.0)
+    integration = Integration(system, state, Request(0.1, np.array([0.1]), index=2))
+    found = integration.settler
+    found.core.contents.slack = 0.0
+    n = found.system.unknowns
+    return found, integration.y[:n].copy(), integration.yd[:n].copy(), integration
+
+
+def both(settler, y, yd):
+    """Settled with the basis, and by the least change alone: (values, whether the basis did it) of each."""
+    core = settler.core.contents
+    found = []
+    for refused in (0, NEVER):
+        core.refused, core.ready = refused, 0
+        a, b, fine = settler.settle(0.0, y, yd)
+        assert fine
+        found.append((a.copy(), b.copy()))
+    core.refused = 0
+    return found
+
+
+def test_what_follows_from_the_state_is_the_same_by_both_ways(settler):
+    settler, y, yd, _ = settler
+    rng = np.random.default_rng(1)
+    follows = settler._weight[: y.size] < 1e-7
+    moved = y + follows * 0.1 * settler.scale[: y.size] * rng.normal(size=y.size)
+    (a, ad), (b, bd) = both(settler, moved, yd)
+    size = settler.scale[: y.size]
+    assert np.abs(a - b).max() <= 1e-11 * size.max() and np.abs((a - y)[~follows]).max() == 0.0
+    assert np.abs((a - y) / size).max() < 1e-11  # where it came from: the start is consistent
+    assert np.abs(ad - bd)[settler.rates].max() <= 1e-10 * max(np.abs(bd).max(), 1.0)
+
+
+def test_a_state_off_its_constraints_moves_least_unless_slack_is_given(settler):
+    settler, y, yd, _ = settler
+    state = settler._weight[: y.size] >= 1e-7
+    off = y + state * 1e-3 * settler.scale[: y.size]
+    (a, _), (b, _) = both(settler, off, yd)
+    assert np.array_equal(a, b)
+    assert np.abs((b - off)[state]).max() > 1e-5 * settler.scale[: y.size][state].max()
+    settler.core.contents.slack, settler.core.contents.ready = 1.0, 0
+    c, _, fine = settler.settle(0.0, off, yd)
+    assert fine and settler.core.contents.residual < 1e-12
+    least, basic = (np.linalg.norm(((x - off) / settler.scale[: y.size])[state]) for x in (b, c))
+    assert least <= basic * (1.0 + 1e-6) and basic < 10.0 * least
