@@ -96,6 +96,7 @@ class System:
         self.starter: Any = None
         """What the start was sought in (start/starter.py), where it may serve again."""
         self._keep: list[Any] = []
+        self._own: dict[Hashable, Any] = {}
         self._assemble()
 
     def once(self, name: Hashable, make: Callable[[], Found]) -> Found:
@@ -104,6 +105,12 @@ class System:
         if key not in self.description.layouts:
             self.description.layouts[key] = make()
         return self.description.layouts[key]  # type: ignore[no-any-return]
+
+    def own(self, name: Hashable, make: Callable[[], Found]) -> Found:
+        """What is made of this system's structures in the core, whatever the numbers: once for all runs it serves."""
+        if name not in self._own:
+            self._own[name] = make()
+        return self._own[name]  # type: ignore[no-any-return]
 
     @property
     def unknowns(self) -> int:
@@ -265,7 +272,10 @@ class System:
         return read_only(in_y), read_only(in_rate)
 
     def observer(self, block: str) -> lib.Call | None:
-        """A call of observe, observe_rate, observe_scale or audit whose rows begin at 0."""
+        """A call of observe, observe_rate, observe_scale or audit whose rows begin at 0; None where there is none."""
+        return self.own(("observer", block), lambda: self._observer(block))
+
+    def _observer(self, block: str) -> lib.Call | None:
         if block not in self.description.blocks:
             return None
         table, number = self.observed_rows(block)

@@ -1,0 +1,115 @@
+#include "magnitudes.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SWEEPS 8
+#define SMALL 1e-3      /* of the largest coefficient of its row and kind: it proposes much, and is asked last */
+#define NOTHING 1e-280  /* less is no magnitude */
+
+/* the larger, or what is no number */
+static double larger(double a, double b)
+{
+    return a >= b || isnan(a) ? a : b;
+}
+
+static double smaller(double a, double b)
+{
+    return a <= b || isnan(a) ? a : b;
+}
+
+int sd_propagate(const sd_balance *m, const double *size, const double *excited, int32_t flags, double *found)
+{
+    size_t n = (size_t)m->unknowns, rows = (size_t)m->rows;
+    int open = 0;
+    for (size_t k = 0; k < n; k++)
+        open |= found[k] == 0.0;
+    if (!open)
+        return 0;
+    double *memory = calloc((size_t)m->groups + rows + n + (size_t)m->kinds + 1, sizeof(double));
+    if (!memory)
+        return -1;
+    double *leading = memory, *line = leading + m->groups, *best = line + rows, *known = best + n;
+    for (int32_t e = 0; e < m->entries; e++)
+        if (size[e] > leading[m->group[e]])
+            leading[m->group[e]] = size[e];
+    double worst = flags & SD_LARGEST ? 0.0 : INFINITY;
+    for (int sweep = 0; sweep < SWEEPS && open; sweep++) {
+        memcpy(line, excited, rows * sizeof *line);
+        for (int32_t e = 0; e < m->entries; e++)
+            if (size[e] > 0.0)
+                line[m->row[e]] = larger(line[m->row[e]], size[e] * found[m->column[e]]);
+        /* small coefficients are asked only where no other is left */
+        int leads = 0;
+        for (int32_t e = 0; e < m->entries && !leads; e++)
+            leads = size[e] > 0.0 && found[m->column[e]] == 0.0 && line[m->row[e]] > 0.0 &&
+                    !(size[e] < SMALL * leading[m->group[e]]);
+        for (size_t k = 0; k < n; k++)
+            best[k] = worst;
+        for (int32_t e = 0; e < m->entries; e++) {
+            int32_t c = m->column[e];
+            if (!(size[e] > 0.0) || found[c] != 0.0 || !(line[m->row[e]] > 0.0))
+                continue;
+            if (leads && size[e] < SMALL * leading[m->group[e]])
+                continue;
+            double proposed = line[m->row[e]] / size[e];
+            best[c] = flags & SD_LARGEST ? larger(best[c], proposed) : smaller(best[c], proposed);
+        }
+        if (flags & SD_CAPPED) {
+            memset(known, 0, (size_t)m->kinds * sizeof *known);
+            for (size_t k = 0; k < n; k++)
+                known[m->kind[k]] = larger(known[m->kind[k]], found[k]);
+            for (size_t k = 0; k < n; k++)
+                if (known[m->kind[k]] > 0.0)
+                    best[k] = smaller(best[k], known[m->kind[k]]);
+        }
+        int changed = 0;
+        open = 0;
+        for (size_t k = 0; k < n; k++)
+            if (found[k] == 0.0) {
+                if (isfinite(best[k]) && best[k] != 0.0) {
+                    found[k] = best[k];
+                    changed = 1;
+                } else {
+                    open = 1;
+                }
+            }
+        if (!changed)
+            break;
+    }
+    free(memory);
+    return 0;
+}
+
+int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const int32_t *rated, const int32_t *member,
+             int32_t members, const double *x, const double *jacobian, const double *residual, int32_t flags,
+             double *scale)
+{
+    double *memory = malloc(((size_t)m->entries + (size_t)m->rows + (size_t)members + 1) * sizeof *memory);
+    if (!memory)
+        return -1;
+    double *size = memory, *free_ = size + m->entries, *most = free_ + m->rows;
+    for (int32_t k = 0; k < m->unknowns; k++)
+        scale[k] = k < first && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]);
+    for (int32_t r = 0; r < m->rows; r++)
+        free_[r] = isfinite(residual[r]) ? fabs(residual[r]) : 0.0;
+    for (int32_t e = 0; e < m->entries; e++)
+        size[e] = isfinite(jacobian[e]) && !rated[m->row[e]] ? fabs(jacobian[e]) : 0.0;
+    int failed = sd_propagate(m, size, free_, flags, scale);
+    /* unknowns of y are no less than a thousandth of their like */
+    memset(most, 0, (size_t)members * sizeof *most);
+    for (int32_t k = 0; k < first; k++)
+        most[member[k]] = larger(most[member[k]], scale[k]);
+    for (int32_t k = 0; k < first; k++) {
+        scale[k] = larger(scale[k], SMALL * most[member[k]]);
+        scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
+    }
+    for (int32_t e = 0; e < m->entries; e++)
+        size[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
+    failed |= sd_propagate(m, size, free_, flags, scale);
+    for (int32_t k = 0; k < m->unknowns; k++)
+        scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
+    free(memory);
+    return failed;
+}
