@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
@@ -21,6 +22,8 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
 
 DENSE = 300
+SMALL = 32
+"""Unknowns up to which the core looks at a pencil first (core/dense.h)."""
 MAX_INDEX = 6
 ROUSED = 1e-2
 """Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""
@@ -161,6 +164,13 @@ def _roused(system: System, t: float, jy: Floats) -> Floats:
     return np.where(asleep, np.copysign(least, jy), jy)
 
 
+def _small_index(system: System, jy: Floats, jyd: Floats) -> int:
+    """`pencil_index` of a small regular pencil, in the core; -1 where it has none, or more must be asked."""
+    pattern = system.pattern
+    arrays = pattern.column, pattern.row, np.ascontiguousarray(jyd), np.ascontiguousarray(jy)
+    return int(lib.core.sd_pencil_index(pattern.unknowns, *map(lib.pointer, arrays), MAX_INDEX))
+
+
 def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
     """Index of the form as written, and the undetermined unknowns where there is none."""
     y, yd = state.for_form(system)
@@ -169,6 +179,10 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
         return 0, ()
     if system.unknowns > DENSE:
         return _growth_index(system, jy, jyd), ()
+    if system.unknowns <= SMALL and system.rows == system.unknowns:
+        found = _small_index(system, jy, jyd)
+        if found >= 0:
+            return found, ()
     names = null_place(system, jy, jyd)[0]
     if names:
         # equilibration may end where one unit makes the others tiny: asked again in sizes of the unknowns
