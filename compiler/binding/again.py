@@ -14,25 +14,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.columns import Varied, following, reads_of_structure
-from sysdyn.compiler.forms.descriptor import DescriptorForm, Pin
+from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.compiler.model.interpret import evaluate
+from sysdyn.compiler.model.interpret import in_order
 from sysdyn.compiler.program.program import Program
-from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.dsl.model.expression import Node, topological, topological_unbound
 from sysdyn.dsl.model.network import Network, Slope
+
+Nodes = tuple[Node, ...]
+"""Of an expression, each after those it needs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Way:
     """What follows from a set of scalar parameters.
 
-    follow: parameters with their formulas, each after those it needs; slopes, pins (with its place among the initial
-    values): those that read any; places: (name, place in p).
+    follow: parameters with the nodes of their formulas, each after those it needs; slopes; initial values, by their
+    places among these: those that read any; places: (name, place in p).
     """
 
-    follow: tuple[tuple[str, Node], ...]
-    slopes: tuple[Slope, ...]
-    pins: tuple[tuple[int, Pin], ...]
+    follow: tuple[tuple[str, Nodes], ...]
+    slopes: tuple[tuple[Slope, Nodes], ...]
+    pins: tuple[tuple[int, Nodes], ...]
     places: tuple[tuple[str, int], ...]
 
 
@@ -55,14 +58,23 @@ def way(
     def read(node: Node) -> bool:
         return any(n.op == "param" and n.data in moving for n in topological([node]))
 
-    slopes = tuple(slope for slope in network.slopes if read(slope.expression))
-    pins = tuple((k, pin) for k, pin in enumerate(form.pins) if read(pin.value))
+    slopes = [slope for slope in network.slopes if read(slope.expression)]
+    pins = [(k, pin) for k, pin in enumerate(form.pins) if read(pin.value)]
     if any(slope.loops for slope in slopes) or any(pin.nest for _, pin in pins):
         return None
     if network.scene is not None and network.scene.start is not None and read(network.scene.start):
         return None
     places = tuple((name, place) for place, name in enumerate(program.scalars) if name in moving)
-    return Way(tuple((n, known[n].values[0]) for n in behind), slopes, pins, places)
+    return Way(
+        tuple((n, _nodes(known[n].values[0])) for n in behind),
+        tuple((slope, _nodes(slope.expression)) for slope in slopes),
+        tuple((k, _nodes(pin.value)) for k, pin in pins),
+        places,
+    )
+
+
+def _nodes(root: Node) -> Nodes:
+    return tuple(topological_unbound([root]))
 
 
 def again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Binding | None:
@@ -70,16 +82,16 @@ def again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Bindin
     parameters = Varied(binding.parameters, overrides)
     values, lookup = parameters.values, parameters.lookup
     for name, formula in path.follow:
-        values[name] = float(evaluate([formula], lookup)[0])
+        values[name] = float(in_order(formula, lookup))
     if not all(math.isfinite(values[name]) for name in (*overrides, *(name for name, _ in path.follow))):
         return None
-    for slope in path.slopes:
-        value = evaluate([slope.expression], lookup)[0]
+    for slope, nodes in path.slopes:
+        value = in_order(nodes, lookup)
         if (value != 0.0) if slope.flat else (value == 0.0 or (slope.sign and not slope.sign * value > 0.0)):
             return None
     starts = list(binding.initial)
-    for k, pin in path.pins:
-        value = float(evaluate([pin.value], lookup)[0])
+    for k, nodes in path.pins:
+        value = float(in_order(nodes, lookup))
         if not math.isfinite(value):
             return None
         starts[k] = replace(starts[k], values=np.full(starts[k].values.shape, value))

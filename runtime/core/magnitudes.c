@@ -113,3 +113,44 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const in
     free(memory);
     return failed;
 }
+
+double sd_excitation(sd_system *system, double t0, double span, const double *y, const double *yd, const double *part,
+                     int32_t parts, double noise, double *moves)
+{
+    size_t rows = (size_t)system->rows;
+    double *base = malloc((3 * rows + 1) * sizeof *base), quick = INFINITY;
+    if (!base)
+        return -1.0;
+    double *early = base + rows, *now = early + rows;
+    sd_residual(system, t0, y, yd, base);
+    memset(moves, 0, rows * sizeof *moves);
+    for (int32_t k = 0; k < parts && !*system->stop; k++) {
+        sd_residual(system, t0 + span * part[k], y, yd, now);
+        for (size_t r = 0; r < rows; r++) {
+            double moved = fabs(now[r] - base[r]);
+            moved = isfinite(moved) ? moved : 0.0;
+            moves[r] = fmax(moves[r], moved);
+            if (k == 0)
+                early[r] = moved;
+        }
+    }
+    for (size_t r = 0; r < rows; r++)
+        if (early[r] > noise * moves[r])
+            quick = fmin(quick, part[0] * span * moves[r] / early[r]);
+    free(base);
+    return quick;
+}
+
+int sd_row_sizes(sd_system *system, double t, const double *y, const double *yd, int32_t entries, const int32_t *entry,
+                 const int32_t *of, int32_t sizes, double *size)
+{
+    double *jy = malloc((2 * (size_t)system->entries + 1) * sizeof *jy);
+    if (!jy)
+        return -1;
+    sd_jacobian(system, t, y, yd, jy, jy + system->entries);
+    memset(size, 0, (size_t)sizes * sizeof *size);
+    for (int32_t e = 0; e < entries; e++)
+        size[of[e]] = larger(size[of[e]], fabs(jy[entry[e]]));
+    free(jy);
+    return 0;
+}

@@ -156,6 +156,8 @@ def _load() -> Any:
         "sd_linear_z_pivoted": (_P, [_P]),
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P]),
         "sd_propagate": (c.c_int, [_P, _P, _P, _I, _P]),
+        "sd_excitation": (_D, [_P, _D, _D, _P, _P, _P, _I, _D, _P]),
+        "sd_row_sizes": (c.c_int, [_P, _D, _P, _P, _I, _P, _P, _I, _P]),
         "sd_scale": (c.c_int, [_P, _P, _I, _P, _P, _I, _P, _P, _P, _I, _P]),
         "sd_factors": (None, [_I, _I, _P, _P, _P, _P]),
         "sd_rank": (c.c_int, [_I, _I, _P, _D]),

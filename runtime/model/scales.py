@@ -10,10 +10,12 @@ During a run magnitudes grow with max |y|; a second run starts with the maxima o
 
 from __future__ import annotations
 
+import ctypes as c
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import compliance
@@ -35,6 +37,8 @@ NOISE = 1e-6
 QUIET = 1e-9
 """Efforts below this part of (largest energy) / q are round-off."""
 _SAMPLES = 16
+_PARTS = np.array([1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)])
+"""Of the span: where rows are asked how far they moved, the first to tell how fast."""
 _HOLDS = ("phi", "psi")
 """Beginnings of the names of groups of constraints."""
 _SWEEPS = 8
@@ -51,16 +55,12 @@ def _grouped(system: System, y: Floats, moves: Floats, compliance: Floats) -> Fl
 
 def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
     """How far each row moves with t alone over the span [rows]; shortest time in which one does so [s]."""
-    base = system.residual(t0, y, yd)
-    span = t_end - t0
-    moves = []
-    for part in (1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)):
-        with np.errstate(all="ignore"):  # what overflows is left out below
-            moved = np.abs(system.residual(t0 + span * part, y, yd) - base)
-        moves.append(np.where(np.isfinite(moved), moved, 0.0))
-    most, early = np.max(moves, axis=0, initial=0.0), moves[0]
-    quick = early > NOISE * most
-    return most, float((1e-6 * span * most[quick] / early[quick]).min(initial=np.inf))
+    moves, parts = np.zeros(max(system.rows, 1)), _PARTS
+    numbers = [lib.pointer(item) for item in (system._buffer(y), system._buffer(yd), parts)]
+    address = c.byref(system.core)
+    quick = lib.core.sd_excitation(address, t0, t_end - t0, *numbers, parts.size, NOISE, lib.pointer(moves))
+    system.failure.check()
+    return moves[: system.rows], float(quick)
 
 
 def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: float) -> float:

@@ -40,6 +40,8 @@ class Layout:
     reads_rate: Ints
 
 
+KEPT = 1000
+"""Unknowns up to which what is as long as they are, and quickly made, is kept."""
 SETS = 4096
 """Active sets whose rows are kept."""
 
@@ -91,8 +93,6 @@ class System:
             description.layouts[key] = plan(description, index_form)
         self.form: Form = description.layouts[key]
         self.failure = Failure()
-        self.sized: tuple[tuple[Any, ...], tuple[Floats, float]] = ((), (np.zeros(0), 0.0))
-        """Magnitudes found last, and the point at which (integrate/integrate.py)."""
         self.starter: Any = None
         """What the start was sought in (start/starter.py), where it may serve again."""
         self._keep: list[Any] = []
@@ -105,6 +105,10 @@ class System:
         if key not in self.description.layouts:
             self.description.layouts[key] = make()
         return self.description.layouts[key]  # type: ignore[no-any-return]
+
+    def once_if_small(self, name: Hashable, make: Callable[[], Found]) -> Found:
+        """The same where keeping it costs no room to speak of; else made anew."""
+        return self.once(name, make) if self.unknowns <= KEPT else make()
 
     def own(self, name: Hashable, make: Callable[[], Found]) -> Found:
         """What is made of this system's structures in the core, whatever the numbers: once for all runs it serves."""

@@ -86,9 +86,9 @@ def remembered(
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
         if not self.remember:
             return ask(self, t, x)
-        known = self.known.get(name)
-        if known is None or known[0] != t or not np.array_equal(known[1], x):
-            known = self.known[name] = (t, x.copy(), ask(self, t, x))
+        known, here = self.known.get(name), x.tobytes()
+        if known is None or known[0] != t or known[1] != here:
+            known = self.known[name] = (t, here, ask(self, t, x))
         return known[2].copy()
 
     return answer
@@ -104,7 +104,7 @@ class Starter:
     def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
         self.system = system
         self.remember = remember  # one search for a start: nothing but t and x changes
-        self.known: dict[str, tuple[float, Floats, NDArray[Any]]] = {}
+        self.known: dict[str, tuple[float, bytes, NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
@@ -143,6 +143,11 @@ class Starter:
             return self.core.balance  # type: ignore[no-any-return]
         self._own_balance = Balance(self.settled.rows, self.rows, self.columns, self.equations.alike)
         return self._own_balance.core
+
+    @functools.cached_property
+    def weight(self) -> Floats:
+        """Of what does not follow from the state [unknowns]."""
+        return np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
 
     @functools.cached_property
     def _of_missed(self) -> Mask:
@@ -299,13 +304,20 @@ class Starter:
         The flow of a momentum counts as state: where neither is written, both begin at zero.
         """
         jy, jyd = self.system.jacobian(t, *self.expand(x))
-        carries = self.system.differential(jyd)[: self.n] & self.system.are(*STATE)[: self.n]
-        pattern = self.system.pattern
-        inert = pattern.columns_of()[(jy != 0.0) & self.equations.momenta[pattern.row]]
-        carries[np.intersect1d(self._flow[carries[self._momentum]], inert)] = True
+        state = self.system.are(*STATE)[: self.n]
+        carries = self.system.differential(jyd)[: self.n] & state
+        if self._flow.size:
+            pattern = self.system.pattern
+            inert = np.zeros(self.n, dtype=bool)
+            inert[pattern.columns_of()[(jy != 0.0) & self.equations.momenta[pattern.row]]] = True
+            moved = self._flow[carries[self._momentum]]
+            carries[moved[inert[moved]]] = True
         carries &= ~self.measured
-        carries |= self.given.written & self.system.are(*STATE)[: self.n]
-        return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool), np.zeros(self.missed.size, dtype=bool)])
+        carries |= self.given.written & state
+        found = np.ones(x.size, dtype=bool)
+        found[: self.n] = ~carries
+        found[self.first :] = False
+        return found
 
     def carried(self) -> Ints:
         """Of flows with momenta: the momentum where the flow is written, else the flow."""
@@ -355,9 +367,7 @@ class Starter:
 def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
     """The equations `rows` in the unknowns `free`, the others as in x."""
     follows = starter.following(t, x)
-    weight = np.full(x.size, WEIGHT["unwritten"])
-    weight[starter.written] = WEIGHT["written"]
-    weight[follows] = WEIGHT["following"]
+    weight = np.where(follows, WEIGHT["following"], starter.weight)
     # unknowns of one kind and unit are moved by one measure, whatever their values
     scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
     weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])

@@ -236,7 +236,7 @@ def structure(system: System, state: ConsistentState) -> Structure:
     found = reactions(system, jy)
     left = dependent(found)
     zero = vanished(system, state)
-    lowest = np.union1d(left, zero).size
+    lowest = np.union1d(left, zero).size if zero.size else left.size
     if left.size:
         # a rank that is smaller here alone is the configuration's, not the constraints'
         for point in nearby(system, state):
@@ -245,13 +245,14 @@ def structure(system: System, state: ConsistentState) -> Structure:
             if fewer.size < left.size:
                 found, left = there, fewer
     # a row that is zero wherever phi holds, but not beside it, is no combination of others
-    left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
+    if left.size and zero.size:
+        left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
     lost = lowest - int(left.size)
-    n = int((system.kinds == "f").sum())
-    now = np.delete(system.kinds, system.idle_multipliers())
-    m1, m2 = (int((now == kind).sum()) for kind in ("kappa", "mu"))
+    n = int(system.are("f").sum())
+    idle = system.idle_multipliers()
+    m1, m2 = (int(system.are(kind).sum() - system.are(kind)[idle].sum()) for kind in ("kappa", "mu"))
     rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())
-    weights = combination(found, left)
+    weights = combination(found, left) if left.size else np.zeros(0)
     group = tuple(
         (_label(system, int(found.multipliers[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8)
     )
