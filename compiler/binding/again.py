@@ -40,7 +40,12 @@ class Way:
 
 
 def way(
-    network: Network, model: EnergyModel, form: DescriptorForm, program: Program, binding: Binding, names: frozenset[str]
+    network: Network,
+    model: EnergyModel,
+    form: DescriptorForm,
+    program: Program,
+    binding: Binding,
+    names: frozenset[str],
 ) -> Way | None:
     """What follows from these parameters; None where more than numbers does."""
     known = {p.name: p for p in network.parameters}

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray

@@ -127,7 +127,7 @@ class Runs:
 
     @property
     def origin(self) -> Origin | None:
-        """The start as the system sees it, shared by all runs; events leave numbers behind, and each run has its own."""
+        """The start as the system sees it, for all runs; events leave numbers behind: each run its own."""
         if self._origin is None and not self.options.events:
             self._origin = Origin(self.system, self.start, self.index)
         return self._origin
@@ -354,8 +354,7 @@ class Runs:
         """The compared quantities [k, quantities] at rows."""
         if finished.beyond > BEYOND:
             rows = np.full_like(rows, np.nan)
-        meters = [METERS[name] for name in self.meters]
-        return rows[:, np.append(lib.ROW_HEAD + self.places, meters).astype(np.int64) if meters else lib.ROW_HEAD + self.places]
+        return rows[:, [*(lib.ROW_HEAD + self.places).tolist(), *(METERS[name] for name in self.meters)]]
 
     def _late(self, rows: Floats, *, steps: bool = False) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]; steps: rows of

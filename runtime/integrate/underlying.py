@@ -54,7 +54,7 @@ class Selection:
 
 
 def _solved_for(system: System) -> tuple[Ints, Ints, Ints]:
-    """unknown [solved], column [unknowns], rate [solved] of a Selection."""
+    """Unknown [solved], column [unknowns], rate [solved] of a Selection."""
     kinds = system.kinds
     unknown = np.flatnonzero(kinds != "q").astype(np.int32)
     column = np.full(system.unknowns, -1, dtype=np.int32)
@@ -254,8 +254,8 @@ def obstacle(system: System, state: ConsistentState) -> tuple[str, ...]:
 
 def _regular(pattern: Pattern, values: Floats) -> bool:
     """Whether a small matrix is certainly regular, or holds what is no number, of which nothing can be said."""
-    answer = lib.core.sd_regular(pattern.unknowns, *map(lib.pointer, (pattern.column, pattern.row, values)), CERTAIN)
-    return int(answer) != 0
+    arrays = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(values)
+    return int(lib.core.sd_regular(pattern.unknowns, *arrays, CERTAIN)) != 0
 
 
 def _balanced(pattern: Pattern, values: Floats) -> Floats:

@@ -167,8 +167,9 @@ def _roused(system: System, t: float, jy: Floats) -> Floats:
 def _small_index(system: System, jy: Floats, jyd: Floats) -> int:
     """`pencil_index` of a small regular pencil, in the core; -1 where it has none, or more must be asked."""
     pattern = system.pattern
-    arrays = pattern.column, pattern.row, np.ascontiguousarray(jyd), np.ascontiguousarray(jy)
-    return int(lib.core.sd_pencil_index(pattern.unknowns, *map(lib.pointer, arrays), MAX_INDEX))
+    jy, jyd = np.ascontiguousarray(jy), np.ascontiguousarray(jyd)
+    places = lib.pointer(pattern.column), lib.pointer(pattern.row)
+    return int(lib.core.sd_pencil_index(pattern.unknowns, *places, lib.pointer(jyd), lib.pointer(jy), MAX_INDEX))
 
 
 def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
