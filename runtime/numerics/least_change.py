@@ -213,12 +213,12 @@ def _solved_in_core(
 ) -> Solution:
     """The same of a small problem (core/search.h)."""
     found, scaled = x.copy(), np.zeros(problem.number)
-    arrays = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.guess, problem.scale, problem.weight
-    work, start = problem.work, c.addressof(core[0])
-    search = lib.Search(
-        start, *map(lib.pointer, arrays), core[1], most, folds, work.share, work.spent, work.largest,
-        lib.pointer(found), lib.pointer(scaled),
-    )  # fmt: skip
+    use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
+    masks = lib.pointer(use), lib.pointer(free)
+    numbers = lib.pointer(problem.guess), lib.pointer(problem.scale), lib.pointer(problem.weight)
+    limits = most, folds, work.share, work.spent, work.largest
+    answers = lib.pointer(found), lib.pointer(scaled)
+    search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], *limits, *answers)
     if lib.core.sd_search_solve(c.byref(search)):
         raise MemoryError
     if problem.check is not None:

@@ -47,8 +47,8 @@ def _places(system: System) -> tuple[Longs, tuple[Longs, Longs], Longs, NDArray[
         momentum[first : first + row.size] = group == "momentum"
     columns = system.pattern.columns_of()
     take = np.flatnonzero((rows[system.pattern.row] >= 0) & (place[columns] >= 0))
-    row = system.pattern.row[take]
-    return flows, (rows[row], place[columns[take]]), take, momentum[row]
+    at = system.pattern.row[take]
+    return flows, (rows[at], place[columns[take]]), take, momentum[at]
 
 
 def _least(
