@@ -102,6 +102,29 @@ void sd_factors(int32_t m, int32_t n, const double *a, const double *b, double *
     }
 }
 
+void sd_sparse_factors(int32_t m, int32_t n, int32_t entries, const int32_t *row_of, const int32_t *column_of,
+                       const double *size, double *row, double *column)
+{
+    for (int32_t i = 0; i < m; i++)
+        row[i] = 1.0;
+    for (int32_t j = 0; j < n; j++)
+        column[j] = 1.0;
+    double *largest = malloc(((size_t)m + (size_t)n) * sizeof *largest + 8);
+    if (!largest)
+        return;
+    for (int side = 0; side < 2 * SWEEPS; side++) {
+        const int32_t *of = side % 2 ? column_of : row_of;
+        double *scale = side % 2 ? column : row;
+        int32_t number = side % 2 ? n : m;
+        memset(largest, 0, (size_t)number * sizeof *largest);
+        for (int32_t e = 0; e < entries; e++)
+            largest[of[e]] = fmax(largest[of[e]], size[e] * row[row_of[e]] * column[column_of[e]]);
+        for (int32_t k = 0; k < number; k++)
+            scale[k] *= root(largest[k]);
+    }
+    free(largest);
+}
+
 static double largest(int32_t m, const double *sigma)
 {
     double most = 0.0;

@@ -16,6 +16,10 @@ void sd_orthogonal_rows(int32_t m, int32_t n, double *a, double *v, double *sigm
 /* row [m], column [n]: factors that bring the largest |entry| of each line of the matrices a and b (NULL: one) near 1 */
 void sd_factors(int32_t m, int32_t n, const double *a, const double *b, double *row, double *column);
 
+/* the same of a matrix by its entries: row_of, column_of, |value| [entries] */
+void sd_sparse_factors(int32_t m, int32_t n, int32_t entries, const int32_t *row_of, const int32_t *column_of,
+                       const double *size, double *row, double *column);
+
 /* how many singular values of a [m, n] are above `least` of the largest; -1: entries that are no numbers; -2: memory */
 int sd_rank(int32_t m, int32_t n, const double *a, double least);
 

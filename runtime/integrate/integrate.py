@@ -20,7 +20,6 @@ from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.metric import kinematic_scale
 from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.pieces import Pieces
-from sysdyn.runtime.integrate.relaxation import order
 from sysdyn.runtime.integrate.request import LONGEST, ON_UNDERLYING, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
@@ -31,6 +30,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.runtime.start.settled import Settler
 from sysdyn.runtime.start.start import ConsistentState
@@ -112,8 +112,7 @@ class Integration:
             self.linear, self._order = self.underlying.linear, None
             return
         pattern = self.system.pattern
-        span = max(self.request.t_end - self.start.t, 1e-300)
-        self._order = order(self.system, jy + 1e3 / span * jyd)
+        self._order = order_of(self.system)
         self.linear = lib.core.sd_linear_new(
             pattern.unknowns, *(lib.pointer(item) for item in (pattern.column, pattern.row, self._order))
         )

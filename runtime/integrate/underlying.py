@@ -124,7 +124,7 @@ class Underlying:
             self._in_matrix, self._source, self._from_rate, self.pattern
         ) = system.once("selection", self._select)  # fmt: skip
         self._parts = system.own("parts", lambda: _Parts(system, self._algebraic()))
-        order = system.once("order of accelerations", lambda: column_order(self.pattern, self.values(jy, jyd)))
+        order = system.once("order of accelerations", lambda: column_order(self.pattern))
         self._order = order
         self.linear = lib.core.sd_linear_new(
             self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))

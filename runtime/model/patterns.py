@@ -24,8 +24,8 @@ Array = TypeVar("Array", bound=NDArray[Any])
 class Places:
     """Entries in the order of the block's list: row, column [entries]."""
 
-    row: Longs
-    column: Longs
+    row: NDArray[np.integer]
+    column: NDArray[np.integer]
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class Pattern:
         """Number of places."""
         return int(self.row.size)
 
-    def columns_of(self) -> Longs:
+    def columns_of(self) -> Ints:
         """Column of each entry [entries]; read-only."""
         return self._columns
 
     @cached_property
-    def _columns(self) -> Longs:
-        return read_only(np.repeat(np.arange(self.unknowns), np.diff(self.column)))
+    def _columns(self) -> Ints:
+        return read_only(np.repeat(np.arange(self.unknowns, dtype=np.int32), np.diff(self.column)))
 
 
 def read_only(array: Array) -> Array:

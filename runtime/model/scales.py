@@ -55,10 +55,10 @@ def _grouped(system: System, y: Floats, moves: Floats, compliance: Floats) -> Fl
 
 def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
     """How far each row moves with t alone over the span [rows]; shortest time in which one does so [s]."""
-    moves, parts = np.zeros(max(system.rows, 1)), _PARTS
-    numbers = [lib.pointer(item) for item in (system._buffer(y), system._buffer(yd), parts)]
-    address = c.byref(system.core)
-    quick = lib.core.sd_excitation(address, t0, t_end - t0, *numbers, parts.size, NOISE, lib.pointer(moves))
+    moves, a, b = np.zeros(max(system.rows, 1)), system._buffer(y), system._buffer(yd)
+    point = t0, t_end - t0, lib.pointer(a), lib.pointer(b)
+    parts = lib.pointer(_PARTS), _PARTS.size
+    quick = lib.core.sd_excitation(c.byref(system.core), *point, *parts, NOISE, lib.pointer(moves))
     system.failure.check()
     return moves[: system.rows], float(quick)
 

@@ -47,11 +47,9 @@ def sparse_factors(
 ) -> tuple[Floats, Floats]:
     """The same of a matrix by its entries: magnitudes `size` at (rows, columns)."""
     row, column = np.ones(shape[0]), np.ones(shape[1])
-    for _ in range(SWEEPS):
-        for places, scale in ((rows, row), (columns, column)):
-            largest = np.zeros(scale.size)
-            np.maximum.at(largest, places, size * row[rows] * column[columns])
-            scale *= _root(largest)
+    places = (np.ascontiguousarray(rows, dtype=np.int32), np.ascontiguousarray(columns, dtype=np.int32))
+    arrays = (lib.pointer(item) for item in (*places, size, row, column))
+    lib.core.sd_sparse_factors(*shape, size.size, *arrays)
     return row, column
 
 

@@ -346,7 +346,8 @@ class Starter:
         found, nominal, free = np.zeros(x.size), self.system.nominal, self.residual(t, x)
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), int(known.member.max(initial=0)) + 1
-        numbers = map(lib.pointer, (np.ascontiguousarray(x, dtype=np.float64), sized, free))
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        numbers = lib.pointer(x), lib.pointer(sized), lib.pointer(free)
         flags = LARGEST * largest
         balance, answer = c.addressof(self._balance), lib.pointer(found)
         if lib.core.sd_scale(balance, lib.pointer(nominal), self.n, *tables, *numbers, flags, answer):

@@ -34,6 +34,8 @@ BESIDE = 1e-3
 NEAR = 10.0
 """Amplitudes: what the way back onto phi leads farther than this may be another singular point."""
 _EPS = 1e-13
+PIVOT = 1e-3
+"""Of rows scaled to one: an entry that makes a row independent beyond doubt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,8 @@ def _sparse_dependent(found: Reactions) -> Ints:
     """The same from the pivots of [I J^T; J -eps]: those of the order of eps.  In any order they count the dependent
     rows; eliminated in the order written they name them.
     """
+    if not _left(found):
+        return np.zeros(0, dtype=np.int32)
     from scipy.sparse import block_array, csc_array, eye_array
     from scipy.sparse.linalg import splu
 
@@ -122,6 +126,18 @@ def _sparse_dependent(found: Reactions) -> Ints:
         return np.zeros(0, dtype=np.int32)
     lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.flatnonzero(np.abs(lu.U.diagonal())[n:] < 1e3 * _EPS).astype(np.int32)
+
+
+def _left(found: Reactions) -> int:
+    """How many rows of J are left when those are taken away that alone stand in some column: they are independent."""
+    m, n = found.multipliers.size, found.rows.size
+    which, place = found.which.astype(np.int32), found.place.astype(np.int32)
+    arrays = lib.pointer(which), lib.pointer(place), lib.pointer(found.value)
+    peeled = np.zeros(m, dtype=np.int32)
+    left = int(lib.core.sd_peel(m, n, which.size, *arrays, PIVOT, lib.pointer(peeled)))
+    if left < 0:
+        raise MemoryError
+    return left
 
 
 def nearby(system: System, state: ConsistentState) -> list[Floats]:
@@ -162,9 +178,9 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     def sizes(point: Floats) -> Floats:
         """The largest entry of each row of J, as written."""
         found = np.zeros(number)
-        numbers = (lib.pointer(item) for item in (system._buffer(point), system._buffer(yd)))
+        a, b = system._buffer(point), system._buffer(yd)
         places = take.size, lib.pointer(take), lib.pointer(which), number, lib.pointer(found)
-        if lib.core.sd_row_sizes(c.byref(system.core), state.t, *numbers, *places):
+        if lib.core.sd_row_sizes(c.byref(system.core), state.t, lib.pointer(a), lib.pointer(b), *places):
             raise MemoryError
         system.failure.check()
         return found

@@ -17,6 +17,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
+from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
@@ -112,25 +113,33 @@ def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...]
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models)."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
     pattern = system.pattern
-    shape = (pattern.rows, pattern.unknowns)
     columns = pattern.columns_of()
-    row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), shape)
+    row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), (pattern.rows, pattern.unknowns))
     scale = row[pattern.row] * column[columns]
-    b = np.random.default_rng(3).standard_normal((pattern.rows, 4))
-    sizes = []
-    for cj in (1e4, 1e5):
-        matrix = csc_array(((jy + cj * jyd) * scale, pattern.row, pattern.column), shape=shape)
-        try:
-            sizes.append(float(np.abs(splu(matrix).solve(b)).max()))
-        except RuntimeError:
-            return None
-    slope = np.log10(sizes[1] / sizes[0])
-    index = round(float(slope)) + 1
+    sides = np.random.default_rng(3).standard_normal((4, pattern.rows))
+    sizes = [_inverse(system, (jy + cj * jyd) * scale, sides.copy()) for cj in (1e4, 1e5)]
+    if not all(np.isfinite(size) and size > 0.0 for size in sizes):
+        return None
+    index = round(float(np.log10(sizes[1] / sizes[0]))) + 1
     return index if 0 <= index <= MAX_INDEX else None
+
+
+def _inverse(system: System, values: Floats, sides: Floats) -> float:
+    """Largest entry of A^-1 b for sides b [k, rows]; infinite where A (by its entries) is singular."""
+    pattern, order = system.pattern, order_of(system)
+    places = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(order)
+    linear = lib.core.sd_linear_new(pattern.unknowns, *places)
+    if not linear:
+        raise MemoryError
+    try:
+        if lib.core.sd_linear_factor(linear, lib.pointer(values), None):
+            return np.inf
+        for side in sides:
+            lib.core.sd_linear_solve(linear, lib.pointer(side))
+    finally:
+        lib.core.sd_linear_free(linear)
+    return float(np.abs(sides).max())
 
 
 def _place(system: System, multiplier: int) -> tuple[int, int]:
