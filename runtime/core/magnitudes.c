@@ -19,7 +19,49 @@ static double smaller(double a, double b)
     return a <= b || isnan(a) ? a : b;
 }
 
-int sd_propagate(const sd_balance *m, const double *size, const double *excited, int32_t flags, double *found)
+/* small [entries] := 1 where a coefficient is small beside the largest of its row and kind; line [rows]: room.  Entries of
+ * a kind lie beside each other, for unknowns do. */
+static int find_small(const sd_balance *m, const double *size, char *small, double *line)
+{
+    int32_t runs = 0, room = 64;
+    int32_t *run = malloc((size_t)room * sizeof *run);
+    for (int32_t e = 0; run && e < m->entries; e++)
+        if (!e || m->kind[m->column[e]] != m->kind[m->column[e - 1]]) {
+            if (runs + 1 == room) {
+                int32_t *more = realloc(run, 2 * (size_t)room * sizeof *run);
+                if (!more) {
+                    free(run);
+                    return -1;
+                }
+                run = more;
+                room *= 2;
+            }
+            run[runs++] = e;
+        }
+    if (!run)
+        return -1;
+    run[runs] = m->entries;
+    for (int32_t kind = 0; kind < m->kinds; kind++)
+        for (int pass = 0; pass < 3; pass++) /* nothing known, the largest, beside the largest */
+            for (int32_t k = 0; k < runs; k++) {
+                if (m->kind[m->column[run[k]]] != kind)
+                    continue;
+                for (int32_t e = run[k]; e < run[k + 1]; e++) {
+                    double *leading = line + m->row[e];
+                    if (pass == 0)
+                        *leading = 0.0;
+                    else if (pass == 1)
+                        *leading = size[e] > *leading ? size[e] : *leading;
+                    else
+                        small[e] = size[e] < SMALL * *leading;
+                }
+            }
+    free(run);
+    return 0;
+}
+
+int sd_propagate(const sd_balance *m, const double *size, const double *excited, const int32_t *silent, int32_t flags,
+                 double *found)
 {
     size_t n = (size_t)m->unknowns, rows = (size_t)m->rows;
     int open = 0;
@@ -27,13 +69,14 @@ int sd_propagate(const sd_balance *m, const double *size, const double *excited,
         open |= found[k] == 0.0;
     if (!open)
         return 0;
-    double *memory = calloc((size_t)m->groups + rows + n + (size_t)m->kinds + 1, sizeof(double));
-    if (!memory)
+    double *memory = calloc(rows + n + (size_t)m->kinds + 1, sizeof(double));
+    char *small = malloc((size_t)m->entries + 1);
+    double *line = memory, *best = line + rows, *known = best + n;
+    if (!memory || !small || find_small(m, size, small, line)) {
+        free(memory);
+        free(small);
         return -1;
-    double *leading = memory, *line = leading + m->groups, *best = line + rows, *known = best + n;
-    for (int32_t e = 0; e < m->entries; e++)
-        if (size[e] > leading[m->group[e]])
-            leading[m->group[e]] = size[e];
+    }
     double worst = flags & SD_LARGEST ? 0.0 : INFINITY;
     for (int sweep = 0; sweep < SWEEPS && open; sweep++) {
         memcpy(line, excited, rows * sizeof *line);
@@ -43,15 +86,15 @@ int sd_propagate(const sd_balance *m, const double *size, const double *excited,
         /* small coefficients are asked only where no other is left */
         int leads = 0;
         for (int32_t e = 0; e < m->entries && !leads; e++)
-            leads = size[e] > 0.0 && found[m->column[e]] == 0.0 && line[m->row[e]] > 0.0 &&
-                    !(size[e] < SMALL * leading[m->group[e]]);
+            leads = size[e] > 0.0 && found[m->column[e]] == 0.0 && line[m->row[e]] > 0.0 && !small[e] &&
+                    !(silent && silent[m->row[e]]);
         for (size_t k = 0; k < n; k++)
             best[k] = worst;
         for (int32_t e = 0; e < m->entries; e++) {
             int32_t c = m->column[e];
-            if (!(size[e] > 0.0) || found[c] != 0.0 || !(line[m->row[e]] > 0.0))
+            if (!(size[e] > 0.0) || found[c] != 0.0 || !(line[m->row[e]] > 0.0) || (silent && silent[m->row[e]]))
                 continue;
-            if (leads && size[e] < SMALL * leading[m->group[e]])
+            if (leads && small[e])
                 continue;
             double proposed = line[m->row[e]] / size[e];
             best[c] = flags & SD_LARGEST ? larger(best[c], proposed) : smaller(best[c], proposed);
@@ -79,38 +122,34 @@ int sd_propagate(const sd_balance *m, const double *size, const double *excited,
             break;
     }
     free(memory);
+    free(small);
     return 0;
 }
 
 int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const int32_t *rated, const int32_t *member,
-             int32_t members, const double *x, const double *jacobian, const double *residual, int32_t flags,
-             double *scale)
+             int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale)
 {
-    double *memory = malloc(((size_t)m->entries + (size_t)m->rows + (size_t)members + 1) * sizeof *memory);
-    if (!memory)
+    double *most = calloc((size_t)members + 1, sizeof *most);
+    if (!most)
         return -1;
-    double *size = memory, *free_ = size + m->entries, *most = free_ + m->rows;
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = k < first && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]);
     for (int32_t r = 0; r < m->rows; r++)
-        free_[r] = isfinite(residual[r]) ? fabs(residual[r]) : 0.0;
+        residual[r] = isfinite(residual[r]) ? fabs(residual[r]) : 0.0;
     for (int32_t e = 0; e < m->entries; e++)
-        size[e] = isfinite(jacobian[e]) && !rated[m->row[e]] ? fabs(jacobian[e]) : 0.0;
-    int failed = sd_propagate(m, size, free_, flags, scale);
+        jacobian[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
+    int failed = sd_propagate(m, jacobian, residual, rated, flags, scale);
     /* unknowns of y are no less than a thousandth of their like */
-    memset(most, 0, (size_t)members * sizeof *most);
     for (int32_t k = 0; k < first; k++)
         most[member[k]] = larger(most[member[k]], scale[k]);
     for (int32_t k = 0; k < first; k++) {
         scale[k] = larger(scale[k], SMALL * most[member[k]]);
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     }
-    for (int32_t e = 0; e < m->entries; e++)
-        size[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
-    failed |= sd_propagate(m, size, free_, flags, scale);
+    failed |= sd_propagate(m, jacobian, residual, NULL, flags, scale);
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
-    free(memory);
+    free(most);
     return failed;
 }
 

@@ -11,26 +11,24 @@
 
 /* Rows of a matrix by its entries; depends on the structure alone, shared by threads. */
 typedef struct sd_balance {
-    int32_t unknowns, rows, entries;
-    int32_t groups, kinds;            /* numbers of the two that follow */
+    int32_t unknowns, rows, entries, kinds;
     const int32_t *row, *column;      /* [entries] */
-    const int32_t *group;             /* [entries] number of the row and the kind of its unknown */
-    const int32_t *kind;              /* [unknowns] number of the kind and unit */
+    const int32_t *kind;              /* [unknowns] number of the kind and unit, below `kinds` */
 } sd_balance;
 
 enum { SD_LARGEST = 1, SD_CAPPED = 2 };
 
 /* found [unknowns]: zeros become what balances the rows; size [entries]: |coefficient|, 0: no place; excited [rows]:
- * magnitude of the free terms; flags: SD_LARGEST of several proposals, SD_CAPPED by the largest known of the kind.
+ * magnitude of the free terms; silent [rows]: rows that propose nothing (NULL: none); flags: SD_LARGEST of several proposals, SD_CAPPED by the largest known of the kind.
  * Returns 0; -1: no memory. */
-int sd_propagate(const sd_balance *balance, const double *size, const double *excited, int32_t flags, double *found);
+int sd_propagate(const sd_balance *balance, const double *size, const double *excited, const int32_t *silent,
+                 int32_t flags, double *found);
 
-/* scale [unknowns] := magnitudes of x, by the entries of a Jacobian and a residual at x (what is no number counts as 0).
- * nominal [first]: 0 where there is none; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
+/* scale [unknowns] := magnitudes of x, by the entries of a Jacobian and a residual at x, which are overwritten by their
+ * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
  * at first; member [first], members: number of the kind of an unknown.  Returns 0; -1: no memory. */
 int sd_scale(const sd_balance *balance, const double *nominal, int32_t first, const int32_t *rated, const int32_t *member,
-             int32_t members, const double *x, const double *jacobian, const double *residual, int32_t flags,
-             double *scale);
+             int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale);
 
 /* size [sizes] := largest |entry| of dF/dy at (t, y, yd) among those of each number: entry [entries] places in the pattern,
  * of [entries] their numbers; -1: no memory */

@@ -58,6 +58,20 @@ int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, doub
     return 0;
 }
 
+int sd_start_scale(const sd_rows_of_start *s, const double *nominal, const int32_t *rated, const int32_t *member,
+                   int32_t members, double t, const double *x, int32_t flags, double *scale)
+{
+    size_t rows = (size_t)s->balance.rows;
+    double *r = malloc((rows + (size_t)s->balance.entries + 1) * sizeof *r);
+    if (!r)
+        return -2;
+    int failed = sd_start_residual(s, t, x, r) | sd_start_jacobian(s, t, x, r + rows);
+    if (!failed)
+        failed = sd_scale(&s->balance, nominal, s->written, rated, member, members, x, r + rows, r, flags, scale);
+    free(r);
+    return failed;
+}
+
 /* What one iteration needs; the arrays of one block of memory. */
 typedef struct {
     int32_t rows, unknowns;                       /* in use, free */
@@ -259,4 +273,27 @@ int sd_search_solve(sd_search *s)
     free(memory);
     free(at);
     return 0;
+}
+
+int sd_search_measure(sd_search *s)
+{
+    const sd_balance *m = &s->start->balance;
+    size_t rows = (size_t)m->rows;
+    double *size = calloc(rows + (size_t)m->entries + 1, sizeof *size);
+    if (!size)
+        return -2;
+    double *values = size + rows;
+    int failed = sd_start_jacobian(s->start, s->t, s->x, values) | sd_start_residual(s->start, s->t, s->x, s->scaled);
+    for (int32_t e = 0; e < m->entries; e++)
+        if (s->use[m->row[e]] && s->free[m->column[e]] && isfinite(values[e]))
+            size[m->row[e]] += fabs(values[e]) * s->scale[m->column[e]];
+    s->residual = 0.0;
+    for (size_t r = 0; r < rows; r++) {
+        double scaled = s->use[r] ? fabs(s->scaled[r] * (size[r] > 0.0 ? 1.0 / size[r] : 1.0)) : 0.0;
+        s->scaled[r] = scaled;
+        s->residual = scaled > s->residual || isnan(scaled) ? scaled : s->residual;
+    }
+    s->residual = isfinite(s->residual) ? s->residual : INFINITY;
+    free(size);
+    return failed;
 }

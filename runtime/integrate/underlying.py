@@ -55,11 +55,10 @@ class Selection:
 
 def _solved_for(system: System) -> tuple[Ints, Ints, Ints]:
     """Unknown [solved], column [unknowns], rate [solved] of a Selection."""
-    kinds = system.kinds
-    unknown = np.flatnonzero(kinds != "q").astype(np.int32)
+    unknown = np.flatnonzero(~system.are("q")).astype(np.int32)
     column = np.full(system.unknowns, -1, dtype=np.int32)
     column[unknown] = np.arange(unknown.size)
-    rate = np.where(system.are("f", "p"), 2, np.where(kinds == "s", 1, 0)).astype(np.int32)[unknown]
+    rate = np.where(system.are("f", "p"), 2, np.where(system.are("s"), 1, 0)).astype(np.int32)[unknown]
     return unknown, column, rate
 
 

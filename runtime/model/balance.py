@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.patterns import numbered
 
 LARGEST, CAPPED = 1, 2
 """SD_LARGEST, SD_CAPPED."""
@@ -24,12 +23,10 @@ class Balance:
         self, number: int, rows: NDArray[np.integer], columns: NDArray[np.integer], kind: NDArray[np.integer]
     ) -> None:
         places = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in (rows, columns, kind))
+        self._arrays = places
         kinds = 1 + int(kind.max(initial=0))
-        group, groups = numbered(places[0], places[2][places[1]], number, kinds)
-        self._arrays = (places[0], places[1], group, places[2])
-        self.unknowns, self.rows, self.entries = kind.size, number, rows.size
         addresses = [lib.pointer(item) for item in self._arrays]
-        self.core = lib.Balance(self.unknowns, self.rows, self.entries, groups, kinds, *addresses)
+        self.core = lib.Balance(kind.size, number, rows.size, kinds, *addresses)
         self.address = c.addressof(self.core)
 
     def propagate(
@@ -44,6 +41,7 @@ class Balance:
         """
         found = magnitude.copy()
         flags = LARGEST * largest + CAPPED * capped
-        if lib.core.sd_propagate(self.address, *map(lib.pointer, (size, excited)), flags, lib.pointer(found)):
+        given = lib.pointer(size), lib.pointer(excited), None
+        if lib.core.sd_propagate(self.address, *given, flags, lib.pointer(found)):
             raise MemoryError
         return found

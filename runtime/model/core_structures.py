@@ -567,11 +567,9 @@ class Balance(c.Structure):
         ("unknowns", _I),
         ("rows", _I),
         ("entries", _I),
-        ("groups", _I),
         ("kinds", _I),
         ("row", _P),
         ("column", _P),
-        ("group", _P),
         ("kind", _P),
     ]
 

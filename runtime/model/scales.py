@@ -175,13 +175,13 @@ def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
     slope = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     take = balance[rows] & (slope > 0.0)
     i, j, slope = rows[take], columns[take], slope[take]
-    multiplier = np.isin(system.kinds[j], ("kappa", "mu", "e"))
+    multiplier = system.are("kappa", "mu", "e")[j]
     leading = np.zeros(system.rows)
     np.maximum.at(leading, i[multiplier], slope[multiplier])
     told = multiplier & (slope >= GROUP * leading[i])
     for _ in range(_SWEEPS):
         row = np.zeros(system.rows)
-        np.maximum.at(row, i, slope * np.where(multiplier | (system.kinds[j] == "f"), found[j], 0.0))
+        np.maximum.at(row, i, slope * np.where(multiplier | system.are("f")[j], found[j], 0.0))
         before = found.copy()
         np.maximum.at(found, j[told], row[i[told]] / slope[told])
         if (found == before).all():
@@ -215,7 +215,7 @@ def magnitudes(
     tau = time_scale(system, span, y, yd, quick)
     jy, jyd = system.jacobian(t0, y, yd)
     # flows without inertia follow from the rest
-    carries = state & ((system.kinds != "f") | system.differential(jyd) | _with_momentum(system))
+    carries = state & (~system.are("f") | system.differential(jyd) | _with_momentum(system))
     moves = np.where(carries, tau * np.abs(yd) if far is None else far(tau), 0.0)
     known = np.maximum(np.abs(y), moves)
     form = system.form

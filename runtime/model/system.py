@@ -401,7 +401,15 @@ class System:
 
     def are(self, *kinds: str) -> Mask:
         """Unknowns of these kinds [unknowns]; read-only."""
-        return self.once(("are", kinds), lambda: read_only(np.isin(self.kinds, kinds)))
+        return self.once(("are", kinds), lambda: read_only(self._are(kinds)))
+
+    def _are(self, kinds: tuple[str, ...]) -> Mask:
+        mask = np.zeros(self.unknowns, dtype=bool)
+        for family, first in zip(self.description.families, self.form.at, strict=True):
+            if family.kind in kinds and family.kind != "audit":
+                mask[first : first + family.size] = True
+        mask[self.form.written :] = "nu" in kinds
+        return mask
 
     def of_groups(self, *names: str) -> Mask:
         """Rows of these groups [rows]; read-only."""

@@ -202,24 +202,27 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) 
 
     folds: iterations that are not counted while rows shrink as fast as their terms do.
     """
-    if problem.core is not None and max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL:
-        return _solved_in_core(problem, problem.core, x, most, folds)
+    if problem.core is not None:
+        small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
+        found = _in_core(problem, problem.core, x, (most, folds), measure=not small)
+        if small or found.residual <= _ROUND_OFF:  # a large one that holds is not linearised
+            return found
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
         return _solve(problem, x, most, folds)
 
 
-def _solved_in_core(
-    problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, most: int, folds: int
+def _in_core(
+    problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, limits: tuple[int, int], *, measure: bool
 ) -> Solution:
-    """The same of a small problem (core/search.h)."""
+    """The same of a small problem (core/search.h); measure: x as it is, of any."""
     found, scaled = x.copy(), np.zeros(problem.number)
     use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
     masks = lib.pointer(use), lib.pointer(free)
     numbers = lib.pointer(problem.guess), lib.pointer(problem.scale), lib.pointer(problem.weight)
-    limits = most, folds, work.share, work.spent, work.largest
+    spent = work.share, work.spent, work.largest
     answers = lib.pointer(found), lib.pointer(scaled)
-    search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], *limits, *answers)
-    if lib.core.sd_search_solve(c.byref(search)):
+    search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], *limits, *spent, *answers)
+    if (lib.core.sd_search_measure if measure else lib.core.sd_search_solve)(c.byref(search)):
         raise MemoryError
     if problem.check is not None:
         problem.check()

@@ -37,8 +37,8 @@ class Equations:
 
     guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: rows of the guesses that have an
     unknown of their own; unsettled [rows]: they need not hold; rows, columns, structural [entries]: of the matrix;
-    moving [unknowns]: kind of each; alike [unknowns]: number of its kind and unit; first: place of the first that is
-    missed.
+    alike [unknowns]: number of the kind and unit of each; member [unknowns of y]: number of the kind; first: place of
+    the first that is missed.
     """
 
     def __init__(self, system: System, settled: System, measuring: bool) -> None:
@@ -50,15 +50,12 @@ class Equations:
         self.missed = np.flatnonzero(self.guessed & self.measuring)
         self.first = self.n + self.rates.size
         self.unsettled = inertial_rates(settled)
-        self.kinds = system.kinds[: self.n]
+        self.unknowns = self.first + self.missed.size
         self.momentum, self.flow = pairs(system)
         self._entries(settled)
         self.units = self._units(settled)
         self._kinds(system)
-        missed = np.zeros(settled.rows, dtype=bool)
-        missed[self.missed] = True
-        self.of_missed = missed[self.rows]
-        self.measured = self._measured()
+        self.measured = self._measured(settled.rows)
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _rows(self, settled: System) -> None:
@@ -74,11 +71,12 @@ class Equations:
         """Those of dF/dy, of dF/dy' where the derivative is an unknown, of what is missed."""
         pattern = settled.pattern
         columns = pattern.columns_of()
-        rate_at = np.full(self.n, -1, dtype=np.int64)
-        rate_at[self.rates] = self.n + np.arange(self.rates.size)
+        rate_at = np.full(self.n, -1, dtype=np.int32)
+        rate_at[self.rates] = self.n + np.arange(self.rates.size, dtype=np.int32)
         self.rated = np.flatnonzero(rate_at[columns] >= 0).astype(np.int32)
-        places = self.first + np.arange(self.missed.size)
-        self.rows = np.concatenate([pattern.row, pattern.row[self.rated], self.missed]).astype(np.int64)
+        places = (self.first + np.arange(self.missed.size)).astype(np.int32)
+        missed = self.missed.astype(np.int32)
+        self.rows = np.concatenate([pattern.row, pattern.row[self.rated], missed])
         self.columns = np.concatenate([columns, rate_at[columns[self.rated]], places])
         in_y, in_rate = settled.structural()
         self.structural = np.concatenate([in_y, in_rate[self.rated], np.ones(self.missed.size, dtype=bool)])
@@ -96,30 +94,37 @@ class Equations:
         self.family = np.unique(self.units, return_inverse=True)[1].astype(np.int64)
         kinds = alike(system)
         largest = kinds.max(initial=0) + 1
-        self.alike = np.concatenate([kinds[: self.n], largest + kinds[self.rates], 2 * largest + self.family])
-        self.member = np.unique(self.kinds, return_inverse=True)[1].astype(np.int32)
-        moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
-        moving[self.first :] = self._read(moving, system)
-        self.moving = read_only(moving)
-        self._of_kinds: dict[tuple[str, ...], Mask] = {}
+        groups = kinds[: self.n], largest + kinds[self.rates], 2 * largest + self.family
+        self.alike = np.concatenate(groups).astype(np.int32)
+        number: dict[str, int] = {}
+        of_family = [number.setdefault(f.kind, len(number)) for f in system.description.families]
+        self.member = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: self.n]]
+        self.members = len(number)
+        self._numbers, self._of_kinds = number, dict[tuple[str, ...], Mask]()
+        self._guesses = self._read([*number])
 
-    def _read(self, moving: NDArray[np.str_], system: System) -> NDArray[np.str_]:
-        """The kind of unknowns that each guess is of; none where it is of several."""
+    def _read(self, kinds: list[str]) -> NDArray[np.str_]:
+        """The kind of unknowns that each guess is of; none where it is of several [missed]."""
         if not self.missed.size:
-            return np.zeros(0, dtype=moving.dtype)
-        number = self.guessed.size
-        found, many = np.full(number, "", dtype=moving.dtype), np.zeros(number, dtype=bool)
-        read = self.structural & (self.columns < self.first)
-        for kind in np.unique(moving[: self.first]):
-            rows = self.rows[read & (moving[self.columns] == kind)]
+            return np.zeros(0, dtype="<U5")
+        found, many = np.full(self.guessed.size, "", dtype="<U5"), np.zeros(self.guessed.size, dtype=bool)
+        for kind in (*kinds, "rate"):
+            moves = np.append(self._plain((kind,)), np.zeros(self.missed.size, dtype=bool))
+            rows = self.rows[self.structural & moves[self.columns]]
             many[rows] |= found[rows] != ""
             found[rows] = kind
         return np.where(many, "", found)[self.missed]
 
-    def _measured(self) -> Mask:
+    def _plain(self, kinds: Sequence[str]) -> Mask:
+        """Unknowns of these kinds among those of y and the derivatives."""
+        among = np.array([kind in kinds for kind in self._numbers], dtype=bool)
+        return np.append(among[self.member], np.full(self.rates.size, "rate" in kinds))
+
+    def _measured(self, number: int) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
-        mask = np.zeros(self.n, dtype=bool)
-        own = self.structural & self.of_missed & (self.columns < self.n)
+        mask, missed = np.zeros(self.n, dtype=bool), np.zeros(number, dtype=bool)
+        missed[self.missed] = True
+        own = self.structural & missed[self.rows] & (self.columns < self.n)
         mask[self.columns[own]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
@@ -128,7 +133,7 @@ class Equations:
         """Unknowns of these kinds [unknowns]; read-only."""
         key = tuple(kinds)
         if key not in self._of_kinds:
-            self._of_kinds[key] = read_only(np.isin(self.moving, key))
+            self._of_kinds[key] = read_only(np.append(self._plain(key), np.isin(self._guesses, key)))
         return self._of_kinds[key]
 
     def core(self, system: System, settled: System) -> lib.RowsOfStart:

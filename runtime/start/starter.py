@@ -115,7 +115,7 @@ class Starter:
         self.n, self.first = known.n, known.first
         self.rates, self.missed = known.rates, known.missed
         self.guessed, self.unsaid = known.guessed, known.unsaid
-        self.kinds, self.moving, self.measured = known.kinds, known.moving, known.measured
+        self.measured = known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
         if not known.measuring:
@@ -258,7 +258,7 @@ class Starter:
         matrix = np.zeros((self.settled.rows, self.n))
         pattern = self.settled.pattern
         columns = pattern.columns_of()
-        flows = (self.kinds == "f")[columns]
+        flows = self.system.are("f")[columns]
         np.add.at(matrix, (pattern.row[flows], columns[flows]), jyd[flows])
         carried = flows & self.groups("momentum")[pattern.row]
         np.add.at(matrix, (pattern.row[carried], columns[carried]), -jy[carried])
@@ -340,19 +340,23 @@ class Starter:
         return self._scale(t, x, largest=True)
 
     def _scale(self, t: float, x: Floats, *, largest: bool) -> Floats:
-        known, values = self.equations, self.jacobian(t, x)
-        told = np.where(self._of_missed, values, 0.0) if self.missed.size else None
-        sized = values if told is None else np.where(self._of_missed, 0.0, values)
-        found, nominal, free = np.zeros(x.size), self.system.nominal, self.residual(t, x)
-        # how fast what follows from the state moves says nothing of its size
-        tables = lib.pointer(known.rated_rows), lib.pointer(known.member), int(known.member.max(initial=0)) + 1
+        known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
-        numbers = lib.pointer(x), lib.pointer(sized), lib.pointer(free)
-        flags = LARGEST * largest
-        balance, answer = c.addressof(self._balance), lib.pointer(found)
-        if lib.core.sd_scale(balance, lib.pointer(nominal), self.n, *tables, *numbers, flags, answer):
+        # how fast what follows from the state moves says nothing of its size
+        tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
+        if self._sums is None and not self.missed.size:
+            numbers = t, lib.pointer(x), LARGEST * largest, lib.pointer(found)
+            if lib.core.sd_start_scale(c.addressof(self.core), lib.pointer(nominal), *tables, *numbers):
+                raise MemoryError
+            self.settled.failure.check()
+            return found
+        values, free = self.jacobian(t, x), self.residual(t, x)
+        told = np.where(self._of_missed, values, 0.0)
+        sized = values - np.where(np.isfinite(told), told, 0.0)
+        numbers = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
+        if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *numbers):
             raise MemoryError
-        return found if told is None else self._of_one_unit(np.abs(told), found)
+        return self._of_one_unit(np.abs(told), found) if self.missed.size else found
 
     def _of_one_unit(self, told: Floats, found: Floats) -> Floats:
         """Magnitudes with those of what guesses miss: guesses of one unit are measured alike."""

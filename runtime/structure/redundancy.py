@@ -144,7 +144,7 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     """Y at up to POINTS seeded points near the state, displacements consistent with phi."""
     starter = Starter(system, remember=True)
     x = np.concatenate([state.y, state.yd[starter.rates]])
-    q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
+    q = starter.moves(("q",))[: x.size]
     size = np.where(q, starter.scale(state.t, x), 0.0)
     random = np.random.default_rng(12)
     found = []

@@ -261,7 +261,7 @@ def structure(system: System, state: ConsistentState) -> Structure:
     n = int(system.are("f").sum())
     idle = system.idle_multipliers()
     m1, m2 = (int(system.are(kind).sum() - system.are(kind)[idle].sum()) for kind in ("kappa", "mu"))
-    rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())
+    rank, rank_q = m1 + m2 - int(left.size), m1 - int(system.are("kappa")[found.multipliers[left]].sum())
     weights = combination(found, left) if left.size else np.zeros(0)
     group = tuple(
         (_label(system, int(found.multipliers[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8)
