@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from sysdyn.compiler.binding import again as again_
 from sysdyn.compiler.binding import binding as binding_
 from sysdyn.compiler.binding import columns as columns_
 from sysdyn.compiler.binding import manifest
+from sysdyn.compiler.binding.again import Way
 from sysdyn.compiler.binding.binding import Binding, Overrides
 from sysdyn.compiler.binding.checks import check_energies
 from sysdyn.compiler.binding.columns import Columns, Floats
@@ -98,6 +100,10 @@ class CompiledModel:
         if found:
             raise ModelError(found)
         return binding
+
+    def way(self, binding: Binding, names: frozenset[str]) -> Way | None:
+        """What follows from scalar parameters; None where more than numbers does."""
+        return again_.way(self.network, self.energies, self.form, self.program, binding, names)
 
     def columns(self, binding: Binding, varied: Mapping[str, Floats]) -> Columns | None:
         """Bindings of many runs at once; None where each needs its own."""

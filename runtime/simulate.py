@@ -236,7 +236,8 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     options, start = runs.options, runs.start
     known = determined(written, start)
     runs.columns = tuple(
-        replace(column, derivative=column.derivative and bool(known[column.place])) for column in runs.columns
+        replace(column, derivative=False) if column.derivative and not known[column.place] else column
+        for column in runs.columns
     )
 
     def outcome(final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None) -> Outcome:
@@ -279,8 +280,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     ended = outcome(True, options.t_end, achieved, None)
     lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, ended.error_estimate))
     below = achieved is not None and achieved.below_round_off
-    ended = replace(ended, held=runs.held, judgement=judgement, below_round_off=below)
-    return replace(ended, cancelled=lost, events=finished.events)
+    return replace(ended, judgement=judgement, below_round_off=below, cancelled=lost, events=finished.events)
 
 
 def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

@@ -49,7 +49,7 @@ def _stages(starter: Starter, t: float, x: Floats, free: Mask) -> list[Stage]:
         rows = written | starter.groups("phi", "psi")
         found.append(Stage(((_places(rows), _places(free & (np.arange(free.size) < starter.n))),), guess=True))
     for groups, moving in STAGES:
-        rows, may = starter.groups(*groups), free & np.isin(starter.moving, moving)
+        rows, may = starter.groups(*groups), free & starter.moves(moving)
         trials = []
         for use in (rows | starter.between(moving), rows):
             if use.any() and may.any():

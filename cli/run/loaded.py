@@ -18,6 +18,8 @@ from sysdyn.cli.run import targets
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, options_of, ready
 from sysdyn.cli.run.targets import Target
+from sysdyn.compiler.binding.again import Way, again
+from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
@@ -40,6 +42,23 @@ class Compiled:
     """Its module was compared with its text."""
     lone: threading.Lock = field(default_factory=threading.Lock)
     """Of the run whose structures the next one takes."""
+    ways: dict[frozenset[str], Way | None] = field(default_factory=dict)
+    """What follows from parameters that were set together."""
+
+    def bound(self, numbers: Mapping[Any, Any]) -> Binding:
+        """The text's binding with these numbers: by what follows from them, or anew."""
+        compiled, binding = self.prepared.compiled, self.prepared.binding
+        if all(isinstance(name, str) and np.ndim(value) == 0 for name, value in numbers.items()):
+            names = frozenset(numbers)
+            if names not in self.ways:
+                if len(self.ways) >= KEPT:
+                    self.ways.clear()
+                self.ways[names] = compiled.way(binding, names)
+            way = self.ways[names]
+            found = None if way is None else again(binding, way, {name: float(v) for name, v in numbers.items()})
+            if found is not None:
+                return found
+        return compiled.bind(numbers)
 
 
 def _text_of(value: Any) -> str:
@@ -61,6 +80,7 @@ class Loaded:
         self.target: Target = target
         self._compiled: dict[tuple[tuple[str, str], ...], Compiled] = {}
         self.first = self._text(())
+        self.parameters = {p.name: p for p in self.first.prepared.network.parameters}
         report.raise_if_failed()
 
     def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
@@ -79,7 +99,7 @@ class Loaded:
 
     def _split(self, settings: Settings) -> tuple[dict[Any, Any], tuple[tuple[str, str], ...]]:
         """Numbers for the binding by name or (name, index, ...); the rest as texts."""
-        known = {p.name: p for p in self.first.prepared.network.parameters}
+        known = self.parameters
         numbers, texts = dict[Any, Any](), list[tuple[str, str]]()
         for name, value in settings.items():
             element = _ELEMENT.fullmatch(name)
@@ -105,7 +125,7 @@ class Loaded:
             return compiled.prepared, compiled
         try:
             with ex.fresh(compiled.nodes):
-                binding = compiled.prepared.compiled.bind(numbers)
+                binding = compiled.bound(numbers)
         except ModelError as error:
             scalar = all(isinstance(value, str) or np.ndim(value) == 0 for value in settings.values())
             if not scalar or {d.code for d in error.diagnostics} != {"E605"}:

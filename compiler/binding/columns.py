@@ -51,10 +51,10 @@ class Read(Parameters):
         return super().lookup(node, args)
 
 
-class _Varied(Parameters):
-    """Parameters of which some are columns."""
+class Varied(Parameters):
+    """Parameters of which some are other numbers, or columns over runs."""
 
-    def __init__(self, parameters: Parameters, columns: Mapping[str, Floats]) -> None:
+    def __init__(self, parameters: Parameters, columns: Mapping[str, Any]) -> None:
         self.__dict__.update(parameters.__dict__)
         self.values = {**parameters.values, **columns}
 
@@ -90,7 +90,7 @@ def _ordered(network: Network, names: list[str]) -> list[str]:
     return order
 
 
-def _reads_of_structure(
+def reads_of_structure(
     network: Network, model: EnergyModel, form: DescriptorForm, program: Program, binding: Binding
 ) -> set[str]:
     """Parameters that sizes, indices, ranges and integers are made of."""
@@ -124,10 +124,10 @@ def columns(
     moving = set(names)
     if any(known[n].shape or known[n].whole for n in names) or any(e.name in moving for e in network.elements):
         return None
-    if moving & _reads_of_structure(network, model, form, program, binding):
+    if moving & reads_of_structure(network, model, form, program, binding):
         return None
     runs = len(next(iter(varied.values())))
-    values = _Varied(binding.parameters, {n: np.asarray(v, dtype=float) for n, v in varied.items()})
+    values = Varied(binding.parameters, {n: np.asarray(v, dtype=float) for n, v in varied.items()})
     good = np.ones(runs, dtype=bool)
     for name in names[len(varied) :]:
         found = _over(known[name].values[0], values, runs)

@@ -6,7 +6,7 @@ loop fastest; every value is a scalar or an array over the iterations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,11 +38,22 @@ def evaluate(roots: Sequence[Node], lookup: Lookup) -> list[Value]:
         return _evaluate(roots, lookup)
 
 
+def in_order(nodes: Sequence[Node], lookup: Lookup) -> Value:
+    """The value of the last of nodes that stand after those they need."""
+    with np.errstate(all="ignore"):
+        return _values(nodes, lookup)[nodes[-1]]
+
+
 def _evaluate(roots: Sequence[Node], lookup: Lookup) -> list[Value]:
-    values: dict[Node, Value] = {}
-    for node in topological_unbound(roots):
-        values[node] = _value(node, [values[a] for a in node.args if a in values], lookup)
+    values = _values(topological_unbound(roots), lookup)
     return [values[r] for r in roots]
+
+
+def _values(nodes: Iterable[Node], lookup: Lookup) -> dict[Node, Value]:
+    values: dict[Node, Value] = {}
+    for node in nodes:
+        values[node] = _value(node, [values[a] for a in node.args if a in values], lookup)
+    return values
 
 
 def _value(node: Node, args: list[Value], lookup: Lookup) -> Value:

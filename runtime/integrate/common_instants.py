@@ -97,6 +97,8 @@ def beside(instants: Floats, one: Floats, two: Floats, span: float) -> NDArray[n
     side of a jump is no error of one on the other.  What the jumps do is compared behind them.
     """
     number = min(one.size, two.size)
+    if not number:
+        return np.zeros(instants.size, dtype=bool)
     low, high = np.minimum(one[:number], two[:number]), np.maximum(one[:number], two[:number])
     gap = np.diff(two, prepend=-np.inf, append=np.inf)
     near = high - low <= APART * np.minimum(gap[:-1], gap[1:])[:number]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +17,20 @@ from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.least_norm import LeastNorm
 from sysdyn.runtime.integrate.ledgers import Ledgers
 from sysdyn.runtime.integrate.methods import Method
-from sysdyn.runtime.integrate.metric import kinematic_scale, light
+from sysdyn.runtime.integrate.metric import kinematic_scale
+from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.pieces import Pieces
-from sysdyn.runtime.integrate.relaxation import displacement, order
 from sysdyn.runtime.integrate.request import LONGEST, ON_UNDERLYING, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
-from sysdyn.runtime.integrate.unknown_roles import Roles, roles
+from sysdyn.runtime.integrate.unknown_roles import Roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model import core_structures as structures
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
-from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise, unresolved
+from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.runtime.start.settled import Settler
 from sysdyn.runtime.start.start import ConsistentState
@@ -46,8 +46,6 @@ CREPT = 1e-7
 SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change:
 unknowns of one constraint are interpolated differently (core/radau_dense.c)."""
-UNRESOLVED = 8.0
-"""Times what round-off leaves open of an unknown: the least that its error test asks for."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -55,33 +53,38 @@ Sink = Callable[[Floats], None]
 Progress = Callable[[float], None]
 
 
-def same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
-    """Whether all numbers are the same."""
-    return len(one) == len(other) and all(map(np.array_equal, one, other))
+def _audited(system: System) -> Ints:
+    """Places of the members of the audit in y, in the order of core/run.h; -1 where there is none."""
+    found = np.full(7, -1, dtype=np.int32)
+    order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
+    for k in system.description.families_of("audit"):
+        name = system.description.families[k].name.rsplit(".", 1)[-1]
+        if name in order:
+            found[order.index(name)] = system.form.at[k]
+    return found
 
 
 class Integration:
     """The core's structures for one system and request; `run` drives them."""
 
-    def __init__(self, system: System, start: ConsistentState, request: Request) -> None:
+    def __init__(
+        self, system: System, start: ConsistentState, request: Request, origin: Origin | None = None
+    ) -> None:
+        """origin: of this start, where it is known."""
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
-        self.y, self.yd = start.for_form(system)
-        jy, jyd = system.jacobian(start.t, self.y, self.yd)
-        self._start_rate = self.yd.copy()
+        self.origin = origin = origin or Origin(system, start, request.index)
+        self.y, self.yd, self._start_rate = origin.y.copy(), origin.yd.copy(), origin.rate.copy()
         self._restart: Restart | None = None
-        # rates of algebraic unknowns do not follow from the start's equations: the first step finds them
-        self.yd = np.where(system.differential(jyd), self.yd, 0.0)
-        self.roles: Roles = roles(system, start.t, jyd, request.index)
+        self.roles: Roles = origin.roles
         self._carries, self._resolved = self.roles.state, np.zeros(system.unknowns)
-        state = system.are("q", "f")
         # a tolerance below what round-off leaves open is one that no step meets
-        self._least = np.where(state, UNRESOLVED * unresolved(system, self.y, jy), 0.0) / max(request.rtol, 1e-15)
-        self.magnitude = self._magnitudes(jy, jyd)
+        self._least = origin.least / max(request.rtol, 1e-15)
+        self.magnitude = self._magnitudes()
         if system.form.name == "2":
-            jy, jyd = self._weighted(jy, jyd)
-        self._light = light(system, jy, jyd)
-        self._linear(jy, jyd)
+            self._weigh()
+        self._light = origin.light
+        self._linear(origin.jy, origin.jyd)
         # flows without inertia in loops of stores follow from the rate of their balance alone
         contacts = request.events.contacts if request.events is not None else ()
         rated = bool(contacts) and "dynamics_rate" in system.description.blocks
@@ -94,29 +97,17 @@ class Integration:
         self._driver()
         self.pieces = Pieces(self, request.events) if request.events else None
 
-    def _weighted(self, jy: Floats, jyd: Floats) -> tuple[Floats, Floats]:
-        """The Jacobian with the factors of the rows q' - f; the magnitudes of nu follow them."""
-        scale = kinematic_scale(self.system, self.magnitude, jy, jyd)
-        if (scale == self.system.kinematic_scale).all():
-            return jy, jyd
-        self.system.kinematic_scale[:] = scale
-        jy, jyd = self.system.jacobian(self.start.t, self.y, self.yd)
-        self.magnitude = self._magnitudes(jy, jyd)
-        return jy, jyd
+    def _weigh(self) -> None:
+        """The factors of the rows q' - f; the magnitudes of nu follow them."""
+        scale = kinematic_scale(self.system, self.magnitude, self.origin.jy, self.origin.jyd)
+        if (scale != self.system.kinematic_scale).any():
+            self.system.kinematic_scale[:] = scale
+            self.origin.weighted()
+            self.magnitude = self._magnitudes()
 
-    def _magnitudes(self, jy: Floats, jyd: Floats) -> Floats:
-        found, self._time = self._sized(jy, jyd)
+    def _magnitudes(self) -> Floats:
+        found, self._time = self.origin.sized(self.request.t_end)
         return np.maximum(found, self._least)
-
-    def _sized(self, jy: Floats, jyd: Floats) -> tuple[Floats, float]:
-        """Magnitudes and the time scale of the start: those of the integration before this one, at the same point."""
-        system, request = self.system, self.request
-        point = self.start.t, request.t_end, jy, jyd, self.y, self.yd, system.description.p, system.held[0]
-        if not same(system.sized[0], point):
-            far = displacement(system, jy, jyd, self.yd)
-            found = magnitudes(system, self.start.t, request.t_end, self.y, self.yd, far)
-            system.sized = tuple(map(np.copy, point)), found
-        return system.sized[1]
 
     def _linear(self, jy: Floats, jyd: Floats) -> None:
         self.underlying: Underlying | None = None
@@ -125,8 +116,7 @@ class Integration:
             self.linear, self._order = self.underlying.linear, None
             return
         pattern = self.system.pattern
-        span = max(self.request.t_end - self.start.t, 1e-300)
-        self._order = order(self.system, jy + 1e3 / span * jyd)
+        self._order = order_of(self.system)
         self.linear = lib.core.sd_linear_new(
             pattern.unknowns, *(lib.pointer(item) for item in (pattern.column, pattern.row, self._order))
         )
@@ -205,14 +195,9 @@ class Integration:
             run.least_norm = self._least_norm.address
         for name, call in self._calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
-        self._audit_at = np.full(7, -1, dtype=np.int32)
-        order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
-        for k in system.description.families_of("audit"):
-            name = system.description.families[k].name.rsplit(".", 1)[-1]
-            if name in order:
-                self._audit_at[order.index(name)] = system.form.at[k]
+        self._audit_at = system.once("audited", lambda: _audited(system))
         self._instants = np.ascontiguousarray(request.instants, dtype=np.float64)
-        self._rows = np.zeros((max(64, min(ROOM, 1 << 24)) if self.width < 4096 else 64, self.width))
+        self._rows = np.empty((max(64, min(ROOM, 1 << 24)) if self.width < 4096 else 64, self.width))
         kinds = request.instant_kinds
         self._kinds = np.ascontiguousarray(
             np.full(self._instants.size, TRACE) if kinds is None else kinds, dtype=np.int32

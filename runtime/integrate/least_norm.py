@@ -32,9 +32,7 @@ class LeastNorm:
         every = np.arange(m + n)
         parts = [Places(which, behind), Places(behind, which), Places(every, every)]
         self.pattern, slots = compress(m + n, m + n, parts)
-        typical = np.random.default_rng(4).uniform(0.5, 1.5, self.pattern.entries)
-        typical[slots[2][m:]] = -1e-14
-        order = column_order(self.pattern, typical)
+        order = column_order(self.pattern)
         self._keep = [
             item if item is None else np.ascontiguousarray(item, dtype=np.int32)
             for item in (place, source, coordinate, *slots, order)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Ints, RowFamily
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.system import System
 
@@ -44,17 +45,22 @@ class Balance:
         return next((t for t, value in self.risen if not value <= limit), None)
 
 
+def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[tuple[RowFamily, int]], Ints]:
+    """Label, unit and first element of each ledger; row and position of each element, and its ledger."""
+    description = system.description
+    heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
+    families = [description.rows[k] for k in description.rows_of("ledger")]
+    labels = [(row, k) for row in families for k in range(row.size)]
+    of = np.array([int(row.kind.split()[0]) for row, _ in labels] + [0], dtype=np.int32)
+    return [(row.label, row.unit, row.at(0)) for row in heads], labels, of
+
+
 class Ledgers:
     """The core's structure for the ledgers of a system."""
 
     def __init__(self, system: System) -> None:
-        description = system.description
-        heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
-        families = [description.rows[k] for k in description.rows_of("ledger")]
-        self._heads = [(row.label, row.unit, row.at(0)) for row in heads]
-        self._labels = [(row, k) for row in families for k in range(row.size)]
-        of = np.array([int(row.kind.split()[0]) for row, _ in self._labels] + [0], dtype=np.int32)
-        count, elements = len(heads), len(self._labels)
+        self._heads, self._labels, of = system.once("ledgers", lambda: _kept(system))
+        count, elements = len(self._heads), len(self._labels)
         names = ("gross", "largest", "stored", "balance", "highest", "dissipated", "supplied")
         self._arrays = {name: np.zeros(count + 1) for name in names}
         self._arrays |= {name: np.zeros(elements + 1) for name in ("most", "value", "before")}

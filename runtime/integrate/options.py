@@ -129,6 +129,8 @@ def instants(options: Options) -> tuple[Floats, Ints]:
         wanted = np.concatenate([wanted, grid])
     # both ends are always there
     wanted = np.unique(np.concatenate([wanted, [t0, t1]]))
+    if not options.sampled_at:
+        return wanted, np.full(wanted.size, TRACE, dtype=np.int32)
     sampled = np.asarray(options.sampled_at, dtype=np.float64)
     every = np.unique(np.concatenate([wanted, sampled]))
     return every, (TRACE * np.isin(every, wanted) + STEP * np.isin(every, sampled)).astype(np.int32)

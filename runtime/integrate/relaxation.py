@@ -10,17 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.ordering import column_order
+from sysdyn.runtime.numerics.ordering import order_of
 
 RUNGS, RATIO = 4, 1e-3
 """Times that are tried: each this part of the one before, down to 1e-9 of the time scale."""
-
-
-def order(system: System, values: Floats) -> Ints | None:
-    """Elimination order of a form's matrices [unknowns], found once a description; values [entries]: a typical one."""
-    return system.once("order", lambda: column_order(system.pattern, values, leaving=bool(system.form.scales)))
 
 
 def displacement(system: System, jy: Floats, jyd: Floats, yd: Floats) -> Callable[[float], Floats]:
@@ -35,7 +30,7 @@ def displacement(system: System, jy: Floats, jyd: Floats, yd: Floats) -> Callabl
         if not (np.isfinite(jy).all() and np.isfinite(jyd).all() and yd.any()):
             return bound
         pattern = system.pattern
-        places = pattern.column, pattern.row, order(system, jy + jyd / tau)
+        places = pattern.column, pattern.row, order_of(system)
         linear = lib.core.sd_linear_new(pattern.unknowns, *map(lib.pointer, places))
         if not linear:
             raise MemoryError

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from sysdyn.runtime.integrate.accuracy import Sampled
 from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, drafted, joined, known
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
+from sysdyn.runtime.integrate.origin import Origin
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints, element
@@ -91,12 +92,13 @@ class Runs:
     def __init__(self, start: ConsistentState, options: Options, way: Way) -> None:
         self.start, self.options = start, options
         self.take(way)
-        self.columns: tuple[Column, ...] = columns_of(self.system.description)
+        self.columns: tuple[Column, ...] = self.system.once("columns", lambda: columns_of(self.system.description))
+        self.places = np.array([column.place for column in self.columns], dtype=np.int64)
         if options.events:  # laws are as the text says, whatever a run before from this start left
             self.system.description.p[[kink.branch for kink in options.events.kinks]] = LIVE
         # events write there: every run begins with these
         self.begin = self.system.description.p.copy(), self.system.description.switches.active.copy()
-        self.names = _observed_names(self.system.description)
+        self.names = self.system.once("observed names", lambda: _observed_names(self.system.description))
         self.instants, self.kinds = instants(options)
         self.keeping = keeping(options.output)
         self.statistics, self.last_statistics = Statistics(), Statistics()
@@ -121,6 +123,14 @@ class Runs:
         """Goes on with another method and form."""
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
         self.patience: int | None = None
+        self._origin: Origin | None = None
+
+    @property
+    def origin(self) -> Origin | None:
+        """The start as the system sees it, for all runs; events leave numbers behind: each run its own."""
+        if self._origin is None and not self.options.events:
+            self._origin = Origin(self.system, self.start, self.index)
+        return self._origin
 
     def request(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Request:
         """One integration's request; longest: step, as part of the span."""
@@ -213,7 +223,7 @@ class Runs:
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
         layout = Layout(self.columns, len(self.names), attributes, self.options.parameters)
         self.writer = self.keeping.writer(layout, first)
-        integration = Integration(self.system, self.start, self.request(rtol, atol, longest))
+        integration = Integration(self.system, self.start, self.request(rtol, atol, longest), self.origin)
         try:
             finished = self._integrate(integration)
         except BaseException:
@@ -255,24 +265,31 @@ class Runs:
         """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
         less than round-off of the largest of the same unit, unknowns (magnitude [unknowns]) among them.
         """
-        own = np.array([float(largest[column.place]) for column in self.columns])
-        return np.asarray(np.maximum(own, ROUND_OFF * self.beside(largest, magnitude)))
+        return np.asarray(np.maximum(largest[self.places], ROUND_OFF * self.beside(largest, magnitude)))
 
     def beside(self, largest: Floats, magnitude: Floats) -> Floats:
         """The largest of the unit of each stored quantity [columns], unknowns among them."""
-        of_unit = {"1": PURE}
-        for family, first in zip(self.system.description.families, self.system.form.at, strict=False):
-            if family.size and first + family.size <= magnitude.size:
-                size = float(magnitude[first : first + family.size].max())
-                of_unit[family.unit] = max(of_unit.get(family.unit, 0.0), size)
-        for column in self.columns:
-            of_unit[column.unit] = max(of_unit.get(column.unit, 0.0), float(largest[column.place]))
-        return np.array([of_unit[column.unit] for column in self.columns])
+        of_unknowns, of_columns, number = self.system.once("units", self._units)
+        found = np.zeros(number)
+        found[0] = PURE
+        np.fmax.at(found, of_unknowns, magnitude[: of_unknowns.size])
+        np.fmax.at(found, of_columns, largest[self.places])
+        return np.asarray(found[of_columns])
+
+    def _units(self) -> tuple[Ints, Ints, int]:
+        """Number of the unit of each unknown as written and of each stored quantity, and how many units there are; 0:
+        pure numbers.
+        """
+        system, number = self.system, {"1": 0}
+        of_family = [number.setdefault(family.unit, len(number)) for family in system.description.families]
+        of_columns = [number.setdefault(column.unit, len(number)) for column in self.columns]
+        of_unknowns = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: system.form.written]]
+        return of_unknowns, np.array(of_columns, dtype=np.int32), len(number)
 
     def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""
         sizes = self.sizes(largest, magnitude)
-        return {column.name: float(size) for column, size in zip(self.columns, sizes, strict=True)}
+        return dict(zip((column.name for column in self.columns), sizes.tolist(), strict=True))
 
     @property
     def held(self) -> Trace | None:
@@ -289,7 +306,8 @@ class Runs:
 
     def statistics_object(self, error_estimate: float | None) -> dict[str, Any]:
         """The counters of all runs, with the estimate."""
-        return {**asdict(self.statistics), "error_estimate": error_estimate}
+        counted = {name: getattr(self.statistics, name) for name in Statistics.__slots__}
+        return {**counted, "error_estimate": error_estimate}
 
     def timings(self) -> dict[str, float]:
         """cpu_integrate_s, wall_integrate_s, cpu_compile_s, wall_total_s; forecast_s of a longer one."""
@@ -318,17 +336,17 @@ class Runs:
             there = self._sampled(own, finished), self._late(own, steps=True)
         self.compared_at = instants if instants is not None else self.common
         values = there[0] if there is not None and instants is None else self._sampled(rows, finished)
-        sizes = [*self.sizes(finished.largest, finished.magnitude), *map(self._turned_over, self.meters)]
+        sizes = np.append(self.sizes(finished.largest, finished.magnitude), [*map(self._turned_over, self.meters)])
         noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(self.meters)))
-        jumps = np.unique([e.time for e in finished.events])
+        jumps = np.unique([e.time for e in finished.events]) if finished.events else np.zeros(0)
         last, self.jumps = self.jumps, jumps
         span = self.options.t_end - self.options.t_start
         assert self.compared_at is not None
         between = beside(self.compared_at, jumps if last is None else last, jumps, span)
         steps = finished.statistics.steps
         late = self._late(rows) if instants is not None else 0.0
-        found = Sampled(tolerance, values, np.array(sizes), steps, noise, between, late, there)
+        found = Sampled(tolerance, values, sizes, steps, noise, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
 
@@ -336,20 +354,18 @@ class Runs:
         """The compared quantities [k, quantities] at rows."""
         if finished.beyond > BEYOND:
             rows = np.full_like(rows, np.nan)
-        places = [lib.ROW_HEAD + column.place for column in self.columns] + [METERS[name] for name in self.meters]
-        return rows[:, places]
+        return rows[:, [*(lib.ROW_HEAD + self.places).tolist(), *(METERS[name] for name in self.meters)]]
 
     def _late(self, rows: Floats, *, steps: bool = False) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]; steps: rows of
         the run's own steps, whose rates are those of the equations.
         """
-        places = np.array([lib.ROW_HEAD + column.place for column in self.columns], dtype=np.int64)
-        options = self.options
+        places, options = lib.ROW_HEAD + self.places, self.options
         asked = min((a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None), default=0.0)
         tau = min(accuracy.TIMING, accuracy.SHARE * asked) * (options.t_end - options.t_start)
         rates = rows[:, places + len(self.names)]
         late = accuracy.lateness(rows[:, 0], rows[:, places], rates, tau) if steps else tau * np.abs(rates)
-        return np.hstack([late, np.zeros((len(rows), len(self.meters)))])
+        return np.hstack([late, np.zeros((len(rows), len(self.meters)))]) if self.meters else late
 
     @property
     def _width(self) -> int:

@@ -26,7 +26,9 @@ class Segment:
 
 def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
     """The pieces of t0..t1; stops outside are left out."""
-    inside = np.unique(np.asarray([] if stops is None else stops, dtype=np.float64))
+    if stops is None or not np.size(stops):
+        return (Segment(t0, t1, t0),)
+    inside = np.unique(np.asarray(stops, dtype=np.float64))
     inside = inside[np.isfinite(inside)]
     least = CLOSE * max(abs(t0), abs(t1), t1 - t0)
     inside = inside[(inside > t0) & (inside < t1)]

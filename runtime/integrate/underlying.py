@@ -24,6 +24,8 @@ from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 
+SMALL = 32
+"""Unknowns up to which the core judges the matrix first (core/dense.h)."""
 DENSE = 300
 """Unknowns up to which the matrix is judged by its singular values."""
 _DERIVED = {"phi": "phi_acceleration", "phi_rate": "phi_acceleration", "psi": "psi_rate", "momentum": "momentum_rate"}
@@ -51,83 +53,45 @@ class Selection:
     applied: tuple[int, ...]
 
 
-class Underlying:
-    """system: form "0"; magnitude [unknowns], kept and read by the core."""
+def _solved_for(system: System) -> tuple[Ints, Ints, Ints]:
+    """Unknown [solved], column [unknowns], rate [solved] of a Selection."""
+    unknown = np.flatnonzero(~system.are("q")).astype(np.int32)
+    column = np.full(system.unknowns, -1, dtype=np.int32)
+    column[unknown] = np.arange(unknown.size)
+    rate = np.where(system.are("f", "p"), 2, np.where(system.are("s"), 1, 0)).astype(np.int32)[unknown]
+    return unknown, column, rate
 
-    def __init__(self, system: System, magnitude: Floats, jy: Floats, jyd: Floats) -> None:
-        self.system, self._magnitude = system, magnitude
-        kinds = system.kinds
-        self._unknown = np.flatnonzero(kinds != "q").astype(np.int32)
-        self._column = np.full(system.unknowns, -1, dtype=np.int32)
-        self._column[self._unknown] = np.arange(self._unknown.size)
-        moved = system.are("f", "p")
-        self._rate = np.where(moved, 2, np.where(kinds == "s", 1, 0)).astype(np.int32)[self._unknown]
-        (
-            self._in_matrix, self._source, self._from_rate, self.pattern
-        ) = system.once("selection", self._select)  # fmt: skip
-        self._systems()
-        order = system.once("order of accelerations", lambda: column_order(self.pattern, self.values(jy, jyd)))
-        self._order = order
-        self.linear = lib.core.sd_linear_new(
-            self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))
-        )
-        self.core: Any = lib.core.sd_underlying_new(c.byref(system.core), self.linear) if self.linear else None
-        if not self.core:
-            raise MemoryError
-        core = self.core.contents
-        core.matrix, core.applied = c.addressof(self.matrix), c.addressof(self.applied)
-        core.position, core.velocity = (item and c.addressof(item) for item in (self.position, self.velocity))
-        core.direct = int(self._direct)
-        core.unknown, core.rate, core.column = map(lib.pointer, (self._unknown, self._rate, self._column))
-        core.source, core.from_rate = lib.pointer(self._source), lib.pointer(self._from_rate)
-        core.magnitude, core.tolerance = lib.pointer(magnitude), 1e-14
-        core.displaced = lib.pointer(self._displaced)
 
-    def _select(self) -> tuple[NDArray[np.bool_], Ints, Ints, Pattern]:
-        """Which entries of dF/dy, dF/dy' stand in the matrix, where from, and its pattern."""
-        system = self.system
-        pattern, first = system.pattern, system.form.k_row.size
-        columns = pattern.columns_of()
-        in_y, in_rate = system.structural()
-        in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
-        of_rate = (self._rate > 0)[self._column[columns]]
-        take = in_matrix & np.where(of_rate, in_rate, in_y)
-        source, from_rate = np.flatnonzero(take).astype(np.int32), of_rate[take].astype(np.int32)
-        number = self._unknown.size
-        start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
-        rows = (pattern.row[take] - first).astype(np.int32)
-        return in_matrix, source, from_rate, Pattern(number, number, start, rows)
+class _Parts:
+    """The calls of a system in form "0" by what they serve: the matrix, the applied efforts, projections.
 
-    def _systems(self) -> None:
-        """The systems of the core: matrix, applied, position, velocity."""
-        system = self.system
+    calls: all, without slopes that do not stand in the matrix; direct: the matrix does not depend on what is solved
+    for; applied, kept: those that are no reactions, and their number; position, velocity: rows of constraints.
+    """
+
+    def __init__(self, system: System, algebraic: NDArray[np.bool_]) -> None:
         number = len(system.form.calls)
-        self._calls = (lib.Call * max(number, 1))()
-        algebraic = (self._rate == 0)[self._column[system.pattern.columns_of()]] & self._in_matrix
-        self._direct = True
+        self.calls = (lib.Call * max(number, 1))()
+        self.direct = True
         for k, planned in enumerate(system.form.calls):
-            self._calls[k] = system.calls[k]
+            self.calls[k] = system.calls[k]
             if not algebraic[system.slots_dy(k)].any():
-                self._calls[k].n_dy = 0  # its slopes in y do not stand in the matrix
+                self.calls[k].n_dy = 0  # its slopes in y do not stand in the matrix
             elif not planned.block.endswith("_reaction"):
-                self._direct = False
-        self.matrix = lib.System.from_buffer_copy(system.core)
-        self.matrix.call = c.addressof(self._calls)
+                self.direct = False
         kept = [k for k, planned in enumerate(system.form.calls) if not planned.block.endswith("_reaction")]
-        self._applied = (lib.Call * max(len(kept), 1))(*(system.calls[k] for k in kept))
-        self.applied = lib.System.from_buffer_copy(system.core)
-        self.applied.call, self.applied.calls = c.addressof(self._applied), len(kept)
+        self.kept = len(kept)
+        self.applied = (lib.Call * max(len(kept), 1))(*(system.calls[k] for k in kept))
         self._keep: list[Any] = []
-        self.position = self._rows("phi")
-        self.velocity = self._rows("phi_rate", "psi", "momentum")
-        self._displaced = np.zeros(system.rows, dtype=np.int32)
+        self.position = self._rows(system, "phi")
+        self.velocity = self._rows(system, "phi_rate", "psi", "momentum")
+        self.displaced = np.zeros(system.rows, dtype=np.int32)
         for planned in system.form.calls:
             for k in system.description.rows_of("phi") if planned.block == "phi_acceleration" else ():
-                self._displaced[planned.to[k] : planned.to[k] + system.description.rows[k].size] = 1
+                self.displaced[planned.to[k] : planned.to[k] + system.description.rows[k].size] = 1
 
-    def _rows(self, *blocks: str) -> lib.System | None:
+    def _rows(self, system: System, *blocks: str) -> lib.System | None:
         """Rows of constraints in the places of their derivatives; None where the model has none."""
-        system = self.system
         planned = {item.block: item for item in system.form.calls}
         found: list[tuple[str, Planned]] = [
             (block, planned[_DERIVED[block]])
@@ -148,6 +112,61 @@ class Underlying:
             stop=system.core.stop,
         )
 
+
+class Underlying:
+    """system: form "0"; magnitude [unknowns], kept and read by the core."""
+
+    def __init__(self, system: System, magnitude: Floats, jy: Floats, jyd: Floats) -> None:
+        self.system, self._magnitude = system, magnitude
+        self._unknown, self._column, self._rate = system.once("solved for", lambda: _solved_for(system))
+        (
+            self._in_matrix, self._source, self._from_rate, self.pattern
+        ) = system.once("selection", self._select)  # fmt: skip
+        self._parts = system.own("parts", lambda: _Parts(system, self._algebraic()))
+        order = system.once("order of accelerations", lambda: column_order(self.pattern))
+        self._order = order
+        self.linear = lib.core.sd_linear_new(
+            self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))
+        )
+        self.core: Any = lib.core.sd_underlying_new(c.byref(system.core), self.linear) if self.linear else None
+        if not self.core:
+            raise MemoryError
+        self._systems(self.core.contents)
+        core = self.core.contents
+        core.unknown, core.rate, core.column = map(lib.pointer, (self._unknown, self._rate, self._column))
+        core.source, core.from_rate = lib.pointer(self._source), lib.pointer(self._from_rate)
+        core.magnitude, core.tolerance = lib.pointer(magnitude), 1e-14
+
+    def _systems(self, core: Any) -> None:
+        """The core's own systems, as rows are held now."""
+        parts, system = self._parts, self.system
+        self.matrix = lib.System.from_buffer_copy(system.core)
+        self.matrix.call = c.addressof(parts.calls)
+        self.applied = lib.System.from_buffer_copy(system.core)
+        self.applied.call, self.applied.calls = c.addressof(parts.applied), parts.kept
+        core.matrix, core.applied = c.addressof(self.matrix), c.addressof(self.applied)
+        core.position, core.velocity = (item and c.addressof(item) for item in (parts.position, parts.velocity))
+        core.direct, core.displaced = int(parts.direct), lib.pointer(parts.displaced)
+
+    def _algebraic(self) -> NDArray[np.bool_]:
+        """Entries of the matrix whose unknown is no rate [entries]."""
+        return np.asarray((self._rate == 0)[self._column[self.system.pattern.columns_of()]] & self._in_matrix)
+
+    def _select(self) -> tuple[NDArray[np.bool_], Ints, Ints, Pattern]:
+        """Which entries of dF/dy, dF/dy' stand in the matrix, where from, and its pattern."""
+        system = self.system
+        pattern, first = system.pattern, system.form.k_row.size
+        columns = pattern.columns_of()
+        in_y, in_rate = system.structural()
+        in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
+        of_rate = (self._rate > 0)[self._column[columns]]
+        take = in_matrix & np.where(of_rate, in_rate, in_y)
+        source, from_rate = np.flatnonzero(take).astype(np.int32), of_rate[take].astype(np.int32)
+        number = self._unknown.size
+        start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
+        rows = (pattern.row[take] - first).astype(np.int32)
+        return in_matrix, source, from_rate, Pattern(number, number, start, rows)
+
     @property
     def selection(self) -> Selection:
         """The tables of the core's structure."""
@@ -160,8 +179,8 @@ class Underlying:
             self._source,
             self._from_rate,
             np.zeros(0, dtype=np.int32) if self._order is None else self._order,
-            self._direct,
-            tuple(k for k in calls if self._calls[k].n_dy == 0),
+            self._parts.direct,
+            tuple(k for k in calls if self._parts.calls[k].n_dy == 0),
             tuple(k for k in calls if not self.system.form.calls[k].block.endswith("_reaction")),
         )
 
@@ -176,10 +195,12 @@ class Underlying:
 
     def undetermined(self, jy: Floats, jyd: Floats) -> tuple[str, ...]:
         """Unknowns, or x' for their derivatives, that the rows do not determine at a point; () where they do."""
-        matrix = _balanced(self.pattern, self.values(jy, jyd))
         number = self.pattern.unknowns
         if number == 0:
             return ()
+        if number <= SMALL and _regular(self.pattern, self.values(jy, jyd)):
+            return ()
+        matrix = _balanced(self.pattern, self.values(jy, jyd))
         if number > DENSE:
             alone = _unmatched(self.pattern)
             return self._largest(alone if alone.any() else _sparse_null(self.pattern, matrix))
@@ -228,6 +249,12 @@ def obstacle(system: System, state: ConsistentState) -> tuple[str, ...]:
     y, yd = state.for_form(system)
     jy, jyd = system.jacobian(state.t, y, yd)
     return Underlying(system, np.ones(system.unknowns), jy, jyd).undetermined(jy, jyd)
+
+
+def _regular(pattern: Pattern, values: Floats) -> bool:
+    """Whether a small matrix is certainly regular, or holds what is no number, of which nothing can be said."""
+    arrays = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(values)
+    return int(lib.core.sd_regular(pattern.unknowns, *arrays, CERTAIN)) != 0
 
 
 def _balanced(pattern: Pattern, values: Floats) -> Floats:

@@ -40,23 +40,23 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
 
     t, jyd: of the start, where dF/dyd shows the flows with inertia.
     """
-    kinds = system.kinds
+    flows, implicit = system.are("f"), system.are("e")
     differential = system.differential(jyd)
-    state = system.are("q", "p", "s") | ((kinds == "f") & differential)
+    state = system.are("q", "p", "s") | (flows & differential)
     test = np.where(state, 0, -1)
     power = np.zeros(system.unknowns, dtype=np.int32)
     multiplier = system.are("kappa", "mu", "nu")
     if index >= 2:
         steep = np.zeros(system.unknowns, dtype=bool)
         steep[system.pattern.columns_of()[system.steep_rows(t)[system.pattern.row]]] = True
-        power[multiplier | (((kinds == "e") | ((kinds == "f") & ~differential)) & ~steep)] = 1
+        power[multiplier | ((implicit | (flows & ~differential)) & ~steep)] = 1
     if index >= 3:
         power[system.are("kappa", "mu")] = 2
         power[system.are("f", "p") & state] = 1
         test[system.are("f", "p") & state] = 1
     if not state.any():
-        test[kinds == "f"] = 0
+        test[flows] = 0
     if (test < 0).all():
         test[:] = 0
-    idle = multiplier | (kinds == "e") | ((kinds == "f") & ~differential)
+    idle = multiplier | implicit | (flows & ~differential)
     return Roles(test.astype(np.int32), power, state, differential, unique(system, jyd), idle)

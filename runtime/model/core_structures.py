@@ -562,3 +562,59 @@ class Many(c.Structure):
         ("last_time", _D),
         *[(name, _P) for name in ["end", "least", "most", "thick", "work", "kind"]],
     ]
+
+
+class Balance(c.Structure):
+    """sd_balance."""
+
+    _fields_ = [
+        ("unknowns", _I),
+        ("rows", _I),
+        ("entries", _I),
+        ("kinds", _I),
+        ("row", _P),
+        ("column", _P),
+        ("kind", _P),
+    ]
+
+
+class RowsOfStart(c.Structure):
+    """sd_rows_of_start."""
+
+    _fields_ = [
+        ("system", _P),
+        ("balance", Balance),
+        ("written", _I),
+        ("rates", _I),
+        ("missed", _I),
+        ("rated", _I),
+        ("kinematics", _I),
+        ("rate", _P),
+        ("entry", _P),
+        ("miss", _P),
+        ("k_q", _P),
+        ("k_f", _P),
+        ("extended", _I),
+    ]
+
+
+class Search(c.Structure):
+    """sd_search."""
+
+    _fields_ = [
+        ("start", _P),
+        ("use", _P),
+        ("free", _P),
+        ("guess", _P),
+        ("scale", _P),
+        ("weight", _P),
+        ("t", _D),
+        ("most", _I),
+        ("folds", _I),
+        ("share", _D),
+        ("spent", _D),
+        ("largest", _D),
+        ("x", _P),
+        ("scaled", _P),
+        ("residual", _D),
+    ]

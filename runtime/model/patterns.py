@@ -24,8 +24,8 @@ Array = TypeVar("Array", bound=NDArray[Any])
 class Places:
     """Entries in the order of the block's list: row, column [entries]."""
 
-    row: Longs
-    column: Longs
+    row: NDArray[np.integer]
+    column: NDArray[np.integer]
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class Pattern:
         """Number of places."""
         return int(self.row.size)
 
-    def columns_of(self) -> Longs:
+    def columns_of(self) -> Ints:
         """Column of each entry [entries]; read-only."""
         return self._columns
 
     @cached_property
-    def _columns(self) -> Longs:
-        return read_only(np.repeat(np.arange(self.unknowns), np.diff(self.column)))
+    def _columns(self) -> Ints:
+        return read_only(np.repeat(np.arange(self.unknowns, dtype=np.int32), np.diff(self.column)))
 
 
 def read_only(array: Array) -> Array:
@@ -117,8 +117,8 @@ def places(
                 + _positions(pair[side], shapes[side][pair[side].family], loops, number, ix)
                 for pair in entries
             ]
-            into.append(np.stack(found, axis=1).ravel())
-    empty = np.zeros(0, dtype=np.int64)
+            into.append(np.stack([item.astype(np.int32) for item in found], axis=1).ravel())
+    empty = np.zeros(0, dtype=np.int32)
     return Places(
         np.concatenate(all_rows) if all_rows else empty, np.concatenate(all_columns) if all_columns else empty
     )
@@ -126,8 +126,11 @@ def places(
 
 def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern, list[Ints]]:
     """One pattern that holds all parts, and for each part the place of each of its entries (int32)."""
-    row = np.concatenate([part.row for part in parts]) if parts else np.zeros(0, dtype=np.int64)
-    column = np.concatenate([part.column for part in parts]) if parts else np.zeros(0, dtype=np.int64)
+    empty = np.zeros(0, dtype=np.int32)
+    row, column = (
+        np.concatenate([empty, *(np.asarray(getattr(part, side), dtype=np.int32) for part in parts)])
+        for side in ("row", "column")
+    )
     if row.size and (row.min() < 0 or row.max() >= rows or column.min() < 0 or column.max() >= unknowns):
         raise ContractError("an entry lies outside the matrix")
     number, count = numbered(column, row, unknowns, rows)

@@ -10,13 +10,16 @@ During a run magnitudes grow with max |y|; a second run starts with the maxima o
 
 from __future__ import annotations
 
+import ctypes as c
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import compliance
-from sysdyn.runtime.model.patterns import numbered, read_only
+from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
 
 ROUND_OFF = 1e-12
@@ -34,6 +37,8 @@ NOISE = 1e-6
 QUIET = 1e-9
 """Efforts below this part of (largest energy) / q are round-off."""
 _SAMPLES = 16
+_PARTS = np.array([1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)])
+"""Of the span: where rows are asked how far they moved, the first to tell how fast."""
 _HOLDS = ("phi", "psi")
 """Beginnings of the names of groups of constraints."""
 _SWEEPS = 8
@@ -50,16 +55,12 @@ def _grouped(system: System, y: Floats, moves: Floats, compliance: Floats) -> Fl
 
 def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
     """How far each row moves with t alone over the span [rows]; shortest time in which one does so [s]."""
-    base = system.residual(t0, y, yd)
-    span = t_end - t0
-    moves = []
-    for part in (1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)):
-        with np.errstate(all="ignore"):  # what overflows is left out below
-            moved = np.abs(system.residual(t0 + span * part, y, yd) - base)
-        moves.append(np.where(np.isfinite(moved), moved, 0.0))
-    most, early = np.max(moves, axis=0, initial=0.0), moves[0]
-    quick = early > NOISE * most
-    return most, float((1e-6 * span * most[quick] / early[quick]).min(initial=np.inf))
+    moves, a, b = np.zeros(max(system.rows, 1)), system._buffer(y), system._buffer(yd)
+    point = t0, t_end - t0, lib.pointer(a), lib.pointer(b)
+    parts = lib.pointer(_PARTS), _PARTS.size
+    quick = lib.core.sd_excitation(c.byref(system.core), *point, *parts, NOISE, lib.pointer(moves))
+    system.failure.check()
+    return moves[: system.rows], float(quick)
 
 
 def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: float) -> float:
@@ -84,69 +85,10 @@ def _flows(system: System, found: Floats, span: float) -> Floats:
     return result
 
 
-def propagate(
-    magnitude: Floats,
-    rows: NDArray[np.integer],
-    columns: NDArray[np.integer],
-    size: Floats,
-    excited: Floats,
-    alike: NDArray[np.int64],
-    *,
-    largest: bool = False,
-    capped: bool = False,
-    group: NDArray[np.int64] | None = None,
-) -> Floats:
-    """Fills zeros of `magnitude` [unknowns] so that their terms balance the others of their rows.
-
-    rows, columns, size [entries]: |coefficient| of each place; excited [rows]: magnitude of the rows' free terms;
-    alike [unknowns]: number of the kind and unit.  A coefficient that is small beside those of its like proposes much:
-    it is asked only where no other is left.
-    Of several rows' proposals the least counts, or the largest; capped: none above the largest of its like that is
-    known, for along a chain each overestimates the next, and a run mends what is too small alone.
-    group [entries]: what `of_a_kind` says of the places, where that is known.
-    """
-    found = magnitude.copy()
-    if not (found == 0.0).any():
-        return found
-    places = size > 0.0
-    if group is None:
-        group = of_a_kind(rows, columns, alike)
-    rows, columns, size, group = rows[places], columns[places], size[places], group[places]
-    leading = np.zeros(int(group.max(initial=-1)) + 1)
-    np.maximum.at(leading, group, size)
-    small = size < GROUP * leading[group]
-    for _ in range(_SWEEPS):
-        missing = found == 0.0
-        if not missing.any():
-            break
-        row = excited.copy()
-        np.maximum.at(row, rows, size * found[columns])
-        wanted = missing[columns] & (row[rows] > 0.0)
-        if (wanted & ~small).any():
-            wanted &= ~small
-        best = np.zeros(found.size) if largest else np.full(found.size, np.inf)
-        pick = np.maximum if largest else np.minimum
-        with np.errstate(over="ignore"):  # a proposal without bound is none
-            pick.at(best, columns[wanted], row[rows[wanted]] / size[wanted])
-        if capped:
-            known = _group_maximum(alike, found)
-            best = np.where(known > 0.0, np.minimum(best, known), best)
-        found = np.where(missing & np.isfinite(best), best, found)
-    return found
-
-
-def of_a_kind(
-    rows: NDArray[np.integer], columns: NDArray[np.integer], alike: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Number of the row and the kind of its unknown, of each place [entries]."""
-    kinds = 1 + int(alike.max(initial=0))
-    return numbered(rows, alike[columns], 1 + int(rows.max(initial=0)), kinds)[0].astype(np.int64)
-
-
-def of_kinds(system: System) -> NDArray[np.int64]:
-    """What `of_a_kind` says of the places of a system's pattern [entries]; read-only."""
-    rows, columns = system.pattern.row, system.pattern.columns_of()
-    return system.once("of kinds", lambda: read_only(of_a_kind(rows, columns, alike(system))))
+def balance(system: System) -> Balance:
+    """The rows of a system's Jacobian."""
+    pattern = system.pattern
+    return system.once("balance", lambda: Balance(system.rows, pattern.row, pattern.columns_of(), alike(system)))
 
 
 def _efforts(system: System, found: Floats, row: Floats) -> Floats:
@@ -200,10 +142,8 @@ def _group_maximum(group: NDArray[np.int64], values: Floats) -> Floats:
 
 def balanced(system: System, y: Floats, jy: Floats) -> Floats:
     """Size of each unknown at a point [unknowns], all positive: |y|, or what balances its rows."""
-    rows, columns = system.pattern.row.astype(np.int64), system.pattern.columns_of()
     size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
-    nothing, group = np.zeros(system.rows), of_kinds(system)
-    found = propagate(np.abs(y), rows, columns, size, nothing, alike(system), largest=True, group=group)
+    found = balance(system).propagate(np.abs(y), size, np.zeros(system.rows), largest=True)
     found = np.maximum(found, GROUP * group_maximum(system, found))
     return np.where(found > 0.0, found, 1.0)
 
@@ -235,13 +175,13 @@ def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
     slope = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     take = balance[rows] & (slope > 0.0)
     i, j, slope = rows[take], columns[take], slope[take]
-    multiplier = np.isin(system.kinds[j], ("kappa", "mu", "e"))
+    multiplier = system.are("kappa", "mu", "e")[j]
     leading = np.zeros(system.rows)
     np.maximum.at(leading, i[multiplier], slope[multiplier])
     told = multiplier & (slope >= GROUP * leading[i])
     for _ in range(_SWEEPS):
         row = np.zeros(system.rows)
-        np.maximum.at(row, i, slope * np.where(multiplier | (system.kinds[j] == "f"), found[j], 0.0))
+        np.maximum.at(row, i, slope * np.where(multiplier | system.are("f")[j], found[j], 0.0))
         before = found.copy()
         np.maximum.at(found, j[told], row[i[told]] / slope[told])
         if (found == before).all():
@@ -275,7 +215,7 @@ def magnitudes(
     tau = time_scale(system, span, y, yd, quick)
     jy, jyd = system.jacobian(t0, y, yd)
     # flows without inertia follow from the rest
-    carries = state & ((system.kinds != "f") | system.differential(jyd) | _with_momentum(system))
+    carries = state & (~system.are("f") | system.differential(jyd) | _with_momentum(system))
     moves = np.where(carries, tau * np.abs(yd) if far is None else far(tau), 0.0)
     known = np.maximum(np.abs(y), moves)
     form = system.form
@@ -286,22 +226,20 @@ def magnitudes(
     found = _flows(system, found, span)
     size = np.abs(jy) + np.abs(jyd) / tau
     size = np.where(np.isfinite(size), size, 0.0)
-    pattern = system.pattern
-    rows, columns, kinds = pattern.row.astype(np.int64), pattern.columns_of(), alike(system)
-    group = of_kinds(system)
+    rows, columns, own = system.pattern.row, system.pattern.columns_of(), balance(system)
     # what round-off leaves of a zero is nothing beside what the sources will make of it
-    driven = propagate(np.zeros(found.size), rows, columns, size, excited, kinds, capped=True, group=group)
+    driven = own.propagate(np.zeros(found.size), size, excited, capped=True)
     found = np.where(carries & (found < ROUND_OFF * driven), driven, found)
     # momenta and dynamic variables are balanced against flows, what follows from the state against all of it: so
     # round-off of a start does not pass for a magnitude
     kept = np.where(system.are("q", "f") & carries, found, 0.0)
-    balanced = propagate(kept, rows, columns, size, excited, kinds, largest=True, capped=True, group=group)
+    balanced = own.propagate(kept, size, excited, largest=True, capped=True)
     found = np.where(~system.are("p", "s") | (found > NOISE * balanced), found, balanced)
     kept = np.where(carries, found, 0.0)
     row = excited.copy()
     np.maximum.at(row, rows, size * kept[columns])
     excited = np.maximum(excited, _efforts(system, found, row))
-    balanced = propagate(kept, rows, columns, size, excited, kinds, capped=True, group=group)
+    balanced = own.propagate(kept, size, excited, capped=True)
     found = np.where(found > NOISE * balanced, found, balanced)
     found = np.where(found == 0.0, group_maximum(system, found), found)
     found[form.k_q] = np.where(found[form.k_q] == 0.0, tau * found[form.k_f], found[form.k_q])

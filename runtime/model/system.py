@@ -40,6 +40,8 @@ class Layout:
     reads_rate: Ints
 
 
+KEPT = 1000
+"""Unknowns up to which what is as long as they are, and quickly made, is kept."""
 SETS = 4096
 """Active sets whose rows are kept."""
 
@@ -91,11 +93,10 @@ class System:
             description.layouts[key] = plan(description, index_form)
         self.form: Form = description.layouts[key]
         self.failure = Failure()
-        self.sized: tuple[tuple[Any, ...], tuple[Floats, float]] = ((), (np.zeros(0), 0.0))
-        """Magnitudes found last, and the point at which (integrate/integrate.py)."""
         self.starter: Any = None
         """What the start was sought in (start/starter.py), where it may serve again."""
         self._keep: list[Any] = []
+        self._own: dict[Hashable, Any] = {}
         self._assemble()
 
     def once(self, name: Hashable, make: Callable[[], Found]) -> Found:
@@ -104,6 +105,16 @@ class System:
         if key not in self.description.layouts:
             self.description.layouts[key] = make()
         return self.description.layouts[key]  # type: ignore[no-any-return]
+
+    def once_if_small(self, name: Hashable, make: Callable[[], Found]) -> Found:
+        """The same where keeping it costs no room to speak of; else made anew."""
+        return self.once(name, make) if self.unknowns <= KEPT else make()
+
+    def own(self, name: Hashable, make: Callable[[], Found]) -> Found:
+        """What is made of this system's structures in the core, whatever the numbers: once for all runs it serves."""
+        if name not in self._own:
+            self._own[name] = make()
+        return self._own[name]  # type: ignore[no-any-return]
 
     @property
     def unknowns(self) -> int:
@@ -265,7 +276,10 @@ class System:
         return read_only(in_y), read_only(in_rate)
 
     def observer(self, block: str) -> lib.Call | None:
-        """A call of observe, observe_rate, observe_scale or audit whose rows begin at 0."""
+        """A call of observe, observe_rate, observe_scale or audit whose rows begin at 0; None where there is none."""
+        return self.own(("observer", block), lambda: self._observer(block))
+
+    def _observer(self, block: str) -> lib.Call | None:
         if block not in self.description.blocks:
             return None
         table, number = self.observed_rows(block)
@@ -387,7 +401,15 @@ class System:
 
     def are(self, *kinds: str) -> Mask:
         """Unknowns of these kinds [unknowns]; read-only."""
-        return self.once(("are", kinds), lambda: read_only(np.isin(self.kinds, kinds)))
+        return self.once(("are", kinds), lambda: read_only(self._are(kinds)))
+
+    def _are(self, kinds: tuple[str, ...]) -> Mask:
+        mask = np.zeros(self.unknowns, dtype=bool)
+        for family, first in zip(self.description.families, self.form.at, strict=True):
+            if family.kind in kinds and family.kind != "audit":
+                mask[first : first + family.size] = True
+        mask[self.form.written :] = "nu" in kinds
+        return mask
 
     def of_groups(self, *names: str) -> Mask:
         """Rows of these groups [rows]; read-only."""

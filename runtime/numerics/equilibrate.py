@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
+SMALL = 32
+"""Rows and columns up to which the core does it (core/dense.h): calls cost more than arithmetic."""
 SWEEPS = 8
 """The distance to one is halved in its logarithm by each: 1e200 becomes 6."""
 
@@ -22,8 +25,14 @@ def equilibrated(*matrices: Floats) -> tuple[Floats, ...]:
 
 def factors(*matrices: Floats) -> tuple[Floats, Floats]:
     """The factors of the rows [m] and of the columns [n]; 1 where a line is empty."""
+    shape = matrices[0].shape
+    row, column = np.ones(shape[0]), np.ones(shape[1])
+    if max(shape) <= SMALL and len(matrices) <= 2:
+        kept = [np.ascontiguousarray(matrix, dtype=np.float64) for matrix in matrices]
+        pair = (*map(lib.pointer, kept), None)[:2]
+        lib.core.sd_factors(*shape, *pair, lib.pointer(row), lib.pointer(column))
+        return row, column
     size = np.max([np.abs(matrix) for matrix in matrices], axis=0)
-    row, column = np.ones(size.shape[0]), np.ones(size.shape[1])
     for _ in range(SWEEPS):
         by_row = _root(size.max(axis=1, initial=0.0))
         size = size * by_row[:, None]
@@ -38,11 +47,9 @@ def sparse_factors(
 ) -> tuple[Floats, Floats]:
     """The same of a matrix by its entries: magnitudes `size` at (rows, columns)."""
     row, column = np.ones(shape[0]), np.ones(shape[1])
-    for _ in range(SWEEPS):
-        for places, scale in ((rows, row), (columns, column)):
-            largest = np.zeros(scale.size)
-            np.maximum.at(largest, places, size * row[rows] * column[columns])
-            scale *= _root(largest)
+    places = (np.ascontiguousarray(rows, dtype=np.int32), np.ascontiguousarray(columns, dtype=np.int32))
+    arrays = (lib.pointer(item) for item in (*places, size, row, column))
+    lib.core.sd_sparse_factors(*shape, size.size, *arrays)
     return row, column
 
 

@@ -7,18 +7,22 @@ with halving of the step while the rows grow or are not finite.
 
 from __future__ import annotations
 
+import ctypes as c
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
 
 Mask = NDArray[np.bool_]
 SINGULAR_VALUES = 120
 """Unknowns up to which singular values are used."""
+SMALL = 32
+"""Rows and unknowns up to which a problem that the core knows is solved there."""
 DENSE = 400
 """Unknowns up to which matrices are full (no SciPy)."""
 EPS = 1e-13
@@ -85,7 +89,7 @@ class Problem:
     """Rows `use` of residual(x) [number] in the unknowns `free` of x.
 
     jacobian(x): values at (rows, columns); guess, scale, weight [unknowns]; work: what all problems of one search draw
-    on.
+    on; core: the same rows and entries there, at an instant t [s], check: raises what a callback of them raised.
     """
 
     residual: Callable[[Floats], Floats]
@@ -99,6 +103,8 @@ class Problem:
     scale: Floats
     weight: Floats
     work: Work = field(default_factory=Work)
+    core: tuple[lib.RowsOfStart, float] | None = None
+    check: Callable[[], None] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +202,32 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) 
 
     folds: iterations that are not counted while rows shrink as fast as their terms do.
     """
+    if problem.core is not None:
+        small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
+        found = _in_core(problem, problem.core, x, (most, folds), measure=not small)
+        if small or found.residual <= _ROUND_OFF:  # a large one that holds is not linearised
+            return found
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
         return _solve(problem, x, most, folds)
+
+
+def _in_core(
+    problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, limits: tuple[int, int], *, measure: bool
+) -> Solution:
+    """The same of a small problem (core/search.h); measure: x as it is, of any."""
+    found, scaled = x.copy(), np.zeros(problem.number)
+    use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
+    masks = lib.pointer(use), lib.pointer(free)
+    numbers = lib.pointer(problem.guess), lib.pointer(problem.scale), lib.pointer(problem.weight)
+    spent = work.share, work.spent, work.largest
+    answers = lib.pointer(found), lib.pointer(scaled)
+    search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], *limits, *spent, *answers)
+    if (lib.core.sd_search_measure if measure else lib.core.sd_search_solve)(c.byref(search)):
+        raise MemoryError
+    if problem.check is not None:
+        problem.check()
+    work.spent, work.largest = search.spent, search.largest
+    return Solution(found, search.residual, scaled)
 
 
 def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:

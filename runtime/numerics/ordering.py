@@ -1,4 +1,4 @@
-"""Column orders for the sparse factorisation: our own for small matrices, for others that of SciPy's SuperLU.
+"""Column orders for the sparse factorisation: exact degrees for small matrices, approximate ones for others.
 
 Small matrices get the least degree of A^T A with rows merged as they are eliminated (George & Ng, SIAM J. Sci. Stat.
 Comput. 8, 1987): what partial pivoting may fill is known from the pattern.
@@ -7,8 +7,10 @@ Comput. 8, 1987): what partial pivoting may fill is known from the pattern.
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.model.system import System
 
 DENSE = 16
 """Largest dense matrix: above, the matrices of models are so sparse that the sparse LU is the cheaper one (measured on
@@ -17,18 +19,22 @@ gained, and full pivoting is the safer one near singular positions."""
 LEAVING = 50
 """The same of matrices whose columns may be left without a pivot, which the dense LU alone does."""
 SMALL = 200
-"""Unknowns up to which the order is our own."""
+"""Unknowns up to which degrees are exact."""
 
 
-def column_order(pattern: Pattern, values: Floats, *, leaving: bool = False) -> Ints | None:
+def order_of(system: System) -> Ints | None:
+    """Elimination order [unknowns] of a form's matrices, found once a text."""
+    return system.once("order", lambda: column_order(system.pattern, leaving=bool(system.form.scales)))
+
+
+def column_order(pattern: Pattern, *, leaving: bool = False) -> Ints | None:
     """Elimination order [unknowns] of a square matrix, None where it is small enough for the dense LU.
 
-    leaving: columns may be left without a pivot; values [entries] of a typical matrix.  Where they are singular, seeded
-    random values on the same pattern serve: the order depends on the pattern.
+    leaving: columns may be left without a pivot.
     """
     if pattern.unknowns <= (LEAVING if leaving else DENSE):
         return None
-    return least_degree(pattern) if pattern.unknowns <= SMALL else _library(pattern, values)
+    return least_degree(pattern) if pattern.unknowns <= SMALL else _large(pattern)
 
 
 def least_degree(pattern: Pattern) -> Ints:
@@ -69,33 +75,14 @@ def least_degree(pattern: Pattern) -> Ints:
 
 
 def tall_order(pattern: Pattern) -> Ints:
-    """Elimination order [unknowns] of the columns of a matrix that has more rows than columns."""
-    if pattern.unknowns <= SMALL:
-        return least_degree(pattern)
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
-    shape = (pattern.rows, pattern.unknowns)
-    matrix = csc_array((np.ones(pattern.entries), pattern.row, pattern.column), shape=shape)
-    squares = csc_array(matrix.T @ matrix)
-    squares.setdiag(squares.sum(axis=0) + 1.0)  # dominant: no pivoting spoils the order
-    found = splu(squares, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.argsort(found.perm_c).astype(np.int32)
+    """The same of a matrix that has more rows than columns, always sparse."""
+    return least_degree(pattern) if pattern.unknowns <= SMALL else _large(pattern)
 
 
-def _library(pattern: Pattern, values: Floats) -> Ints:
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
-    random = np.random.default_rng(0).uniform(0.5, 1.5, size=pattern.entries)
-    shape = (pattern.rows, pattern.unknowns)
-    for attempt in (values, random):
-        if not np.isfinite(attempt).all():
-            continue
-        matrix = csc_array((attempt, pattern.row, pattern.column), shape=shape)
-        try:
-            found = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1)
-        except RuntimeError:
-            continue
-        return np.argsort(found.perm_c).astype(np.int32)
-    return np.arange(pattern.unknowns, dtype=np.int32)
+def _large(pattern: Pattern) -> Ints:
+    """The same by approximate degrees, in the core (core/order.h)."""
+    found = np.zeros(pattern.unknowns, dtype=np.int32)
+    places = lib.pointer(pattern.column), lib.pointer(pattern.row)
+    if lib.core.sd_column_order(pattern.rows, pattern.unknowns, *places, lib.pointer(found)):
+        raise MemoryError
+    return found

@@ -9,12 +9,16 @@ above that, and below the conditioning of a model that a double can be trusted w
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
 TOLERANCE = 1e-9
 """Singular values below this part of the largest count as zero."""
 CERTAIN = 1e-12
 """The same where a model is refused for it: what is above may be a true, if bad, conditioning."""
+
+SMALL = 32
+"""Rows and columns up to which the core does it (core/dense.h): calls cost more than arithmetic."""
 
 
 class NotFiniteError(ArithmeticError):
@@ -41,7 +45,15 @@ def count(sigma: Floats, smallest: float = TOLERANCE) -> int:
 
 def rank(matrix: Floats) -> int:
     """Rank of an equilibrated matrix.  NotFiniteError."""
-    return count(decomposed(matrix)[1]) if matrix.size else 0
+    if not matrix.size:
+        return 0
+    if max(matrix.shape) > SMALL:
+        return count(decomposed(matrix)[1])
+    matrix = np.ascontiguousarray(matrix, dtype=np.float64)
+    found = int(lib.core.sd_rank(*matrix.shape, lib.pointer(matrix), TOLERANCE))
+    if found < 0:
+        raise NotFiniteError
+    return found
 
 
 def null_space(matrix: Floats) -> Floats:

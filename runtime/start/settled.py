@@ -98,7 +98,7 @@ class Settler:
         """Pattern of [D G^T; G -eps] and the places of the parts."""
         pattern, n = self.system.pattern, self._n
         number = self._moves + self.system.rows
-        columns, rows = pattern.columns_of(), pattern.row.astype(np.int64)
+        columns, rows = pattern.columns_of(), pattern.row
         rate_at = np.full(n, -1, dtype=np.int64)
         rate_at[self.rates] = n + np.arange(self.rates.size)
         with_rate = rate_at[columns] >= 0
@@ -130,15 +130,8 @@ class Settler:
             found[: self.system.rows][inertial_rates(self.system)] = 3
         return found
 
-    def _typical(self) -> Floats:
-        """Values for the choice of an elimination order: ones in G, weights on the diagonal."""
-        values = np.random.default_rng(1).uniform(0.5, 1.5, self.pattern.entries)
-        values[self._slots[4]] = self._weight
-        values[self._slots[5]] = -1e-14
-        return values
-
     def _allocate(self) -> None:
-        order = self.system.once("saddle order", lambda: column_order(self.pattern, self._typical()))
+        order = self.system.once("saddle order", lambda: column_order(self.pattern))
         self._order = order
         self.linear = lib.core.sd_linear_new(
             self.pattern.unknowns,

@@ -100,7 +100,7 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     if found.residual < EXACT or (np.isfinite(found.residual) and not given):
         guess = found.x
     # of a flow that an expression guesses, the momentum is guessed with it
-    momenta = free & (starter.moving == "p") & ~starter.written
+    momenta = free & starter.moves(("p",)) & ~starter.written
     found = solve(problem_of(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta), guess)
     return found.x if found.residual < EXACT else guess
 
@@ -186,7 +186,7 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     Left out are gammas that are not linear, held what their text guesses of implicit unknowns (all that stand in them,
     where it guesses none).
     """
-    implicit = starter.moving == "e"
+    implicit = starter.moves(("e",))
     gammas = starter.groups("gamma")
     if not gammas.any() or not implicit.any():
         return x
@@ -215,7 +215,7 @@ def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask
         x = found.x
     # what round-off left is no magnitude; rates follow from the rest by linear rows
     x = starter.without_noise(x, starter.scale(t, x))
-    return np.where(starter.moving == "rate", guess, x)
+    return np.where(starter.moves(("rate",)), guess, x)
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -269,7 +269,7 @@ def _nearer(
     curved = np.zeros(x.size, dtype=bool)
     bent = _bent(starter, t, x) & starter.groups("phi")
     curved[starter.columns[bent[starter.rows]]] = True
-    free = free & ~(curved & (starter.moving == "q"))
+    free = free & ~(curved & starter.moves(("q",)))
     state = free & ~follows
     if not (x != guess)[state].any():
         return None, 0.0
@@ -436,9 +436,9 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     """
     system = system if system.form.name == "3" else system.another("3")
     starter = Starter(system, measuring=True, remember=True)
-    guess = np.concatenate([starter.given.guess, np.zeros(starter.moving.size - starter.n)])
+    guess = np.concatenate([starter.given.guess, np.zeros(starter.equations.unknowns - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
-        guess[: starter.n] = np.where(np.isin(starter.kinds, (*STATE, "e")), near.y, guess[: starter.n])
+        guess[: starter.n] = np.where(system.are(*STATE, "e")[: starter.n], near.y, guess[: starter.n])
         guess[starter.first :] = starter.residual(t0, guess)[starter.missed]
     free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
     guess = _guess(starter, t0, guess, free)

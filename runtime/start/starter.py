@@ -9,6 +9,7 @@ what the row misses; these are what moves least, and the coordinates follow.
 
 from __future__ import annotations
 
+import ctypes as c
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,13 +17,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.model.scales import alike, group_maximum, of_a_kind, propagate
+from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
-from sysdyn.runtime.start.settled import inertial_rates, rates_of
+from sysdyn.runtime.start.equations import Equations
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
@@ -62,16 +65,6 @@ def _given(system: System) -> _Given:
     return _Given(guess, fixed, written, label)
 
 
-def _pairs(system: System) -> tuple[Ints, Ints]:
-    """Places of momenta, and of the flows of the same coordinates."""
-    families, at = system.description.families, system.form.at
-    flows = {f.owner: k for k, f in enumerate(families) if f.kind == "f"}
-    found = [(at[k] + np.arange(f.size), at[flows[f.owner]]) for k, f in enumerate(families) if f.kind == "p"]
-    nothing = np.zeros(0, dtype=np.int64)
-    momenta = np.concatenate([nothing, *(places for places, _ in found)])
-    return momenta, np.concatenate([nothing, *(places - places[:1] + first for places, first in found)])
-
-
 @dataclass(frozen=True, slots=True)
 class _Sums:
     """Rows [k] that hold weights [k, n] times the rows `of` [n] instead; entries of these, and the n of each."""
@@ -93,9 +86,9 @@ def remembered(
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
         if not self.remember:
             return ask(self, t, x)
-        known = self.known.get(name)
-        if known is None or known[0] != t or not np.array_equal(known[1], x):
-            known = self.known[name] = (t, x.copy(), ask(self, t, x))
+        known, here = self.known.get(name), x.tobytes()
+        if known is None or known[0] != t or known[1] != here:
+            known = self.known[name] = (t, here, ask(self, t, x))
         return known[2].copy()
 
     return answer
@@ -111,60 +104,50 @@ class Starter:
     def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
         self.system = system
         self.remember = remember  # one search for a start: nothing but t and x changes
-        self.known: dict[str, tuple[float, Floats, NDArray[Any]]] = {}
+        self.known: dict[str, tuple[float, bytes, NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
-        self.settled = system.another("start")
-        self.rates = rates_of(self.settled)
+        self.settled = settled = system.another("start")
         self.given = _given(system)
-        self.n = system.form.written
-        self._momenta = system.of_groups("momentum")
-        self.guessed, self.unsaid = self._guessed()
-        starting, measuring = measuring, measuring and bool(self.unsaid.any())
-        self.missed = np.flatnonzero(self.guessed & measuring)
-        unsettled = self._unsettled()
-        self.every = ~unsettled  # rows that must hold
-        if not measuring:
+        key = "equations of the start", measuring
+        self.equations = known = system.once(key, lambda: Equations(system, settled, measuring))
+        self.core = settled.own(key, lambda: known.core(system, settled))
+        self.n, self.first = known.n, known.first
+        self.rates, self.missed = known.rates, known.missed
+        self.guessed, self.unsaid = known.guessed, known.unsaid
+        self.measured = known.measured
+        self._momentum, self._flow = known.momentum, known.flow
+        self.every = ~known.unsettled  # rows that must hold
+        if not known.measuring:
             self.every &= ~self.guessed
-        self.kinds = system.kinds[: self.n]
-        pattern = self.settled.pattern
-        columns = pattern.columns_of()
-        rate_at = np.full(self.n, -1, dtype=np.int64)
-        rate_at[self.rates] = self.n + np.arange(self.rates.size)
-        self._rated = rate_at[columns] >= 0
-        self.first = self.n + self.rates.size  # place of the first that is missed
-        places = self.first + np.arange(self.missed.size)
-        self.rows = np.concatenate([pattern.row, pattern.row[self._rated], self.missed]).astype(np.int64)
-        self.columns = np.concatenate([columns, rate_at[columns[self._rated]], places])
-        self._momentum, self._flow = _pairs(system)
-        in_y, in_rate = self.settled.structural()
-        self._structural = np.concatenate([in_y, in_rate[self._rated], np.ones(self.missed.size, dtype=bool)])
-        self._sums = self._floating(np.flatnonzero(unsettled)) if starting else None
+        self.rows, self.columns, self._structural = known.rows, known.columns, known.structural
+        self._sums = self._floating(np.flatnonzero(known.unsettled)) if measuring else None
         if self._sums is not None:
-            self.every[self._sums.rows] = True
-            self.rows = np.concatenate([self.rows, np.repeat(self._sums.rows, self._sums.entries.size)])
-            columns = self.columns[self._sums.entries]
-            self.columns = np.concatenate([self.columns, np.tile(columns, self._sums.rows.size)])
-            more = self._structural[self._sums.entries]
-            self._structural = np.concatenate([self._structural, np.tile(more, self._sums.rows.size)])
-        self.units = self._units()
-        self._family = np.unique(self.units, return_inverse=True)[1].astype(np.int64)
-        kinds = alike(system)
-        largest = kinds.max(initial=0) + 1
-        self._alike = np.concatenate([kinds[: self.n], largest + kinds[self.rates], 2 * largest + self._family])
+            self._summed_rows(self._sums)
         self.written = np.concatenate(
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
-        self.measured = self._measured()
-        self.idle = self._idle()
-        self.moving = np.concatenate([self.kinds, np.full(self.rates.size, "rate"), np.full(self.missed.size, "")])
-        self.moving[self.first :] = self._read()
-        self._of_kinds: dict[tuple[str, ...], Mask] = {}
+
+    def _summed_rows(self, sums: _Sums) -> None:
+        """The entries of sums of rows behind the others."""
+        self.every[sums.rows] = True
+        self.rows = np.concatenate([self.rows, np.repeat(sums.rows, sums.entries.size)])
+        self.columns = np.concatenate([self.columns, np.tile(self.columns[sums.entries], sums.rows.size)])
+        more = np.tile(self._structural[sums.entries], sums.rows.size)
+        self._structural = np.concatenate([self._structural, more])
 
     @functools.cached_property
-    def _of_a_kind(self) -> NDArray[np.int64]:
-        """Number of the row and the kind of its unknown, of each place [entries]."""
-        return of_a_kind(self.rows, self.columns, self._alike)
+    def _balance(self) -> lib.Balance:
+        """The rows and their entries, sums of rows among them."""
+        if self._sums is None:
+            return self.core.balance  # type: ignore[no-any-return]
+        self._own_balance = Balance(self.settled.rows, self.rows, self.columns, self.equations.alike)
+        return self._own_balance.core
+
+    @functools.cached_property
+    def weight(self) -> Floats:
+        """Of what does not follow from the state [unknowns]."""
+        return np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
 
     @functools.cached_property
     def _of_missed(self) -> Mask:
@@ -173,9 +156,16 @@ class Starter:
         missed[self.missed] = True
         return np.asarray(missed[self.rows])
 
-    def _members(self) -> list[Places]:
-        """Unknowns of y of each kind."""
-        return [np.flatnonzero(self.kinds == kind) for kind in np.unique(self.kinds)]
+    @functools.cached_property
+    def idle(self) -> Mask:
+        """Displacements that stand in constraints alone and move without inertia: they hold nothing."""
+        form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
+        inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
+        inertial[self._flow] = True
+        held = np.zeros(self.first + self.missed.size, dtype=bool)
+        held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
+        held[self.columns[self._structural & ~self.groups("phi")[self.rows]]] = False
+        return held
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
@@ -187,17 +177,24 @@ class Starter:
 
     def residual(self, t: float, x: Floats) -> Floats:
         """All rows [rows]."""
-        rows = self.settled.residual(t, *self.expand(x))
-        rows[self.missed] -= x[self.first :]
+        rows = np.zeros(self.settled.rows)
+        self._ask(lib.core.sd_start_residual, t, x, rows)
         if self._sums is not None:
             rows[self._sums.rows] = self._sums.weights @ rows[self._sums.of]
         return rows
 
+    def _ask(self, function: Any, t: float, x: Floats, answer: Floats) -> None:
+        """What the core says of the rows at x."""
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        if function(c.addressof(self.core), t, lib.pointer(x), lib.pointer(answer)):
+            raise MemoryError
+        self.settled.failure.check()
+
     @remembered
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
-        jy, jyd = self.settled.jacobian(t, *self.expand(x))
-        values = np.concatenate([jy, jyd[self._rated], np.full(self.missed.size, -1.0)])
+        values = np.zeros(self.equations.rows.size)
+        self._ask(lib.core.sd_start_jacobian, t, x, values)
         if self._sums is None:
             return values
         summed = self._sums.weights[:, self._sums.place] * values[self._sums.entries]
@@ -223,10 +220,7 @@ class Starter:
 
     def moves(self, kinds: Sequence[str]) -> Mask:
         """Unknowns of these kinds [unknowns]; read-only."""
-        key = tuple(kinds)
-        if key not in self._of_kinds:
-            self._of_kinds[key] = np.isin(self.moving, key)
-        return self._of_kinds[key]
+        return self.equations.moves(kinds)
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
@@ -234,16 +228,6 @@ class Starter:
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
         mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
-
-    def _guessed(self) -> tuple[Mask, Mask]:
-        """Rows of block initial that are guesses, and those of them that no text says."""
-        guessed, unsaid = (np.zeros(self.settled.rows, dtype=bool) for _ in range(2))
-        for group, family, first in self.settled.form.groups:
-            rows = self.settled.description.rows[family]
-            if group == "initial" and not rows.fixed:
-                guessed[first : first + rows.size] = True
-                unsaid[first : first + rows.size] = not rows.written
-        return guessed, unsaid
 
     def _floating(self, unsettled: Places) -> _Sums | None:
         """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
@@ -274,7 +258,7 @@ class Starter:
         matrix = np.zeros((self.settled.rows, self.n))
         pattern = self.settled.pattern
         columns = pattern.columns_of()
-        flows = (self.kinds == "f")[columns]
+        flows = self.system.are("f")[columns]
         np.add.at(matrix, (pattern.row[flows], columns[flows]), jyd[flows])
         carried = flows & self.groups("momentum")[pattern.row]
         np.add.at(matrix, (pattern.row[carried], columns[carried]), -jy[carried])
@@ -289,23 +273,6 @@ class Starter:
                     found[mine] += matrix[at + unsettled[mine] - place]
         return found
 
-    def _units(self) -> list[str]:
-        """The unit of what each guess misses."""
-        found = [""] * self.settled.rows
-        for group, family, first in self.settled.form.groups:
-            rows = self.settled.description.rows[family]
-            if group == "initial":
-                found[first : first + rows.size] = [rows.unit] * rows.size
-        return [found[row] for row in self.missed]
-
-    def _measured(self) -> Mask:
-        """Unknowns of y that the contents of stores measure; a momentum with its flow."""
-        mask = np.zeros(self.n, dtype=bool)
-        own = self._structural & self._of_missed & (self.columns < self.n)
-        mask[self.columns[own]] = True
-        mask[self._momentum] |= mask[self._flow]
-        return mask
-
     def by_content(self, t: float, x: Floats, scale: Floats) -> Floats:
         """Weights of guesses that are not written: contents of one unit are measured alike, flows by their momenta."""
         families, form = self.system.description.families, self.system.form
@@ -319,7 +286,7 @@ class Starter:
                 own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
         own_units = np.array(units)[self.system.family_of[: self.n]]
-        names = np.concatenate([own_units, np.full(self.rates.size, ""), self.units])
+        names = np.concatenate([own_units, np.full(self.rates.size, ""), self.equations.units])
         pattern = self.system.pattern
         inertia = pattern.columns_of() == own[pattern.row]
         content = np.zeros(x.size)
@@ -330,33 +297,6 @@ class Starter:
         np.maximum.at(largest, unit, content * scale)
         return np.asarray(WEIGHT["unwritten"] * content * scale / largest[unit])
 
-    def _idle(self) -> Mask:
-        """Displacements that stand in constraints alone and move without inertia: they hold nothing."""
-        form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
-        inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
-        inertial[self._flow] = True
-        held = np.zeros(self.first + self.missed.size, dtype=bool)
-        held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
-        held[self.columns[self._structural & ~self.groups("phi")[self.rows]]] = False
-        return held
-
-    def _read(self) -> NDArray[np.str_]:
-        """The kind of unknowns that each guess is of; none where it is of several."""
-        if not self.missed.size:
-            return np.zeros(0, dtype=self.moving.dtype)
-        found = np.full(self.settled.rows, "", dtype=self.moving.dtype)
-        many = np.zeros(self.settled.rows, dtype=bool)
-        read = self._structural & (self.columns < self.first)
-        for kind in np.unique(self.moving[: self.first]):
-            rows = self.rows[read & (self.moving[self.columns] == kind)]
-            many[rows] |= found[rows] != ""
-            found[rows] = kind
-        return np.where(many, "", found)[self.missed]
-
-    def _unsettled(self) -> Mask:
-        """Rates of balances with inertia: the start does not know them."""
-        return inertial_rates(self.settled)
-
     @remembered
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
@@ -364,13 +304,20 @@ class Starter:
         The flow of a momentum counts as state: where neither is written, both begin at zero.
         """
         jy, jyd = self.system.jacobian(t, *self.expand(x))
-        carries = self.system.differential(jyd)[: self.n] & self.system.are(*STATE)[: self.n]
-        pattern = self.system.pattern
-        inert = pattern.columns_of()[(jy != 0.0) & self._momenta[pattern.row]]
-        carries[np.intersect1d(self._flow[carries[self._momentum]], inert)] = True
+        state = self.system.are(*STATE)[: self.n]
+        carries = self.system.differential(jyd)[: self.n] & state
+        if self._flow.size:
+            pattern = self.system.pattern
+            inert = np.zeros(self.n, dtype=bool)
+            inert[pattern.columns_of()[(jy != 0.0) & self.equations.momenta[pattern.row]]] = True
+            moved = self._flow[carries[self._momentum]]
+            carries[moved[inert[moved]]] = True
         carries &= ~self.measured
-        carries |= self.given.written & self.system.are(*STATE)[: self.n]
-        return np.concatenate([~carries, np.ones(self.rates.size, dtype=bool), np.zeros(self.missed.size, dtype=bool)])
+        carries |= self.given.written & state
+        found = np.ones(x.size, dtype=bool)
+        found[: self.n] = ~carries
+        found[self.first :] = False
+        return found
 
     def carried(self) -> Ints:
         """Of flows with momenta: the momentum where the flow is written, else the flow."""
@@ -378,9 +325,9 @@ class Starter:
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
-        largest = np.zeros(int(self._alike.max(initial=0)) + 1)
-        np.maximum.at(largest, self._alike, np.abs(x))
-        return np.where(np.abs(x) > NOISE * np.maximum(scale, largest[self._alike]), x, 0.0)
+        largest = np.zeros(int(self.equations.alike.max(initial=0)) + 1)
+        np.maximum.at(largest, self.equations.alike, np.abs(x))
+        return np.where(np.abs(x) > NOISE * np.maximum(scale, largest[self.equations.alike]), x, 0.0)
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:
@@ -393,38 +340,39 @@ class Starter:
         return self._scale(t, x, largest=True)
 
     def _scale(self, t: float, x: Floats, *, largest: bool) -> Floats:
-        known = np.abs(x)
-        nominal = self.system.nominal[: self.n]
-        known[: self.n] = np.where(nominal > 0.0, nominal, known[: self.n])
-        values = np.abs(self.jacobian(t, x))
-        free = np.abs(self.residual(t, x))
-        values, free = (np.where(np.isfinite(item), item, 0.0) for item in (values, free))
-        told = values * self._of_missed
-        values = values - told
+        known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
+        x = np.ascontiguousarray(x, dtype=np.float64)
         # how fast what follows from the state moves says nothing of its size
-        sizes = ~self.groups("dynamics_rate")[self.rows]
-        of = self._of_a_kind
-        own = self.rows[sizes], self.columns[sizes], values[sizes]
-        found = propagate(known, *own, free, self._alike, group=of[sizes], largest=largest)
-        for members in self.system.once("members", self._members):
-            found[members] = np.maximum(found[members], 1e-3 * found[members].max(initial=0.0))
-        found[: self.n] = np.where(found[: self.n] > 1e-280, found[: self.n], 1.0)
-        found = propagate(found, self.rows, self.columns, values, free, self._alike, group=of, largest=largest)
-        # guesses of one unit are measured alike
-        size, most = np.zeros(self.settled.rows), np.zeros(int(self._family.max(initial=0)) + 1)
+        tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
+        if self._sums is None and not self.missed.size:
+            numbers = t, lib.pointer(x), LARGEST * largest, lib.pointer(found)
+            if lib.core.sd_start_scale(c.addressof(self.core), lib.pointer(nominal), *tables, *numbers):
+                raise MemoryError
+            self.settled.failure.check()
+            return found
+        values, free = self.jacobian(t, x), self.residual(t, x)
+        told = np.where(self._of_missed, values, 0.0)
+        sized = values - np.where(np.isfinite(told), told, 0.0)
+        numbers = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
+        if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *numbers):
+            raise MemoryError
+        return self._of_one_unit(np.abs(told), found) if self.missed.size else found
+
+    def _of_one_unit(self, told: Floats, found: Floats) -> Floats:
+        """Magnitudes with those of what guesses miss: guesses of one unit are measured alike."""
+        family, told = self.equations.family, np.where(np.isfinite(told), told, 0.0)
+        size, most = np.zeros(self.settled.rows), np.zeros(int(family.max(initial=0)) + 1)
         text = self.columns < self.first
         np.add.at(size, self.rows[text], (told * found[self.columns])[text])
-        np.maximum.at(most, self._family, size[self.missed])
-        found[self.first :] = most[self._family]
+        np.maximum.at(most, family, size[self.missed])
+        found[self.first :] = most[family]
         return np.where(found > 1e-280, found, 1.0)
 
 
 def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
     """The equations `rows` in the unknowns `free`, the others as in x."""
     follows = starter.following(t, x)
-    weight = np.full(x.size, WEIGHT["unwritten"])
-    weight[starter.written] = WEIGHT["written"]
-    weight[follows] = WEIGHT["following"]
+    weight = np.where(follows, WEIGHT["following"], starter.weight)
     # unknowns of one kind and unit are moved by one measure, whatever their values
     scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
     weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
@@ -447,6 +395,8 @@ def weighted(
         scale=scale,
         weight=weight,
         work=starter.work,
+        core=None if starter.summed else (starter.core, t),
+        check=starter.settled.failure.check,
     )
 
 

@@ -27,7 +27,7 @@ DENSE = 600
 def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
     """Implicit unknowns whose gammas have no slope in them at the state; system: the form as written."""
     y, yd = state.for_form(system)
-    implicit = np.flatnonzero(system.kinds == "e")
+    implicit = np.flatnonzero(system.are("e"))
     if not implicit.size:
         return ()
     gamma = system.of_groups("gamma")

@@ -7,10 +7,12 @@ coefficient of f (Hamilton, p - dT*/df).
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 
+Longs = NDArray[np.int64]
 DENSE = 300
 NEGATIVE = 1e-9
 """Eigenvalues below minus this part of the largest are negative."""
@@ -21,31 +23,32 @@ def negative_inertia(system: System, state: ConsistentState) -> tuple[str, float
 
     system: the form as written.  Models of more than DENSE flows are judged by their diagonal.
     """
-    jy, jyd = system.jacobian(state.t, *state.for_form(system))
-    flows = np.flatnonzero(system.kinds == "f")
+    flows, (i, j), places, of_momentum = system.once("inertia", lambda: _places(system))
     if not flows.size:
         return None
+    jy, jyd = system.jacobian(state.t, *state.for_form(system))
+    return _least(system, flows, (i, j, np.where(of_momentum, -jy[places], jyd[places])))
+
+
+def _places(system: System) -> tuple[Longs, tuple[Longs, Longs], Longs, NDArray[np.bool_]]:
+    """Flows; the entries of M: row and column among these, place in the pattern, whether in a row of momentum."""
+    flows = np.flatnonzero(system.are("f"))
     place = np.full(system.unknowns, -1, dtype=np.int64)
     place[flows] = np.arange(flows.size)
     rows = np.full(system.rows, -1, dtype=np.int64)
-    sign = np.ones(system.rows)
-    values = np.zeros(jy.size)
-    columns = system.pattern.columns_of()
+    momentum = np.zeros(system.rows, dtype=bool)
+    owners = {f.owner: k for k, f in enumerate(system.description.families) if f.kind == "f"}
     for group, family, first in system.form.groups:
         row = system.description.rows[family]
-        owner = next(
-            (k for k, f in enumerate(system.description.families) if (f.kind, f.owner) == ("f", row.owner)), None
-        )
+        owner = owners.get(row.owner)
         if group not in ("dynamics", "momentum") or owner is None:
             continue
         rows[first : first + row.size] = place[system.form.at[owner] + np.arange(row.size)]
-        sign[first : first + row.size] = -1.0 if group == "momentum" else 1.0
-        mine = (system.pattern.row >= first) & (system.pattern.row < first + row.size)
-        values[mine] = (jy if group == "momentum" else jyd)[mine]
-    take = (rows[system.pattern.row] >= 0) & (place[columns] >= 0)
-    i, j = rows[system.pattern.row[take]], place[columns[take]]
-    v = values[take] * sign[system.pattern.row[take]]
-    return _least(system, flows, (i, j, v))
+        momentum[first : first + row.size] = group == "momentum"
+    columns = system.pattern.columns_of()
+    take = np.flatnonzero((rows[system.pattern.row] >= 0) & (place[columns] >= 0))
+    at = system.pattern.row[take]
+    return flows, (rows[at], place[columns[take]]), take, momentum[at]
 
 
 def _least(

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import TOLERANCE, null_space
@@ -25,9 +26,18 @@ MOVED = 1e-3
 
 def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     """[unknowns]: derivatives that F = 0 determines: none moves along the null space of dF/dyd."""
-    found: NDArray[np.bool_] = system.differential(jyd)
-    row, column = system.pattern.row[jyd != 0.0], system.pattern.columns_of()[jyd != 0.0]
-    left = np.ones(row.size, dtype=bool)
+    there = jyd != 0.0
+    found, left = system.once_if_small(("known rates", there.tobytes()), lambda: _single(system, there))
+    if left.any():
+        return _coupled(system, jyd, found.copy(), left)
+    return found
+
+
+def _single(system: System, there: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """[unknowns]: derivatives that occur; [entries that are there]: those that no row with but one left determines."""
+    row, column = system.pattern.row[there], system.pattern.columns_of()[there]
+    found, left = np.zeros(system.unknowns, dtype=bool), np.ones(row.size, dtype=bool)
+    found[column] = True
     while left.any():  # a row with but one derivative determines it
         single = np.bincount(row[left], minlength=system.rows) == 1
         known = np.zeros(system.unknowns, dtype=bool)
@@ -35,6 +45,14 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
         if not known.any():
             break
         left &= ~known[column]
+    return read_only(found), left
+
+
+def _coupled(
+    system: System, jyd: Floats, found: NDArray[np.bool_], left: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """`found` without the rates that move along the null space of the rows left."""
+    row, column = system.pattern.row[jyd != 0.0], system.pattern.columns_of()[jyd != 0.0]
     columns, at = np.unique(column[left], return_inverse=True)
     if not 0 < columns.size <= LARGE:
         return found
@@ -48,18 +66,30 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     return found
 
 
+def _inert(system: System) -> NDArray[np.bool_]:
+    """Flows of coordinates with a momentum of their own [unknowns]."""
+    families = system.description.families
+    moved = {family.owner for family in families if family.kind == "p"}
+    inert = np.array([family.kind == "f" and family.owner in moved for family in families] + [False])
+    return read_only(np.asarray(inert[system.family_of]))
+
+
+def _nudges(number: int) -> list[tuple[Floats, Floats]]:
+    """Parts by which values are moved, and times by which rates are, at the start and beside it."""
+    random = np.random.default_rng(0)
+    return [(random.uniform(0.5, 1.0, number), random.uniform(1.0, 2.0, number)) for _ in range(2)]
+
+
 def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     """[observed]: elements of block observe whose derivative follows from the equations."""
     y, yd = start.for_form(system)
     _, jyd = system.jacobian(start.t, y, yd)
-    moved = {family.owner for family in system.description.families if family.kind == "p"}
-    inert = np.array([family.kind == "f" and family.owner in moved for family in system.description.families] + [False])
-    free = ~(unique(system, jyd) | inert[system.family_of])
-    random = np.random.default_rng(0)
+    free = ~(unique(system, jyd) | system.once("inert", lambda: _inert(system)))
+    nudges = system.once_if_small("nudges", lambda: _nudges(y.size))
     found: NDArray[np.bool_] | None = None
-    for size in (0.0, MOVED):
-        there = y + size * (np.abs(y) + MOVED) * random.uniform(0.5, 1.0, y.size)
-        other = yd + free * random.uniform(1.0, 2.0, y.size) * np.where(yd != 0.0, np.abs(yd), 1.0)
+    for size, (part, times) in zip((0.0, MOVED), nudges, strict=True):
+        there = y + size * (np.abs(y) + MOVED) * part
+        other = yd + free * times * np.where(yd != 0.0, np.abs(yd), 1.0)
         with np.errstate(all="ignore"):
             one = system.observe_rate(start.t, there, yd)
             two = system.observe_rate(start.t, there, other)

@@ -8,10 +8,12 @@ In a system a left-out row reads "its multiplier = 0": the motion is that of the
 
 from __future__ import annotations
 
+import ctypes as c
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import solve
@@ -32,6 +34,8 @@ BESIDE = 1e-3
 NEAR = 10.0
 """Amplitudes: what the way back onto phi leads farther than this may be another singular point."""
 _EPS = 1e-13
+PIVOT = 1e-3
+"""Of rows scaled to one: an entry that makes a row independent beyond doubt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +113,8 @@ def _sparse_dependent(found: Reactions) -> Ints:
     """The same from the pivots of [I J^T; J -eps]: those of the order of eps.  In any order they count the dependent
     rows; eliminated in the order written they name them.
     """
+    if not _left(found):
+        return np.zeros(0, dtype=np.int32)
     from scipy.sparse import block_array, csc_array, eye_array
     from scipy.sparse.linalg import splu
 
@@ -122,11 +128,23 @@ def _sparse_dependent(found: Reactions) -> Ints:
     return np.flatnonzero(np.abs(lu.U.diagonal())[n:] < 1e3 * _EPS).astype(np.int32)
 
 
+def _left(found: Reactions) -> int:
+    """How many rows of J are left when those are taken away that alone stand in some column: they are independent."""
+    m, n = found.multipliers.size, found.rows.size
+    which, place = found.which.astype(np.int32), found.place.astype(np.int32)
+    arrays = lib.pointer(which), lib.pointer(place), lib.pointer(found.value)
+    peeled = np.zeros(m, dtype=np.int32)
+    left = int(lib.core.sd_peel(m, n, which.size, *arrays, PIVOT, lib.pointer(peeled)))
+    if left < 0:
+        raise MemoryError
+    return left
+
+
 def nearby(system: System, state: ConsistentState) -> list[Floats]:
     """Y at up to POINTS seeded points near the state, displacements consistent with phi."""
     starter = Starter(system, remember=True)
     x = np.concatenate([state.y, state.yd[starter.rates]])
-    q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
+    q = starter.moves(("q",))[: x.size]
     size = np.where(q, starter.scale(state.t, x), 0.0)
     random = np.random.default_rng(12)
     found = []
@@ -153,32 +171,47 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     zero on phi alone (a circle of radius 0) has its size.
     """
     y, yd = state.for_form(system)
-    here = _sizes(system, system.jacobian(state.t, y, yd)[0])
-    random = np.random.default_rng(12)
-    anywhere = y + np.maximum(np.abs(y), 1.0) * random.standard_normal(y.size)
+    take, which, number = system.once("sizes of J", lambda: _reacting(system))
+    if not number:
+        return np.zeros(0, dtype=np.int32)
+
+    def sizes(point: Floats) -> Floats:
+        """The largest entry of each row of J, as written."""
+        found = np.zeros(number)
+        a, b = system._buffer(point), system._buffer(yd)
+        places = take.size, lib.pointer(take), lib.pointer(which), number, lib.pointer(found)
+        if lib.core.sd_row_sizes(c.byref(system.core), state.t, lib.pointer(a), lib.pointer(b), *places):
+            raise MemoryError
+        system.failure.check()
+        return found
+
+    here = sizes(y)
+    anywhere = y + np.maximum(np.abs(y), 1.0) * _directions(system, 1)[0, : y.size]
     with np.errstate(all="ignore"):
-        straight = (here > 0.0) & (here == _sizes(system, system.jacobian(state.t, anywhere, yd)[0]))
+        straight = (here > 0.0) & (here == sizes(anywhere))
     if straight.all():  # rows of J that are the same everywhere vanish nowhere
         return np.zeros(0, dtype=np.int32)
     starter = system.starter or Starter(system, remember=True)
     x = np.concatenate([state.y, state.yd[starter.rates]])
-    q = np.concatenate([starter.kinds == "q", np.zeros(starter.rates.size, dtype=bool)])
-    size = np.where(q, starter.scale(state.t, x), 0.0)
-    random = np.random.default_rng(12)
-    there = np.full(here.size, np.inf)
-    for _ in range(POINTS):
-        shaken = x + BESIDE * size * random.standard_normal(x.size)
-        there = np.minimum(there, _sizes(system, system.jacobian(state.t, starter.expand(shaken)[0], yd)[0]))
+    size = np.where(starter.moves(("q",))[: x.size], starter.scale(state.t, x), 0.0)
+    there = np.full(number, np.inf)
+    for direction in _directions(system, POINTS):
+        shaken = x + BESIDE * size * direction[: x.size]
+        there = np.minimum(there, sizes(starter.expand(shaken)[0]))
     return np.flatnonzero(here <= TOLERANCE * there).astype(np.int32)
 
 
-def _sizes(system: System, jy: Floats) -> Floats:
-    """The largest entry of each row of J, as written."""
-    columns = system.pattern.columns_of()
-    multipliers, take = system.once("reacting", lambda: _of(system, ("kappa", "mu"), np.zeros(0, dtype=np.int32)))
-    found = np.zeros(multipliers.size)
-    np.maximum.at(found, np.searchsorted(multipliers, columns[take]), np.abs(jy[take]))
-    return found
+def _directions(system: System, number: int) -> Floats:
+    """Seeded directions [number, 2 unknowns], always the same."""
+    shape = number, 2 * system.form.written
+    return system.once_if_small(("directions", number), lambda: np.random.default_rng(12).standard_normal(shape))
+
+
+def _reacting(system: System) -> tuple[Ints, Ints, int]:
+    """Places in the pattern of J's entries, the multiplier of each, and how many of these there are."""
+    multipliers, take = _of(system, ("kappa", "mu"), np.zeros(0, dtype=np.int32))
+    which = np.searchsorted(multipliers, system.pattern.columns_of()[take])
+    return take.astype(np.int32), which.astype(np.int32), multipliers.size
 
 
 def combination(found: Reactions, left: Ints) -> Floats:

@@ -11,16 +11,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
+from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
 
 DENSE = 300
+SMALL = 32
+"""Unknowns up to which the core looks at a pencil first (core/dense.h)."""
 MAX_INDEX = 6
 ROUSED = 1e-2
 """Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""
@@ -109,25 +113,33 @@ def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...]
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models)."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
     pattern = system.pattern
-    shape = (pattern.rows, pattern.unknowns)
     columns = pattern.columns_of()
-    row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), shape)
+    row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), (pattern.rows, pattern.unknowns))
     scale = row[pattern.row] * column[columns]
-    b = np.random.default_rng(3).standard_normal((pattern.rows, 4))
-    sizes = []
-    for cj in (1e4, 1e5):
-        matrix = csc_array(((jy + cj * jyd) * scale, pattern.row, pattern.column), shape=shape)
-        try:
-            sizes.append(float(np.abs(splu(matrix).solve(b)).max()))
-        except RuntimeError:
-            return None
-    slope = np.log10(sizes[1] / sizes[0])
-    index = round(float(slope)) + 1
+    sides = np.random.default_rng(3).standard_normal((4, pattern.rows))
+    sizes = [_inverse(system, (jy + cj * jyd) * scale, sides.copy()) for cj in (1e4, 1e5)]
+    if not all(np.isfinite(size) and size > 0.0 for size in sizes):
+        return None
+    index = round(float(np.log10(sizes[1] / sizes[0]))) + 1
     return index if 0 <= index <= MAX_INDEX else None
+
+
+def _inverse(system: System, values: Floats, sides: Floats) -> float:
+    """Largest entry of A^-1 b for sides b [k, rows]; infinite where A (by its entries) is singular."""
+    pattern, order = system.pattern, order_of(system)
+    places = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(order)
+    linear = lib.core.sd_linear_new(pattern.unknowns, *places)
+    if not linear:
+        raise MemoryError
+    try:
+        if lib.core.sd_linear_factor(linear, lib.pointer(values), None):
+            return np.inf
+        for side in sides:
+            lib.core.sd_linear_solve(linear, lib.pointer(side))
+    finally:
+        lib.core.sd_linear_free(linear)
+    return float(np.abs(sides).max())
 
 
 def _place(system: System, multiplier: int) -> tuple[int, int]:
@@ -161,6 +173,14 @@ def _roused(system: System, t: float, jy: Floats) -> Floats:
     return np.where(asleep, np.copysign(least, jy), jy)
 
 
+def _small_index(system: System, jy: Floats, jyd: Floats) -> int:
+    """`pencil_index` of a small regular pencil, in the core; -1 where it has none, or more must be asked."""
+    pattern = system.pattern
+    jy, jyd = np.ascontiguousarray(jy), np.ascontiguousarray(jyd)
+    places = lib.pointer(pattern.column), lib.pointer(pattern.row)
+    return int(lib.core.sd_pencil_index(pattern.unknowns, *places, lib.pointer(jyd), lib.pointer(jy), MAX_INDEX))
+
+
 def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
     """Index of the form as written, and the undetermined unknowns where there is none."""
     y, yd = state.for_form(system)
@@ -169,6 +189,10 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
         return 0, ()
     if system.unknowns > DENSE:
         return _growth_index(system, jy, jyd), ()
+    if system.unknowns <= SMALL and system.rows == system.unknowns:
+        found = _small_index(system, jy, jyd)
+        if found >= 0:
+            return found, ()
     names = null_place(system, jy, jyd)[0]
     if names:
         # equilibration may end where one unit makes the others tiny: asked again in sizes of the unknowns
@@ -222,7 +246,7 @@ def structure(system: System, state: ConsistentState) -> Structure:
     found = reactions(system, jy)
     left = dependent(found)
     zero = vanished(system, state)
-    lowest = np.union1d(left, zero).size
+    lowest = np.union1d(left, zero).size if zero.size else left.size
     if left.size:
         # a rank that is smaller here alone is the configuration's, not the constraints'
         for point in nearby(system, state):
@@ -231,13 +255,14 @@ def structure(system: System, state: ConsistentState) -> Structure:
             if fewer.size < left.size:
                 found, left = there, fewer
     # a row that is zero wherever phi holds, but not beside it, is no combination of others
-    left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
+    if left.size and zero.size:
+        left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
     lost = lowest - int(left.size)
-    n = int((system.kinds == "f").sum())
-    now = np.delete(system.kinds, system.idle_multipliers())
-    m1, m2 = (int((now == kind).sum()) for kind in ("kappa", "mu"))
-    rank, rank_q = m1 + m2 - int(left.size), m1 - int((system.kinds[found.multipliers[left]] == "kappa").sum())
-    weights = combination(found, left)
+    n = int(system.are("f").sum())
+    idle = system.idle_multipliers()
+    m1, m2 = (int(system.are(kind).sum() - system.are(kind)[idle].sum()) for kind in ("kappa", "mu"))
+    rank, rank_q = m1 + m2 - int(left.size), m1 - int(system.are("kappa")[found.multipliers[left]].sum())
+    weights = combination(found, left) if left.size else np.zeros(0)
     group = tuple(
         (_label(system, int(found.multipliers[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8)
     )

@@ -15,7 +15,7 @@ class Solver:
         matrix.sort_indices()
         n = matrix.shape[0]
         self.pattern = Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
-        self.order = column_order(self.pattern, matrix.data)
+        self.order = column_order(self.pattern)
         if sparse:
             self.order = np.arange(n, dtype=np.int32)
         pointers = [lib.pointer(item) for item in (self.pattern.column, self.pattern.row, self.order)]

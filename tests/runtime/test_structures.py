@@ -18,7 +18,8 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("RunSamples", "sd_samples"), ("Modes", "sd_modes"), ("Mode", "sd_mode"), ("Held", "sd_held")]
     pairs += [("Transition", "sd_transition"), ("Contact", "sd_contact"), ("Kink", "sd_kink")]
     pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
-    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau", "dopri", "energy", "many")]
+    pairs += [("Balance", "sd_balance"), ("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
+    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau", "dopri", "energy", "many", "search")]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
         lines.append(f'printf("%zu\\n", sizeof({tag}));')

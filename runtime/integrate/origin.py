@@ -1,0 +1,54 @@
+"""The start as one system sees it: what every integration from it begins with, found once for all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate.metric import light
+from sysdyn.runtime.integrate.relaxation import displacement
+from sysdyn.runtime.integrate.unknown_roles import Roles, roles
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import magnitudes, unresolved
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+
+UNRESOLVED = 8.0
+"""Times what round-off leaves open of an unknown: the least that its error test asks for."""
+
+
+class Origin:
+    """system: in any form; index: of that form as the error test takes it.
+
+    y, rate [unknowns] and the entries jy, jyd of the Jacobian there; yd: rates of what is differentiated, those of
+    algebraic unknowns do not follow from the start's equations; roles; least [unknowns]: what round-off leaves open of
+    displacements and flows.
+    """
+
+    def __init__(self, system: System, start: ConsistentState, index: int) -> None:
+        self.system, self.t = system, start.t
+        self.y, self.rate = start.for_form(system)
+        self.jy, self.jyd = system.jacobian(start.t, self.y, self.rate)
+        self.yd = np.where(system.differential(self.jyd), self.rate, 0.0)
+        self.roles: Roles = roles(system, start.t, self.jyd, index)
+        self.least = np.where(system.are("q", "f"), UNRESOLVED * unresolved(system, self.y, self.jy), 0.0)
+        self._sized: tuple[float, tuple[Floats, float]] | None = None
+        self._light: NDArray[np.bool_] | None = None
+
+    def sized(self, t_end: float) -> tuple[Floats, float]:
+        """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
+        if self._sized is None or self._sized[0] != t_end:
+            far = displacement(self.system, self.jy, self.jyd, self.yd)
+            self._sized = t_end, magnitudes(self.system, self.t, t_end, self.y, self.yd, far)
+        return self._sized[1]
+
+    @property
+    def light(self) -> NDArray[np.bool_]:
+        """Displacements without inertia where others have some [unknowns]."""
+        if self._light is None:
+            self._light = light(self.system, self.jy, self.jyd)
+        return self._light
+
+    def weighted(self) -> None:
+        """The entries of the Jacobian anew: its rows q' - f have other factors."""
+        self.jy, self.jyd = self.system.jacobian(self.t, self.y, self.rate)
+        self._sized = self._light = None

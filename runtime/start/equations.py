@@ -1,0 +1,151 @@
+"""What of the equations of a start depends on a text's structure alone: their unknowns, rows, entries, kinds.
+
+Unknowns x = (y as written, the derivatives that occur, what guessed expressions miss); see starter.py.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.description import Ints
+from sysdyn.runtime.model.patterns import read_only
+from sysdyn.runtime.model.scales import alike
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.settled import inertial_rates, rates_of
+
+Mask = NDArray[np.bool_]
+Places = NDArray[np.integer]
+
+
+def pairs(system: System) -> tuple[Ints, Ints]:
+    """Places of momenta, and of the flows of the same coordinates."""
+    families, at = system.description.families, system.form.at
+    flows = {f.owner: k for k, f in enumerate(families) if f.kind == "f"}
+    found = [(at[k] + np.arange(f.size), at[flows[f.owner]]) for k, f in enumerate(families) if f.kind == "p"]
+    nothing = np.zeros(0, dtype=np.int64)
+    momenta = np.concatenate([nothing, *(places for places, _ in found)])
+    return momenta, np.concatenate([nothing, *(places - places[:1] + first for places, first in found)])
+
+
+class Equations:
+    """system: as written; settled: its form "start"; measuring: guessed expressions may miss something.
+
+    guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: rows of the guesses that have an
+    unknown of their own; unsettled [rows]: they need not hold; rows, columns, structural [entries]: of the matrix;
+    alike [unknowns]: number of the kind and unit of each; member [unknowns of y]: number of the kind; first: place of
+    the first that is missed.
+    """
+
+    def __init__(self, system: System, settled: System, measuring: bool) -> None:
+        self.n = system.form.written
+        self.rates = rates_of(settled)
+        self.momenta = system.of_groups("momentum")
+        self._rows(settled)
+        self.measuring = measuring and bool(self.unsaid.any())
+        self.missed = np.flatnonzero(self.guessed & self.measuring)
+        self.first = self.n + self.rates.size
+        self.unsettled = inertial_rates(settled)
+        self.unknowns = self.first + self.missed.size
+        self.momentum, self.flow = pairs(system)
+        self._entries(settled)
+        self.units = self._units(settled)
+        self._kinds(system)
+        self.measured = self._measured(settled.rows)
+        self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
+
+    def _rows(self, settled: System) -> None:
+        """Rows of block initial that are guesses, and those of them that no text says."""
+        self.guessed, self.unsaid = (np.zeros(settled.rows, dtype=bool) for _ in range(2))
+        for group, family, first in settled.form.groups:
+            rows = settled.description.rows[family]
+            if group == "initial" and not rows.fixed:
+                self.guessed[first : first + rows.size] = True
+                self.unsaid[first : first + rows.size] = not rows.written
+
+    def _entries(self, settled: System) -> None:
+        """Those of dF/dy, of dF/dy' where the derivative is an unknown, of what is missed."""
+        pattern = settled.pattern
+        columns = pattern.columns_of()
+        rate_at = np.full(self.n, -1, dtype=np.int32)
+        rate_at[self.rates] = self.n + np.arange(self.rates.size, dtype=np.int32)
+        self.rated = np.flatnonzero(rate_at[columns] >= 0).astype(np.int32)
+        places = (self.first + np.arange(self.missed.size)).astype(np.int32)
+        missed = self.missed.astype(np.int32)
+        self.rows = np.concatenate([pattern.row, pattern.row[self.rated], missed])
+        self.columns = np.concatenate([columns, rate_at[columns[self.rated]], places])
+        in_y, in_rate = settled.structural()
+        self.structural = np.concatenate([in_y, in_rate[self.rated], np.ones(self.missed.size, dtype=bool)])
+
+    def _units(self, settled: System) -> list[str]:
+        """The unit of what each guess misses."""
+        found = [""] * settled.rows
+        for group, family, first in settled.form.groups:
+            rows = settled.description.rows[family]
+            if group == "initial":
+                found[first : first + rows.size] = [rows.unit] * rows.size
+        return [found[row] for row in self.missed]
+
+    def _kinds(self, system: System) -> None:
+        self.family = np.unique(self.units, return_inverse=True)[1].astype(np.int64)
+        kinds = alike(system)
+        largest = kinds.max(initial=0) + 1
+        groups = kinds[: self.n], largest + kinds[self.rates], 2 * largest + self.family
+        self.alike = np.concatenate(groups).astype(np.int32)
+        number: dict[str, int] = {}
+        of_family = [number.setdefault(f.kind, len(number)) for f in system.description.families]
+        self.member = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: self.n]]
+        self.members = len(number)
+        self._numbers, self._of_kinds = number, dict[tuple[str, ...], Mask]()
+        self._guesses = self._read([*number])
+
+    def _read(self, kinds: list[str]) -> NDArray[np.str_]:
+        """The kind of unknowns that each guess is of; none where it is of several [missed]."""
+        if not self.missed.size:
+            return np.zeros(0, dtype="<U5")
+        found, many = np.full(self.guessed.size, "", dtype="<U5"), np.zeros(self.guessed.size, dtype=bool)
+        for kind in (*kinds, "rate"):
+            moves = np.append(self._plain((kind,)), np.zeros(self.missed.size, dtype=bool))
+            rows = self.rows[self.structural & moves[self.columns]]
+            many[rows] |= found[rows] != ""
+            found[rows] = kind
+        return np.where(many, "", found)[self.missed]
+
+    def _plain(self, kinds: Sequence[str]) -> Mask:
+        """Unknowns of these kinds among those of y and the derivatives."""
+        among = np.array([kind in kinds for kind in self._numbers], dtype=bool)
+        return np.append(among[self.member], np.full(self.rates.size, "rate" in kinds))
+
+    def _measured(self, number: int) -> Mask:
+        """Unknowns of y that the contents of stores measure; a momentum with its flow."""
+        mask, missed = np.zeros(self.n, dtype=bool), np.zeros(number, dtype=bool)
+        missed[self.missed] = True
+        own = self.structural & missed[self.rows] & (self.columns < self.n)
+        mask[self.columns[own]] = True
+        mask[self.momentum] |= mask[self.flow]
+        return mask
+
+    def moves(self, kinds: Sequence[str]) -> Mask:
+        """Unknowns of these kinds [unknowns]; read-only."""
+        key = tuple(kinds)
+        if key not in self._of_kinds:
+            self._of_kinds[key] = read_only(np.append(self._plain(key), np.isin(self._guesses, key)))
+        return self._of_kinds[key]
+
+    def core(self, system: System, settled: System) -> lib.RowsOfStart:
+        """The core's structure for the rows of one settled system."""
+        form, found = system.form, lib.RowsOfStart()
+        balance = Balance(settled.rows, self.rows, self.columns, self.alike)
+        missed = self.missed.astype(np.int32)
+        found.system, found.balance, found.extended = c.addressof(settled.core), balance.core, settled.form.extended
+        found.written, found.rates, found.missed = self.n, self.rates.size, missed.size
+        found.rated, found.kinematics = self.rated.size, form.k_q.size
+        found.rate, found.entry, found.miss, found.k_q, found.k_f = map(
+            lib.pointer, (self.rates, self.rated, missed, form.k_q, form.k_f)
+        )
+        found.kept = balance, missed
+        return found
