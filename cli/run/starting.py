@@ -25,6 +25,15 @@ from sysdyn.runtime.structure.inertia import negative_inertia
 from sysdyn.runtime.structure.order import order_and_manifold
 from sysdyn.runtime.structure.structure import Structure, structure
 
+SOUGHT = {
+    "perturbed_stage": "from a point beside the guess: the equations are singular at the guess itself",
+    "all_unknowns": "with all unknowns at once",
+    "rows_as_written": "down steep laws, from the equations without their derivatives",
+    "perturbed_guess": "from a point beside the guess",
+    "largest_scales": "in the largest scales that the equations propose",
+}
+"""What the summary says of a start by its strategy (runtime/start); nothing of the plain one."""
+
 
 @dataclass(frozen=True, slots=True)
 class Started:
@@ -85,6 +94,11 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
 def described(state: ConsistentState) -> list[str]:
     """What the start moved, a line each."""
     return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
+
+
+def sought(state: ConsistentState) -> str:
+    """How the start was found, where Newton's method from the guesses was not enough; else nothing."""
+    return SOUGHT.get(state.strategy, "") and f"the start was found {SOUGHT[state.strategy]} ({state.strategy})"
 
 
 def shortened(lines: list[str]) -> list[str]:
