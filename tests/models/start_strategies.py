@@ -1,6 +1,7 @@
 """By which strategy each scene of models/ finds its start, in every formulation.
 
-`python tests/models/start_strategies.py [PATTERN]` prints the starts that need more than the first strategy, and the counts.  The line of 100000 sections is left out.
+`python tests/models/start_strategies.py [PATTERN]` prints the starts that need more than the first strategy, and the
+counts.  The line of 100000 sections is left out.
 """
 
 import sys
