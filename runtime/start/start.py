@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
     FOLDS,
+    OutOfTimeError,
     Problem,
     Solution,
     Work,
@@ -320,7 +321,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
 def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """Down steep laws on the rows as written, with a share of work of its own; then everything at once."""
-    own, starter.work = starter.work, Work(WALKED)
+    own, starter.work = starter.work, Work(WALKED, starter.work.until)
     down = _as_written(starter, t, x, guess, free)
     starter.work = own
     return _rescaled(starter, t, down, guess, free)
@@ -339,7 +340,7 @@ def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
 
 def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """Everything at once in the largest scales that rows propose, with work of its own; kept where it succeeds."""
-    own, starter.work, starter.generous = starter.work, Work(), True
+    own, starter.work, starter.generous = starter.work, Work(until=starter.work.until), True
     found, holds = _rescaled(starter, t, x, guess, free)
     starter.work, starter.generous = own, holds
     return (found if holds else replace(found, residual=np.inf)), holds
@@ -428,7 +429,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
-    starter.work = Work(EXPLAINED)
+    starter.work = Work(EXPLAINED, starter.work.until)
     x, scaled = best.x, best.scaled
     if x.size <= DENSE:
         problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
@@ -472,13 +473,25 @@ def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tu
     return missing, names
 
 
-def consistent_start(system: System, t0: float, near: ConsistentState | None = None) -> ConsistentState:
+def consistent_start(
+    system: System, t0: float, near: ConsistentState | None = None, until: float | None = None
+) -> ConsistentState:
     """A state at t0 that satisfies all rows and their hidden derivatives.
 
-    system: any index form of the model; near: a state to stay close to, else the guesses.  Raises InconsistentStart.
+    system: any index form of the model; near: a state to stay close to, else the guesses; until: `time.monotonic()` at
+    which the search is given up.  Raises InconsistentStart; SolverFailure (max_wall).
     """
+    try:
+        return _consistent(system, t0, near, until)
+    except OutOfTimeError as error:
+        raise SolverFailure("max_wall", t0, 0.0) from error
+
+
+def _consistent(system: System, t0: float, near: ConsistentState | None, until: float | None) -> ConsistentState:
+    """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
     starter = Starter(system, measuring=True, remember=True)
+    starter.work = Work(until=until)
     guess = np.concatenate([starter.given.guess, np.zeros(starter.moving.size - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         guess[: starter.n] = np.where(np.isin(starter.kinds, (*STATE, "e")), near.y, guess[: starter.n])
@@ -488,10 +501,11 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     best, strategy = _attempt(starter, t0, guess, free)
     if not strategy:
         raise _explain(starter, t0, guess, free, best)
-    starter.work = Work(EXPLAINED)
+    starter.work = Work(EXPLAINED, until)
     best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
     again = not starter.missed.size and not starter.summed and best.x.size <= DENSE  # of a large one the room counts
     system.starter = starter if again else None
+    starter.work.until = None  # a restart is limited by the clock of its run
     y, yd = starter.expand(best.x)
     counted = Starter(system, remember=True) if starter.missed.size else starter
     freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])

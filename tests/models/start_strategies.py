@@ -32,15 +32,30 @@ def strategies(pattern, formulations=EVERY):
 
 
 def _strategy(path, document, scene, formulation):
+    prepared, begun = _started(str(path), document, scene, formulation)
+    if prepared is None:
+        return ""
+    return begun.state.strategy if begun else None
+
+
+def _started(name, document, scene, formulation):
+    """A target prepared without a compiler, and its start; None where there is none."""
     report = Report()
     with ex.fresh():
-        target = targets.one(document, str(path), None, scene, report)
-        prepared = target and ready(Request(str(path), formulation=formulation, backend="numpy"), target, report)
+        target = targets.one(document, name, None, scene, report)
+        prepared = target and ready(Request(name, formulation=formulation, backend="numpy"), target, report)
         if prepared is None:
-            return ""
+            return None, None
         begin = prepared.network.scene and prepared.network.scene.start
-        started = start(prepared, 0.0 if begin is None else prepared.binding.evaluate(begin), report)
-    return started.state.strategy if started else None
+        return prepared, start(prepared, 0.0 if begin is None else prepared.binding.evaluate(begin), report)
+
+
+def started(text, formulation):
+    """The start of a text, which must have one."""
+    report = Report()
+    _, begun = _started("model.sd", load.document(Source("model.sd", text), report), None, formulation)
+    assert begun is not None, list(report)
+    return begun
 
 
 if __name__ == "__main__":
