@@ -33,7 +33,7 @@ SHOWN = 4
 def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
     """Simulate a scene of FILE and write its trace."""
     from sysdyn.cli.run.running import Request, run
-    from sysdyn.cli.run.starting import described, shortened
+    from sysdyn.cli.run.starting import described, shortened, sought
 
     line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)
@@ -45,10 +45,11 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
         )
     finally:
         line.clear()
-    if ran is None:
-        return console.finish(1)
+    if ran is None:  # a limit that is reached before the first step is one of the run
+        return console.finish(3 if any(d.code == "E934" for d in console.report) else 1)
     console.result = _result(ran)
-    for text in (*shortened(described(ran.started.state)), *ran.outcome.warnings):
+    found = sought(ran.started.state)
+    for text in (*shortened(described(ran.started.state)), *([found] if found else []), *ran.outcome.warnings):
         console.say(text)
     if ran.outcome.judgement is not None and not ran.outcome.met:
         for claim in ran.claims:
@@ -112,6 +113,7 @@ def _result(ran: Ran) -> dict[str, Any]:
         "formulation": ran.prepared.formulation,
         "method": o.method,
         "index": o.index,
+        "start_strategy": ran.started.state.strategy,
         "statistics": o.statistics,
         "timings": o.timings,
         "error_estimate": o.error_estimate,

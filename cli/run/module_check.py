@@ -66,7 +66,9 @@ def _apart(module: Array, sample: Sample) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore"):
         apart = np.abs(found - sample.value)
     both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
-    return ~both & ~(apart <= ROUNDING * sample.size)
+    # the size of terms in which something overflows (one over cosh) is no number
+    size = np.where(np.isfinite(sample.size), sample.size, np.abs(sample.value))
+    return ~both & ~(apart <= ROUNDING * size)
 
 
 def _points(system: System, started: Started, oracle: SampledRows, until: float) -> Points:

@@ -181,7 +181,9 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
 
     checked: they were compared before, with other numbers.
     """
-    started = start(prepared, options.t_start, report, options.redundancy)
+    since = options.wall_began
+    until = None if options.max_wall is None or since is None else since + options.max_wall
+    started = start(prepared, options.t_start, report, options.redundancy, until)
     if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
         return None
     if not checked:

@@ -16,7 +16,7 @@ from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.text.diagnostics import Related, Report
 from sysdyn.runtime.events.start import eventful_start
 from sysdyn.runtime.model.description import describe
-from sysdyn.runtime.model.failures import InconsistentStart
+from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.start import ConsistentState
@@ -24,6 +24,15 @@ from sysdyn.runtime.structure.implicit import undetermined
 from sysdyn.runtime.structure.inertia import negative_inertia
 from sysdyn.runtime.structure.order import order_and_manifold
 from sysdyn.runtime.structure.structure import Structure, structure
+
+SOUGHT = {
+    "perturbed_stage": "from a point beside the guess: the equations are singular at the guess itself",
+    "all_unknowns": "with all unknowns at once",
+    "rows_as_written": "down steep laws, from the equations without their derivatives",
+    "perturbed_guess": "from a point beside the guess",
+    "largest_scales": "in the largest scales that the equations propose",
+}
+"""What the summary says of a start by its strategy (runtime/start); nothing of the plain one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +44,19 @@ class Started:
     facts: Structure
 
 
-def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None = None) -> Started | None:
+def start(
+    prepared: Prepared, t0: float, report: Report, redundancy: str | None = None, until: float | None = None
+) -> Started | None:
     """The consistent start and the structural facts there; None where the report says what is in the way.
 
-    redundancy: error, drop or minimum_norm; None: the scene's.
+    redundancy: error, drop or minimum_norm; None: the scene's; until: `time.monotonic()` of the limit of wall time.
     """
     scene = prepared.network.scene
     policy = redundancy or (scene.redundancy if scene else None) or "error"
     system = System.of(describe(prepared.manifest, prepared.arrays), prepared.carrier, "3")
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
-            state = eventful_start(system, t0, plan(prepared, system))
+            state = eventful_start(system, t0, plan(prepared, system), until)
             facts = structure(system, state)
             implicit = undetermined(system, state)
     except InconsistentStart as error:
@@ -53,6 +64,10 @@ def start(prepared: Prepared, t0: float, report: Report, redundancy: str | None 
         return None
     except NotFiniteError:
         _steep(prepared, report)
+        return None
+    except SolverFailure:
+        text = "the limit of wall time is reached while the start is sought: there is no trace"
+        report.error("E934", text, prepared.network.place, help="a higher limit, or guesses nearer to a start")
         return None
     _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
@@ -85,6 +100,11 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
 def described(state: ConsistentState) -> list[str]:
     """What the start moved, a line each."""
     return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
+
+
+def sought(state: ConsistentState) -> str:
+    """How the start was found, where Newton's method from the guesses was not enough; else nothing."""
+    return SOUGHT.get(state.strategy, "") and f"the start was found {SOUGHT[state.strategy]} ({state.strategy})"
 
 
 def shortened(lines: list[str]) -> list[str]:

@@ -17,13 +17,13 @@ SPAN = 1.0
 """s: in which what starts at rest may come to its magnitude."""
 
 
-def eventful_start(system: System, t0: float, plan: Plan) -> ConsistentState:
+def eventful_start(system: System, t0: float, plan: Plan, until: float | None = None) -> ConsistentState:
     """A state at t0 with the active set and the senses that fit it, which the model then has.
 
-    Raises InconsistentStart.
+    until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
     if not plan.contacts:
-        return consistent_start(system, t0)
+        return consistent_start(system, t0, until=until)
     contacts = Contacts(plan, system, Observer(system), system.description.p)
     contacts.begin()
     zeros = np.zeros(system.form.written)
@@ -36,7 +36,7 @@ def eventful_start(system: System, t0: float, plan: Plan) -> ConsistentState:
 
     def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         try:
-            found.append(consistent_start(system, t))
+            found.append(consistent_start(system, t, until=until))
         except InconsistentStart as error:
             errors.append(error)
             return None

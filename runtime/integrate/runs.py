@@ -216,6 +216,7 @@ class Runs:
             **self.options.attributes,
             "method": self.method,
             "index": self.way.name,
+            "start_strategy": self.start.strategy,
             "rtol": float(rtol),
             "atol": float(atol or 0.0),
         }

@@ -1,13 +1,14 @@
 """Nonlinear equations with more unknowns than rows: the solution nearest to a guess.
 
 Gauss-Newton: with u = W (x - guess) / scale, each step takes the minimum-norm u of the linearised rows
-A u = A u_k - r, by singular values (dense) or the saddle-point system [I A^T; A -eps] (sparse, SciPy, lazily),
+A u = A u_k - r, by singular values (dense) or the saddle-point system [a I A^T; A -eps] (sparse, SciPy, lazily),
 with halving of the step while the rows grow or are not finite.
 """
 
 from __future__ import annotations
 
 import ctypes as c
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -25,10 +26,13 @@ SMALL = 32
 """Rows and unknowns up to which a problem that the core knows is solved there."""
 DENSE = 400
 """Unknowns up to which matrices are full (no SciPy)."""
-EPS = 1e-13
-"""Of redundant rows, relative to rows of size one."""
 RANK = 1e-11
 """Singular values below this part of the largest belong to redundant rows."""
+EPS = 1e-13
+"""Of redundant rows in the saddle-point system, relative to rows of size one: above the round-off of its pivots."""
+NORM = RANK**2 / EPS
+"""Weight of the norm there.  Rows whose singular value is below the root of NORM EPS pass for redundant, as below RANK;
+and the system is as well conditioned as the rows, not as their squares (Bjorck, BIT 7, 1967)."""
 GRANTED = 3.6e9
 """Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
 ITERATIONS = 40
@@ -51,14 +55,20 @@ _BESIDE = 1e-8
 _PROXIMAL = 6
 
 
+class OutOfTimeError(Exception):
+    """The wall time granted is over."""
+
+
 @dataclass(slots=True)
 class Work:
     """What a search has left to spend, in operations counted by size: the same on every machine.
 
-    A share of GRANTED, or as much as ITERATIONS iterations of the largest problem met take.
+    A share of GRANTED, or as much as ITERATIONS iterations of the largest problem met take.  until: `time.monotonic()`
+    beyond which counting raises OutOfTimeError.
     """
 
     share: float = 1.0
+    until: float | None = None
     spent: float = 0.0
     largest: float = 0.0
 
@@ -70,13 +80,20 @@ class Work:
             solution = 15.0 * rows * unknowns * min(shape)
         elif max(shape) <= DENSE:
             solution = 4.0 * (rows + unknowns) ** 3
+        self.clocked()
         whole = solution + EVALUATION + EACH * entries
         self.largest = max(self.largest, whole)
         self.spent += whole
 
     def evaluation(self, entries: int) -> None:
         """Count one evaluation of all rows."""
+        self.clocked()
         self.spent += EVALUATION + EACH * entries
+
+    def clocked(self) -> None:
+        """Raise OutOfTimeError where the wall time is over."""
+        if self.until is not None and time.monotonic() > self.until:
+            raise OutOfTimeError
 
     @property
     def done(self) -> bool:
@@ -167,7 +184,7 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
 
 
 def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
-    """The u of least norm with A u = aim from [I A^T; A -eps], dense up to DENSE unknowns."""
+    """The u of least norm with A u = aim from [a I A^T; A -eps], dense up to DENSE unknowns."""
     rows, unknowns = shape
     i, j, v = entries
     here = np.arange(unknowns), unknowns + np.arange(rows)
@@ -175,7 +192,7 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
         np.concatenate([here[0], j, unknowns + i, here[1]]),
         np.concatenate([here[0], unknowns + i, j, here[1]]),
     )
-    values = np.concatenate([np.ones(unknowns), v, v, np.full(rows, -EPS)])
+    values = np.concatenate([np.full(unknowns, NORM), v, v, np.full(rows, -EPS)])
     apply: Callable[[Floats], Floats]
     back: Callable[[Floats], Floats]
     if max(shape) <= DENSE:

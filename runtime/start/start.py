@@ -3,23 +3,24 @@
 Unknowns and equations: see starter.py.  Fixed values never move.  Guesses move least: each step is the minimum-norm
 solution of the linearised rows around the *guess* (Gauss-Newton, in unknowns scaled by magnitude, rank-deficient rows
 tolerated).  Stages: positions onto phi and what else holds between them, then flows and momenta onto the first
-derivatives, then everything.  Where the rows are singular at the guess (a valve C f|f| at rest), seeded perturbations
-of the free unknowns are tried.
+derivatives, then everything.  Globalisation is the list STRATEGIES, tried in order until the rows hold; the name of
+the one that found it stays with the state.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
     FOLDS,
+    OutOfTimeError,
     Problem,
     Solution,
     Work,
@@ -32,6 +33,8 @@ from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
+UNPERTURBED = 2
+"""Trials of a stage that begin at the guess itself: the restricted problem, the whole one."""
 _FEW = 3
 """Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
@@ -64,7 +67,8 @@ class ConsistentState:
     """y, yd [unknowns as written] at t; residual: largest scaled row.
 
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  freedom: how many more
-    fixed values the state would take, guesses: names of the free unknowns among which.
+    fixed values the state would take, guesses: names of the free unknowns among which.  strategy: the one of
+    STRATEGIES that found it (PERTURBED_STAGE); "" of a state that was not sought from guesses.
     """
 
     t: float
@@ -74,6 +78,7 @@ class ConsistentState:
     residual: float
     freedom: int
     guesses: tuple[str, ...]
+    strategy: str = ""
 
     def for_form(self, system: System) -> tuple[Floats, Floats]:
         """y, yd in the layout of an index form: new multipliers are zero."""
@@ -105,11 +110,13 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return found.x if found.residual < EXACT else guess
 
 
-def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held.
+def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Floats, bool]:
+    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held; whether
+    Newton's iteration from the guess was enough.
 
     What follows from the state moves alone where that is enough.
     """
+    plain = True
     for groups, moving in STAGES:
         rows, may = starter.groups(*groups), free & starter.moves(moving)
         for use in (rows | starter.between(moving), rows):
@@ -117,11 +124,13 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
                 continue
             problem = problem_of(starter, t, x, guess, rows=use, free=may)
             gentle = replace(problem, free=may & starter.following(t, x))
-            found = next((s for s in _trials(gentle, problem, x) if s.residual < EXACT), None)
+            trials = enumerate(_trials(gentle, problem, x))
+            k, found = next(((k, s) for k, s in trials if s.residual < EXACT), (0, None))
             if found is not None:
                 x = starter.without_noise(found.x, problem.scale)
+                plain = plain and k < UNPERTURBED
                 break
-    return x
+    return x, plain
 
 
 def _trials(gentle: Problem, problem: Problem, x: Floats) -> Iterator[Solution]:
@@ -301,31 +310,66 @@ def _without_noise(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     return next((c for c in (empty, z, x) if _own(starter, t, c, c) < OWN), None)
 
 
-def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """What follows from the staged state; where nothing does, everything at once, then from perturbed points."""
-    x = _beside_gammas(starter, t, _stages(starter, t, guess.copy(), guess, free), guess, free)
-    best, holds = _rescaled(starter, t, x, guess, free & starter.following(t, x))
-    if holds:
-        return best, True
-    best, holds = _rescaled(starter, t, x, guess, free)
-    if not holds:
-        own, starter.work = starter.work, Work(WALKED)
-        down = _as_written(starter, t, x, guess, free)
-        starter.work = own
-        found, holds = _rescaled(starter, t, down, guess, free)
-        best = found if holds or found.residual < best.residual else best
+Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool]]
+"""From t, a staged point x, the guess and the free unknowns: the best solution, and whether all rows hold."""
+
+
+def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """The state stays as staged, what follows from it by Newton's method."""
+    return _rescaled(starter, t, x, guess, free & starter.following(t, x))
+
+
+def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Down steep laws on the rows as written, with a share of work of its own; then everything at once."""
+    own, starter.work = starter.work, Work(WALKED, starter.work.until)
+    down = _as_written(starter, t, x, guess, free)
+    starter.work = own
+    return _rescaled(starter, t, down, guess, free)
+
+
+def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Everything at once from seeded points around, as long as there is work left."""
+    best, holds = Solution(x, np.inf, np.zeros(0)), False
     for shaken in _shaken(x, free, starter.scale(t, x)):
         if holds or starter.work.done:
             break
         found, holds = _rescaled(starter, t, shaken, guess, free)
-        if holds or found.residual < best.residual:
-            best = found
-    if not holds:
-        own, starter.work, starter.generous = starter.work, Work(), True
-        found, holds = _rescaled(starter, t, x, guess, free)
-        starter.work, starter.generous = own, holds
-        best = found if holds else best
+        best = found if holds or found.residual < best.residual else best
     return best, holds
+
+
+def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Everything at once in the largest scales that rows propose, with work of its own; kept where it succeeds."""
+    own, starter.work, starter.generous = starter.work, Work(until=starter.work.until), True
+    found, holds = _rescaled(starter, t, x, guess, free)
+    starter.work, starter.generous = own, holds
+    return (found if holds else replace(found, residual=np.inf)), holds
+
+
+STRATEGIES: tuple[tuple[str, Strategy], ...] = (
+    ("newton", _newton),
+    ("all_unknowns", _rescaled),
+    ("rows_as_written", _walked),
+    ("perturbed_guess", _perturbed),
+    ("largest_scales", _in_largest_scales),
+)
+"""Globalisation: what is tried, in this order, until all rows hold."""
+PERTURBED_STAGE = "perturbed_stage"
+"""The first of them, from a stage that was itself found from a point around its guess."""
+
+
+def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
+    """The first strategy that holds from the staged state, and its name; the least residual and "" where none does."""
+    x, plain = _stages(starter, t, guess.copy(), guess, free)
+    x = _beside_gammas(starter, t, x, guess, free)
+    best = Solution(x, np.inf, np.zeros(0))
+    for name, strategy in STRATEGIES:
+        found, holds = strategy(starter, t, x, guess, free)
+        if holds:
+            return found, name if plain or name != "newton" else PERTURBED_STAGE
+        # what follows alone is no point to explain a failure at
+        best = found if name == "all_unknowns" or found.residual < best.residual else best
+    return best, ""
 
 
 def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
@@ -385,7 +429,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
-    starter.work = Work(EXPLAINED)
+    starter.work = Work(EXPLAINED, starter.work.until)
     x, scaled = best.x, best.scaled
     if x.size <= DENSE:
         problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
@@ -395,11 +439,11 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     order = np.argsort(-scaled)
     worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]
     rows = tuple(dict.fromkeys(starter.settled.row_label(row) for row in worst))
-    freed, holds = _attempt(starter, t, guess, np.ones_like(free))
+    freed, found = _attempt(starter, t, guess, np.ones_like(free))
     candidates: tuple[RowLabel, ...] = ()
     # rows that hold to round-off at some point contradict nothing: it was the search that failed
     contradict = bool(scaled[order[0]] > OWN)
-    if holds and contradict:
+    if found and contradict:
         scale = starter.scale(t, freed.x)
         change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
@@ -429,28 +473,41 @@ def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tu
     return missing, names
 
 
-def consistent_start(system: System, t0: float, near: ConsistentState | None = None) -> ConsistentState:
+def consistent_start(
+    system: System, t0: float, near: ConsistentState | None = None, until: float | None = None
+) -> ConsistentState:
     """A state at t0 that satisfies all rows and their hidden derivatives.
 
-    system: any index form of the model; near: a state to stay close to, else the guesses.  Raises InconsistentStart.
+    system: any index form of the model; near: a state to stay close to, else the guesses; until: `time.monotonic()` at
+    which the search is given up.  Raises InconsistentStart; SolverFailure (max_wall).
     """
+    try:
+        return _consistent(system, t0, near, until)
+    except OutOfTimeError as error:
+        raise SolverFailure("max_wall", t0, 0.0) from error
+
+
+def _consistent(system: System, t0: float, near: ConsistentState | None, until: float | None) -> ConsistentState:
+    """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
     starter = Starter(system, measuring=True, remember=True)
+    starter.work = Work(until=until)
     guess = np.concatenate([starter.given.guess, np.zeros(starter.equations.unknowns - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         guess[: starter.n] = np.where(system.are(*STATE, "e")[: starter.n], near.y, guess[: starter.n])
         guess[starter.first :] = starter.residual(t0, guess)[starter.missed]
     free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
     guess = _guess(starter, t0, guess, free)
-    best, holds = _attempt(starter, t0, guess, free)
-    if not holds:
+    best, strategy = _attempt(starter, t0, guess, free)
+    if not strategy:
         raise _explain(starter, t0, guess, free, best)
-    starter.work = Work(EXPLAINED)
+    starter.work = Work(EXPLAINED, until)
     best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
     again = not starter.missed.size and not starter.summed and best.x.size <= DENSE  # of a large one the room counts
     system.starter = starter if again else None
+    starter.work.until = None  # a restart is limited by the clock of its run
     y, yd = starter.expand(best.x)
     counted = Starter(system, remember=True) if starter.missed.size else starter
     freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
-    return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)
+    return ConsistentState(t0, y, yd, moved, best.residual, freedom, names, strategy)

@@ -39,6 +39,7 @@ SIMULATE = {
     "formulation": str,
     "method": str,
     "index": str,
+    "start_strategy": str,
     "statistics": dict,
     "timings": dict,
     "error_estimate": (*NUMBER, type(None)),

@@ -52,6 +52,7 @@ def test_the_trace_is_as_the_contract_says(tmp_path):
             "formulation",
             "method",
             "index",
+            "start_strategy",
             "rtol",
             "atol",
             "model_sha256",

@@ -1,9 +1,16 @@
 """Starts of the gallery's models from other guesses and positions than their own."""
 
+import os
+
 import numpy as np
 import pytest
-from model_runs import FOUR, trace_of
+from model_runs import FOUR, attempt, trace_of
 from reduced import ROOT
+from start_strategies import strategies
+from sysdyn.cli.options import EVERY
+from sysdyn.cli.run.starting import SOUGHT, sought
+from sysdyn.runtime.start.start import PERTURBED_STAGE, STRATEGIES
+from sysdyn.runtime.trace.trace import Trace
 
 GALLERY = ROOT / "models" / "gallery"
 
@@ -37,3 +44,24 @@ def test_a_junction_guessed_far_above_its_voltage_is_walked_down(tmp_path, formu
     assert 470.0 * (be - 0.618 * bc) == pytest.approx(ve, rel=1e-6)
     assert 2.2e3 * (0.774 * be - bc) == pytest.approx(12.0 - vc, rel=1e-6)
     assert (12.0 - vb) / 127e3 == pytest.approx(vb / 5.27e3 + (1 - 0.774) * be + (1 - 0.618) * bc, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "formulations"),
+    [("seed/*.sd", ("lagrangian", "co_lagrangian")), *([("*/*.sd", EVERY)] if os.environ.get("SYSDYN_LONG") else [])],
+)
+def test_nearly_all_starts_need_the_first_strategy_alone(pattern, formulations):
+    """One Newton iteration from the guesses, staged: 95 of 100."""
+    found = [strategy for *_, strategy in strategies(pattern, formulations)]
+    assert len(found) > 70
+    assert found.count("newton") >= 0.95 * len(found)
+    assert set(found) <= {name for name, _ in STRATEGIES} | {PERTURBED_STAGE}
+
+
+def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
+    """The amplifier's guesses of the bias contradict each other: they move with everything else."""
+    ran, _ = attempt(tmp_path, GALLERY / "ebers_moll_amp.sd", scene="bias", formulation="lagrangian")
+    assert ran.started.state.strategy == "all_unknowns"
+    assert sought(ran.started.state) == "the start was found with all unknowns at once (all_unknowns)"
+    assert Trace.open(tmp_path / "trace.h5").attributes["start_strategy"] == "all_unknowns"
+    assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]} | {PERTURBED_STAGE}

@@ -1,0 +1,160 @@
+"""Starts of models whose contents, stiffnesses and time constants lie far apart, against closed forms."""
+
+import time
+
+import numpy as np
+import pytest
+from model_runs import FOUR
+from start_strategies import started
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.start.start import consistent_start
+
+SOLITON = """
+from std.electrical import inductor
+component exponential {{
+  branch: electrical
+  {law}
+}}
+model toda {{
+  param n = {n}
+  param k = {k!r}
+  let b = sinh(k)/(1 s)
+  node v[0..n]: electrical
+  short: inductor(L = 1 H) ground -> v[0]
+  for i in 1..n {{ L[i]: inductor(L = 1 H) v[i - 1] -> v[i] }}
+  for i in 0..n {{
+    C[i]: exponential() v[i] -> ground
+    init C[i].e = 1 V*(sinh(k)/cosh(k*(i - n/2)))^2
+  }}
+  for i in 1..n {{ init L[i].f = 1 C*b*(tanh(k*(i - n/2)) - tanh(k*(i - 1 - n/2))) }}
+  init short.f = 1 C*b*(tanh(-k*n/2) - tanh(-k*(1 + n/2)))
+}}
+"""
+LAWS = {"e": "law e = 1 V*(exp(q/(1 C)) - 1)", "q": "law q = 1 C*ln(1 + e/(1 V))"}
+
+
+def named(state, system, *names):
+    """The values of unknowns [k] whose names begin so."""
+    found = {system.name(k).partition("[")[0]: [] for k in range(state.y.size)}
+    for k in range(state.y.size):
+        found[system.name(k).partition("[")[0]].append(k)
+    return next(np.array(found[name]) for name in names if name in found)
+
+
+@pytest.mark.parametrize(("n", "k"), [(20, 1.1), (200, 0.11), (300, 1.0)])
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+def test_a_soliton_with_tails(n, k, law, formulation):
+    """Toda's lattice: V = (sinh k / cosh(k i))^2, charges ln(1 + V), currents' rates the differences of voltages.
+
+    The tails are 1e-9 of the peak, or nothing at all; what is known of them is round-off of one.
+    """
+    begun = started(SOLITON.format(n=n, k=k, law=LAWS[law]), formulation)
+    state, system = begun.state, begun.system
+    place = k * (np.arange(n + 1) - n / 2)
+    volts = (np.sinh(k) / np.cosh(place)) ** 2
+    if formulation == "lagrangian":
+        charges = state.y[named(state, system, "C")]
+        slopes = state.yd[named(state, system, "L'")]
+        assert slopes == pytest.approx(volts[:-1] - volts[1:], rel=1e-6, abs=1e-14)
+    else:
+        charges = state.y[named(state, system, "C.p")]
+        linkages = state.y[named(state, system, "v'")]
+        assert linkages == pytest.approx(volts, rel=1e-6, abs=1e-14)
+    assert charges == pytest.approx(np.log1p(volts), rel=1e-6, abs=1e-14)
+
+
+STAGES = """
+from std.electrical import resistor, capacitor, voltage
+model stages {
+  node s, a, b: electrical
+  V: voltage(v = 1 V) s -> ground
+  R1: resistor(R = 1 ohm) s -> a
+  C1: capacitor(C = 1 uF) a -> ground
+  R2: resistor(R = 1 Mohm) a -> b
+  C2: capacitor(C = 1 F) b -> ground
+  init C1.e = 0.25 V
+  init C2.e = 0.5 V
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_stages_twelve_decades_apart(formulation):
+    """The small capacitor takes 3/4 A and 1/4 uA, the large one gives 1/4 uA."""
+    begun = started(STAGES, formulation)
+    values = dict(zip(map(begun.system.name, range(begun.state.y.size)), begun.state.y, strict=True))
+    assert begun.state.strategy == "newton"
+    assert values["C1"] == pytest.approx(0.25e-6, rel=1e-12)
+    assert values["C2"] == pytest.approx(0.5, rel=1e-12)
+    assert values["R2'"] == pytest.approx(-0.25e-6, rel=1e-9)
+    assert values["C1'"] == pytest.approx(0.75 + 0.25e-6, rel=1e-12)
+
+
+STIFF = """
+from std.mechanical import mass, spring, force
+model stiff {
+  node a, b, c: translation
+  A: mass(m = 1 kg) a
+  B: mass(m = 1 kg) b
+  D: mass(m = 1 kg) c
+  k1: spring(k = 1e12 N/m) a -> b
+  k2: spring(k = 2 N/m) b -> c
+  F: force(F = 1 N) a -> ground
+  init A.f = 0 m/s
+  init k1.q = 1e-12 m
+  init k2.q = 0.5 m
+}
+"""
+
+
+def test_a_spring_of_1e12_beside_one_of_2():
+    """Forces 1 N along the stiff spring and 1 N along the soft one: the first mass feels F and k1, the third k2."""
+    begun = started(STIFF, "lagrangian")
+    assert begun.state.strategy == "newton"
+    rates = dict(zip(map(begun.system.name, range(begun.state.y.size)), begun.state.yd, strict=True))
+    force = -1.0 if rates["c'"] > 0.0 else 1.0  # the sign of a pull of 1 N along k2
+    assert abs(rates["c'"]) == pytest.approx(1.0, rel=1e-9)
+    assert rates["b'"] == pytest.approx(0.0, abs=1e-9)
+    assert rates["a'"] in (pytest.approx(force - 1.0, abs=1e-9), pytest.approx(force + 1.0, abs=1e-9))
+
+
+LOOPS = """
+from std.electrical import resistor, capacitor
+model loops {
+  node a, b, c: electrical
+  C1: capacitor(C = 1 uF) a -> ground
+  C2: capacitor(C = 2 uF) b -> a
+  C3: capacitor(C = 3 uF) b -> ground
+  C4: capacitor(C = 5 uF) c -> b
+  C5: capacitor(C = 7 uF) c -> ground
+  R1: resistor(R = 1 ohm) a -> ground
+  R2: resistor(R = 2 ohm) b -> ground
+  R3: resistor(R = 3 ohm) c -> ground
+  init C1.e = 1 V
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_two_loops_of_three_capacitors_of_which_one_is_said(formulation):
+    """The charges that nobody said have the least sum of squares: two linear equations in the voltages b and c."""
+    a = np.array([[4.0 + 9.0 + 25.0, -25.0], [-25.0, 25.0 + 49.0]])
+    b, c = np.linalg.solve(a, [4.0, 0.0])
+    charges = 1e-6 * np.array([1.0, 2.0 * (b - 1.0), 3.0 * b, 5.0 * (c - b), 7.0 * c])
+    begun = started(LOOPS, formulation)
+    state, system = begun.state, begun.system
+    values = dict(zip(map(system.name, range(state.y.size)), state.y, strict=True))
+    if formulation.startswith("co_"):
+        volts = [values[name] for name in ("a'", "b'", "c'")]
+        assert volts == pytest.approx([1.0, b, c], rel=1e-9)
+    else:
+        assert [values[f"C{k}"] for k in range(1, 6)] == pytest.approx(charges, rel=1e-9)
+
+
+def test_the_wall_time_binds_the_start():
+    begun = started(STAGES, "lagrangian")
+    with pytest.raises(SolverFailure) as caught:
+        consistent_start(begun.system, 0.0, until=time.monotonic() - 1.0)
+    assert caught.value.cause == "max_wall"
+    assert consistent_start(begun.system, 0.0, until=time.monotonic() + 1e3).residual < 1e-9
