@@ -14,6 +14,7 @@
 #include "assembly.h"
 #include "linear.h"
 
+/* Of a condensed system the kept unknowns are moved; the others follow, and so do their rates. */
 enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
 
 typedef struct sd_settle {
@@ -37,10 +38,14 @@ typedef struct sd_settle {
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
                                         rate of another; norm of the constraint rows */
     int64_t calls, failures;
+    const struct sd_condensed *seen;       /* points are handed over as this system has them; NULL: with all unknowns */
+    double *room;                    /* [2][unknowns of the whole system] for points with all of them, and kept ones */
+    int32_t whole;                   /* unknowns of a point: those of the system, or of the one that it is condensed from */
     double drift;                    /* norm of the constraint rows before the last call moved the point */
 } sd_settle;
 
-sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);
+/* whole: unknowns of a point, more than the system's where that is condensed */
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole);
 void sd_settle_free(sd_settle *settle);
 /* y, yd [unknowns] moved in place; 0 done, 1 it did not converge (they are unchanged) */
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
