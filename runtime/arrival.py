@@ -68,6 +68,7 @@ def _arrived(
         stiff_steps=1e5,
         events=options.events or None,
         begin=begin,
+        condense=False,
         least_norm=options.redundancy == "minimum_norm" and bool(way.system.left_out),
     )
     run = Integration(way.system, start, request)

@@ -58,6 +58,8 @@ def _kernel(pattern: Pattern) -> dict[str, Any]:
         "rows": [_reference(r) for r in pattern.rows],
         "dy": [[_reference(r), _reference(c)] for r, c in pattern.dy],
         "dyd": [[_reference(r), _reference(c)] for r, c in pattern.dyd],
+        "reads": list(pattern.reads),
+        "curved": list(pattern.curved),
     }
 
 

@@ -198,3 +198,24 @@ def local_variables(root: Node, kinds: str | Sequence[str], order: int | None = 
     """The unknowns of those kinds that occur, in the order they were made."""
     found = (n for n in variables(root) if n.op == "var" and n.data[1] in kinds)
     return sorted((n for n in found if order is None or n.data[2] == order), key=lambda n: n.number)
+
+
+def is_affine(root: Node, changing: frozenset[str]) -> bool:
+    """Whether the expression is a constant plus constants times unknowns: neither unknowns nor time nor the parameters
+    `changing` enter a constant.
+    """
+    affine: dict[Node, bool] = {}
+    for node in topological([root]):
+        if node.op == "param" and node.data in changing:
+            return False
+        moving = [a for a in node.args if variables(a)]
+        if not variables(node) or node.op == "var":
+            affine[node] = True
+        elif node.op == "sum":
+            affine[node] = all(affine[a] for a in moving)
+        elif node.op == "mul":
+            powers = [e for e, a in zip(node.data, node.args, strict=True) if variables(a)]
+            affine[node] = powers == [1.0] and affine[moving[0]]
+        else:
+            affine[node] = False
+    return affine[root]

@@ -13,7 +13,7 @@ from typing import Any
 
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, Block, DescriptorForm, Kernel
 from sysdyn.compiler.model.integers import Index, Integers, Reference, Slot
-from sysdyn.compiler.model.terms import Nest
+from sysdyn.compiler.model.terms import Nest, is_affine
 from sysdyn.dsl.model.expression import Node, derivative, is_const, linear, topological, variables
 
 Operand = int | float  # the number of an assignment, or a constant
@@ -73,12 +73,16 @@ class Routine:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """What one kernel adds to: its loops, rows, and the places of its entries."""
+    """What one kernel adds to: its loops, rows, and the places of its entries; families of unknowns that it reads; row
+    families to which it adds anything but constants and constants times unknowns.
+    """
 
     loops: tuple[tuple[Index, Index], ...]
     rows: tuple[Reference, ...]
     dy: tuple[tuple[Reference, Reference], ...]
     dyd: tuple[tuple[Reference, Reference], ...]
+    reads: tuple[int, ...]
+    curved: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +115,7 @@ class Programmer:
         self.integers = Integers()
         self.scalars = {name: k for k, name in enumerate(scalars)}
         self.families = {(f.owner, f.kind): k for k, f in enumerate(form.families)}
+        self.changing = frozenset(kink.branch for kink in form.kinks)
         self.tables: dict[str, None] = {}
         self.routines: list[Routine] = []
 
@@ -149,7 +154,10 @@ class Programmer:
             found[part] = tuple((places[e.row], self.reference(e.column, loops)) for e in entries)
             numbered: list[tuple[Reference | int, Node]] = [(k, e.value) for k, e in enumerate(entries)]
             self._cut((block, part, number), bounds, numbered, [rows[e.row] for e in entries], len(entries))
-        return Pattern(bounds, places, found["dy"], found["dyd"])
+        unknowns = {n for s in kernel.rows for n in variables(s.expression) if n.op == "var"}
+        reads = {self.families[n.data[0], n.data[1]] for n in unknowns}
+        curved = {s.row for s in kernel.rows if not is_affine(s.expression, self.changing)}
+        return Pattern(bounds, places, found["dy"], found["dyd"], tuple(sorted(reads)), tuple(sorted(curved)))
 
     def formula(self, block: str, number: int, nest: Nest, expression: Node) -> None:
         """One value an iteration, in the order of the iterations (formulas.py)."""

@@ -12,6 +12,11 @@
 
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r)
 {
+    system->residual_evaluations++;
+    if (system->left) {
+        system->left->residual(system->left, t, y, yd, r);
+        return;
+    }
     memset(r, 0, (size_t)system->rows * sizeof *r);
     for (int32_t i = 0; i < system->kinematics; i++)
         r[system->k_row[i]] = system->k_scale[i] * (yd[system->k_q[i]] - y[system->k_f[i]]);
@@ -19,7 +24,6 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
         system->call[c].rows(&system->call[c].frame, t, y, yd, r);
     for (int32_t i = 0; i < system->held; i++)
         r[system->held_row[i]] = (system->held_rate[i] ? yd : y)[system->held_unknown[i]];
-    system->residual_evaluations++;
 }
 
 /* adds one block's entries into their places; entries of one place add up */
@@ -37,6 +41,11 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
 {
     memset(jy, 0, (size_t)system->entries * sizeof *jy);
     memset(jyd, 0, (size_t)system->entries * sizeof *jyd);
+    system->jacobian_evaluations++;
+    if (system->left) {
+        system->left->jacobian(system->left, t, y, yd, jy, jyd);
+        return;
+    }
     for (int32_t i = 0; i < system->kinematics; i++) {
         jyd[system->k_slot_q[i]] += system->k_scale[i];
         jy[system->k_slot_f[i]] -= system->k_scale[i];
@@ -52,12 +61,15 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
         jy[system->held_slot[i]] = system->held_rate[i] ? 0.0 : 1.0;
         jyd[system->held_slot[i]] = system->held_rate[i] ? 1.0 : 0.0;
     }
-    system->jacobian_evaluations++;
 }
 
 /* s := magnitudes of the terms of steep rows, zero in others */
 static void steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s)
 {
+    if (system->left) {
+        system->left->steep(system->left, t, y, rate, s, steep_terms);
+        return;
+    }
     memset(s, 0, (size_t)system->rows * sizeof *s);
     for (int32_t c = 0; c < system->scales; c++)
         system->scale[c].rows(&system->scale[c].frame, t, y, rate, s);

@@ -31,7 +31,18 @@ typedef struct sd_call {
     const int32_t *slot_dy, *slot_dyd;
 } sd_call;
 
-typedef struct sd_system {
+typedef struct sd_system sd_system;
+
+/* What is left of a system when unknowns are eliminated (condensed.h): the functions below for its kept unknowns.
+ * jacobian adds to jy, jyd; steep: s := magnitudes of the terms of steep rows, by `terms` of the whole system. */
+typedef void sd_terms(sd_system *system, double t, const double *y, const double *rate, double *s);
+typedef struct sd_left {
+    void (*residual)(const struct sd_left *left, double t, const double *y, const double *yd, double *r);
+    void (*jacobian)(const struct sd_left *left, double t, const double *y, const double *yd, double *jy, double *jyd);
+    void (*steep)(const struct sd_left *left, double t, const double *y, const double *rate, double *s, sd_terms *terms);
+} sd_left;
+
+struct sd_system {
     int32_t unknowns, rows, entries, calls, kinematics;
     const int32_t *column, *row;
     const sd_call *call;
@@ -44,7 +55,8 @@ typedef struct sd_system {
     double *v;
     const int32_t *stop; /* nonzero: a callback of the caller failed, give up */
     int64_t residual_evaluations, jacobian_evaluations;
-} sd_system;
+    const sd_left *left; /* the unknowns and rows are those that are left of another system; NULL: all are */
+};
 
 /* r := F(t, y, yd) */
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r);

@@ -179,8 +179,9 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     memmove(radau->yd, yd, size);
     memcpy(radau->slope[0], radau->yd, size);
     radau->refined[0] = 1; /* a start is settled */
-    /* what is interpolated meets no steep law: its powers are those of the stages */
-    radau->stepper.nodes = radau->system->scales > 0 ? SD_STAGES : 0;
+    /* what is interpolated meets no steep law, and of what follows from differences of unknowns too little: its powers
+     * are those of the stages */
+    radau->stepper.nodes = radau->system->scales > 0 || radau->system->left ? SD_STAGES : 0;
     radau->h = 1.0;
     set_weights(radau);
     double span = radau->t_end - t, change = tested_norm(radau, yd) * radau->tolerance;
@@ -494,6 +495,8 @@ static void note_pulls(sd_radau *radau)
     const sd_system *system = radau->system;
     for (int32_t j = 0; j < radau->n; j++) {
         radau->pull[j] = 0.0;
+        if (radau->smooth[j] == SD_UNPULLED)
+            continue;
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
             if (radau->jyd[e] != 0.0)
                 radau->pull[j] = fmax(radau->pull[j], radau->h * fabs(radau->jy[e] / radau->jyd[e]));

@@ -23,6 +23,7 @@
 #include "stepper.h"
 
 #define SD_STAGES 3
+#define SD_UNPULLED 2
 
 typedef struct sd_radau {
     sd_system *system;
@@ -33,7 +34,8 @@ typedef struct sd_radau {
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
     double *magnitude;        /* [n] of the unknowns; grows with max |y| */
     double *met;              /* [n] max |y| */
-    const int32_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative */
+    const int32_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative,
+                                               * SD_UNPULLED: and is interpolated whatever pulls */
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;

@@ -86,13 +86,14 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
     const double *value[SD_STAGES] = {radau->phi, radau->last, radau->before};
     double t[SD_STAGES] = {radau->t, radau->t - radau->h_used, radau->t - radau->h_used - radau->h_before};
     size_t size = (size_t)radau->n * sizeof(double);
+    int32_t n = radau->n < settle->whole ? radau->n : settle->whole;
     for (int k = 0; k < SD_STAGES && k <= radau->taken; k++) {
         if (radau->refined[k])
             continue;
         memcpy(radau->point, value[k], size);
         memcpy(radau->point_d, radau->slope[k], size);
         if (sd_settle_point(settle, t[k], radau->point, radau->point_d) == 0)
-            for (int32_t i = 0; i < settle->unknowns; i++)
+            for (int32_t i = 0; i < n; i++)
                 if (radau->smooth[i])
                     radau->slope[k][i] = radau->point_d[i];
         radau->refined[k] = 1;

@@ -1,5 +1,6 @@
 /* Least change onto the equations and their hidden derivatives: see settle.h. */
 #include "settle.h"
+#include "condensed.h"
 
 #include <float.h>
 #include <math.h>
@@ -21,13 +22,14 @@
 
 enum { NONE, MATRIX, BASIS };
 
-sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole)
 {
     sd_settle *settle = calloc(1, sizeof *settle);
     if (!settle)
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
-    settle->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * m + 5 * n, sizeof(double));
+    size_t all = system->left ? (size_t)whole + 8 : 0;
+    settle->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * m + 5 * n + 4 * all, sizeof(double));
     if (!settle->memory) {
         free(settle);
         return NULL;
@@ -47,6 +49,8 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     settle->scale = settle->x0 + n;
     settle->step = settle->scale + n; /* unknowns, rates and rows */
     settle->matrix = settle->step + n + m;
+    settle->room = settle->matrix + linear->entries + 1;
+    settle->whole = whole;
     return settle;
 }
 
@@ -317,12 +321,13 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done)
 {
     for (int32_t i = 0; done && i < settle->system->held; i++)
         y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
-    for (int32_t i = 0; i < settle->kinematics; i++)
+    for (int32_t i = 0; i < settle->kinematics && !settle->system->left; i++)
         yd[settle->k_q[i]] = y[settle->k_f[i]];
     measure(settle, t, y, yd);
 }
 
-int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
+/* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
+static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
     int32_t n = settle->unknowns;
     double best;
@@ -354,4 +359,35 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
     settle->failures += !done;
     finish(settle, t, y, yd, done);
     return !done;
+}
+
+/* the same for a point with all unknowns of the system that this one is condensed from */
+static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
+{
+    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
+    if (!condensed)
+        return settle_unknowns(settle, t, y, yd);
+    double *z = settle->room + 2 * settle->whole, *zd = z + settle->whole;
+    sd_condensed_gather(condensed, y, z);
+    sd_condensed_gather(condensed, yd, zd);
+    int failed = settle_unknowns(settle, t, z, zd);
+    sd_condensed_expand(condensed, z, y, 0);
+    sd_condensed_expand(condensed, zd, yd, 1);
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    sd_condensed_complete(condensed, yd, 1); /* what follows from displacements follows them in its rate */
+    return failed;
+}
+
+int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
+{
+    if (!settle->seen)
+        return settle_whole(settle, t, y, yd);
+    double *whole = settle->room, *whole_d = whole + settle->whole;
+    sd_condensed_expand(settle->seen, y, whole, 0);
+    sd_condensed_expand(settle->seen, yd, whole_d, 1);
+    int failed = settle_whole(settle, t, whole, whole_d);
+    sd_condensed_gather(settle->seen, whole, y);
+    sd_condensed_gather(settle->seen, whole_d, yd);
+    return failed;
 }

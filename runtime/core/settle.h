@@ -18,6 +18,7 @@
 #include "linear.h"
 #include "sparse.h"
 
+/* Of a condensed system the kept unknowns are moved; the others follow, and so do their rates. */
 enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
 
 typedef struct sd_settle {
@@ -47,10 +48,14 @@ typedef struct sd_settle {
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
                                         rate of another; norm of the constraint rows */
     int64_t calls, failures;
+    const struct sd_condensed *seen;       /* points are handed over as this system has them; NULL: with all unknowns */
+    double *room;                    /* [2][unknowns of the whole system] for points with all of them, and kept ones */
+    int32_t whole;                   /* unknowns of a point: those of the system, or of the one that it is condensed from */
     double drift;                    /* norm of the constraint rows before the last call moved the point */
 } sd_settle;
 
-sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);
+/* whole: unknowns of a point, more than the system's where that is condensed */
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole);
 /* The basis: pattern of G^T, order of its columns, the rows; places as above.  2: no memory. */
 int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
                     const int32_t *place_y, const int32_t *place_yd);

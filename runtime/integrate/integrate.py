@@ -10,9 +10,12 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.least_norm import LeastNorm
 from sysdyn.runtime.integrate.ledgers import Ledgers
@@ -23,7 +26,7 @@ from sysdyn.runtime.integrate.pieces import Pieces
 from sysdyn.runtime.integrate.request import LONGEST, ON_UNDERLYING, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
-from sysdyn.runtime.integrate.unknown_roles import Roles
+from sysdyn.runtime.integrate.unknown_roles import Roles, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model import core_structures as structures
 from sysdyn.runtime.model.description import Floats, Ints
@@ -46,6 +49,8 @@ CREPT = 1e-7
 SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change:
 unknowns of one constraint are interpolated differently (core/radau_dense.c)."""
+UNPULLED = 2
+"""Kind of a derivative (core/radau.h): interpolated whatever pulls at its unknown."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -84,6 +89,8 @@ class Integration:
         if system.form.name == "2":
             self._weigh()
         self._light = origin.light
+        self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
+        self.forms = self._condensed()
         self._linear(origin.jy, origin.jyd)
         # flows without inertia in loops of stores follow from the rate of their balance alone
         contacts = request.events.contacts if request.events is not None else ()
@@ -91,8 +98,6 @@ class Integration:
         self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
         self.settler.core.contents.slack = SLACK * request.tolerance
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
-        stops = None if request.fixed_step else request.stops
-        self.segments = segments(start.t, request.t_end, stops)
         self._stepper()
         self._driver()
         self.pieces = Pieces(self, request.events) if request.events else None
@@ -105,6 +110,19 @@ class Integration:
             self.origin.weighted()
             self.magnitude = self._magnitudes()
 
+    def _condensed(self) -> Forms | None:
+        """The forms without what constant sums define; None where all unknowns are integrated."""
+        request = self.request
+        whole = request.events is not None or request.least_norm or request.fixed_step is not None
+        if whole or not request.condense or request.method in ON_UNDERLYING or len(self.segments) > 1:
+            return None
+        return condensed(self.system, self.start.t, self.y, self.yd)
+
+    @property
+    def stepped(self) -> System | Condensed:
+        """What the method sees."""
+        return self.system if self.forms is None else self.forms.stepped
+
     def _magnitudes(self) -> Floats:
         found, self._time = self.origin.sized(self.request.t_end)
         return np.maximum(found, self._least)
@@ -115,8 +133,8 @@ class Integration:
             self.underlying = Underlying(self.system, self.magnitude, jy, jyd)
             self.linear, self._order = self.underlying.linear, None
             return
-        pattern = self.system.pattern
-        self._order = order_of(self.system)
+        pattern = self.stepped.pattern
+        self._order = order_of(self.system) if self.forms is None else self.forms.order()
         self.linear = lib.core.sd_linear_new(
             pattern.unknowns, *(lib.pointer(item) for item in (pattern.column, pattern.row, self._order))
         )
@@ -127,31 +145,25 @@ class Integration:
         form = self.system.form
         n = form.written
         kinematics = (form.k_q, form.k_f)
-        return Settler(self.system.another(name), kinematics, self.magnitude[:n], self._time, state, self._light[:n])
+        left = self.forms.settled if self.forms is not None and name == "settled" else None
+        system = self.system.another(name)
+        return Settler(system, kinematics, self.magnitude[:n], self._time, state, self._light[:n], left)
 
     def _stepper(self) -> None:
         request = self.request
-        self.method = Method(request.method, self.system, self.linear, self._order, self.underlying)
+        self.method = Method(request.method, self.stepped, self.linear, self._order, self.underlying)
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._met = np.zeros(self.system.unknowns)
         self._unnamed = self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
-        self._smooth = self.roles.smooth.astype(np.int32)
         method = self.method.contents
-        self._idle = self.roles.idle.astype(np.int32)
-        if self.system.form.scales and self.underlying is None:
-            self.linear.contents.idle = lib.pointer(self._idle)
         method.rtol, method.t_end = request.rtol, self.segments[0].end
         method.h_max = request.fixed_step or request.h_max or LONGEST * (request.t_end - self.start.t)
         method.fixed_h = request.fixed_step or 0.0
-        method.atol = lib.pointer(self._atol)
-        method.magnitude, method.met = lib.pointer(self.magnitude), lib.pointer(self._met)
-        method.test, method.power = lib.pointer(self.roles.test), lib.pointer(self.roles.power)
-        if request.method == "radau":
-            method.smooth = lib.pointer(self._smooth)
-        elif request.method == "bdf":
+        self._tell(method)
+        if request.method == "bdf":
             method.max_order = request.max_order
-        else:
+        elif request.method != "radau":
             method.patience = request.stiff_steps
         if request.method == "energy":
             self._audit = self.system.observer("audit")
@@ -161,6 +173,45 @@ class Integration:
             self._project = self._settler("constraints", np.ones(self.system.form.written, dtype=bool))
             method.project = self._project.address
         self.method.start(self.start.t, self.y, self.yd)
+
+    def _tell(self, method: Any) -> None:
+        """What the method is told of each unknown that it steps: tolerance, magnitude, roles."""
+        found, seen = self.roles, (self._atol, self.magnitude, self._met)
+        if self.forms is not None:
+            kept = self.forms.stepped.kept
+            found = self._kept_roles(self.forms.stepped.whole, kept)
+            seen = (None if self._atol is None else self._atol[kept], self.magnitude[kept], self._met[kept])
+        smooth = found.smooth.astype(np.int32)
+        if self.forms is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing
+            smooth[found.smooth & self.system.are("q")[kept]] = UNPULLED
+        self._stepped = found, seen, smooth, found.idle.astype(np.int32)
+        atol, magnitude, met = seen
+        method.atol, method.magnitude, method.met = map(lib.pointer, (atol, magnitude, met))
+        method.test, method.power = lib.pointer(found.test), lib.pointer(found.power)
+        if self.request.method == "radau":
+            method.smooth = lib.pointer(self._stepped[2])
+        if self.system.form.scales and self.underlying is None:
+            self.linear.contents.idle = lib.pointer(self._stepped[3])
+            if self.forms is not None:  # rows within a step are judged by the magnitudes of all unknowns
+                expanded = self.method.expanded.contents
+                expanded.met, expanded.magnitude = lib.pointer(self._met), lib.pointer(self.magnitude)
+
+    def _kept_roles(self, whole: System, kept: NDArray[np.int64]) -> Roles:
+        """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
+        _, jyd = whole.jacobian(self.start.t, self.y, self.yd)
+        found = roles(whole, self.start.t, jyd, min(self.request.index, 2))
+        return Roles(*(np.ascontiguousarray(getattr(found, field.name)[kept]) for field in fields(Roles)))
+
+    def _sizes(self) -> tuple[Floats, Floats]:
+        """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point."""
+        if self.forms is None:
+            return self._met, self.magnitude
+        _, (_, magnitude, met), _, _ = self._stepped
+        largest, kept = np.maximum(self._met, np.abs(self.method.point()[0])), self.forms.stepped.kept
+        largest[kept] = met
+        sizes = np.maximum(self.magnitude, largest)
+        sizes[kept] = magnitude
+        return largest, sizes
 
     def _projected(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -233,10 +284,10 @@ class Integration:
             return SolverFailure("inertia", method.t, method.h, None, self.ledgers.lost)
         unknown: str | None = None
         row: RowLabel | None = None
-        if cause in ("singular", "nonfinite") and 0 <= method.bad_row < self.system.rows:
-            row = self.system.row_label(method.bad_row)
+        if cause in ("singular", "nonfinite") and 0 <= method.bad_row < self.stepped.rows:
+            row = self.stepped.row_label(method.bad_row)
         if cause == "singular":
-            unknown = self.system.name(method.bad_column)
+            unknown = self.stepped.name(method.bad_column)
         if cause in ("newton", "step_too_small", "error_test", "singular") and self.system.unknowns <= DENSE:
             # where the equations themselves are singular there, say so, with the place
             names, at = self._null_place()
@@ -260,12 +311,13 @@ class Integration:
 
     def _worst(self) -> str:
         """The unknown with the largest weighted correction in the last step."""
-        method, n = self.method.contents, self.system.unknowns
+        method, n = self.method.contents, self.stepped.unknowns
         change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
         change = np.where(np.isfinite(change), change, np.inf)
-        if (self.roles.test >= 0).any():
-            change[self.roles.test < 0] = 0.0
-        return self.system.name(int(np.argmax(change)))
+        test = self._stepped[0].test
+        if (test >= 0).any():
+            change[test < 0] = 0.0
+        return self.stepped.name(int(np.argmax(change)))
 
     def happened(self) -> tuple[Happened, ...]:
         """The events so far."""
@@ -277,7 +329,7 @@ class Integration:
 
     def statistics(self) -> Statistics:
         """Counters so far; residuals and Jacobians of the settling at output instants not included."""
-        method, core = self.method.contents, self.system.core
+        method, core = self.method.contents, self.stepped.core
         residuals, matrices = (0, 0) if self.underlying is None else self.underlying.evaluations
         return Statistics(
             method.steps,
@@ -383,7 +435,7 @@ class Integration:
     def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
         """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
         began = time.monotonic()
-        self.system.core.residual_evaluations = self.system.core.jacobian_evaluations = 0
+        self.stepped.core.residual_evaluations = self.stepped.core.jacobian_evaluations = 0
         method = self.method.contents
         for segment in self.segments:
             if segment is not self.segments[0]:
@@ -391,7 +443,7 @@ class Integration:
                 self._cross(segment)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
-        magnitude = confirmed(self.system, self.request.t_end - self.start.t, self._met, self.magnitude)
+        magnitude = confirmed(self.system, self.request.t_end - self.start.t, *self._sizes())
         return Finished(
             method.t,
             self.statistics(),

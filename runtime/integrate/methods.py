@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes as c
 from typing import Any
 
+from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
@@ -19,12 +20,19 @@ class Method:
     """One of "bdf", "radau", "dopri", "energy" on one system.
 
     linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri and energy.
+    Of a condensed system it steps what is kept, and shows every unknown.
     """
 
     def __init__(
-        self, name: str, system: System, linear: Any, order: Ints | None, underlying: Underlying | None = None
+        self,
+        name: str,
+        system: System | Condensed,
+        linear: Any,
+        order: Ints | None,
+        underlying: Underlying | None = None,
     ) -> None:
         self.name = name
+        self.expanded: Any = None
         self._complex: int | None = None
         self._core: Any = None
         if name == "radau":
@@ -32,6 +40,7 @@ class Method:
             self._core = lib.core.sd_radau_new(c.byref(system.core), linear, self._complex)
         elif name == "energy":
             assert underlying is not None
+            assert isinstance(system, System)
             audited = system.observed_rows("audit")[1]
             self._core = lib.core.sd_energy_new(
                 c.byref(system.core), underlying.core, system.form.extended, audited
@@ -43,6 +52,12 @@ class Method:
         if not self._core:
             raise MemoryError
         self._n = system.unknowns
+        if isinstance(system, Condensed):
+            self._n = system.whole.unknowns
+            condensed = c.addressof(system.condensed)
+            self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
+            if not self.expanded:
+                raise MemoryError
 
     @property
     def contents(self) -> Any:
@@ -51,21 +66,29 @@ class Method:
 
     @property
     def stepper(self) -> int:
-        """Address of its sd_stepper."""
+        """Address of its sd_stepper, or of the one that shows every unknown."""
+        address = lib.core.sd_expanded_stepper(self.expanded) if self.expanded else self._stepper()
+        assert isinstance(address, int)
+        return address
+
+    def _stepper(self) -> int:
         address = getattr(lib.core, f"sd_{self.name}_stepper")(self._core)
         assert isinstance(address, int)
         return address
 
     def start(self, t: float, y: Floats, yd: Floats) -> None:
         """From (t, y, yd) with a step of its own choice."""
-        getattr(lib.core, f"sd_{self.name}_start")(self._core, t, lib.pointer(y), lib.pointer(yd), 0.0)
+        name, core = ("expanded", self.expanded) if self.expanded else (self.name, self._core)
+        getattr(lib.core, f"sd_{name}_start")(core, t, lib.pointer(y), lib.pointer(yd), 0.0)
 
     def point(self) -> tuple[Floats, Floats]:
         """y, yd [unknowns] of the last accepted point."""
-        stepper = self.contents.stepper
+        stepper = self.expanded.contents.face if self.expanded else self.contents.stepper
         return lib.reader(stepper.y, self._n).copy(), lib.reader(stepper.yd, self._n).copy()
 
     def __del__(self) -> None:
+        if getattr(self, "expanded", None):
+            lib.core.sd_expanded_free(self.expanded)
         if getattr(self, "_core", None):
             getattr(lib.core, f"sd_{self.name}_free")(self._core)
         if getattr(self, "_complex", None):

@@ -34,6 +34,7 @@ class Request:
     stiff_steps: dopri and energy give up
     where stability holds it to more steps than these; settled_to: scaled residual that will do for rows
     by which runs are compared and nothing else, of a draft for all, 0: round-off;
+    condense: what constant sums define leaves the system (condense/);
     apart: part of a step; instants within it that are nearer to the row before are passed over.
     """
 
@@ -59,6 +60,7 @@ class Request:
     settled_to: float = 0.0
     draft: bool = False
     apart: float = 0.0
+    condense: bool = True
 
     @property
     def tolerance(self) -> float:

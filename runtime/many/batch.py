@@ -204,6 +204,7 @@ class Batch:
             h_max=min(longest * (options.t_end - options.t_start), options.longest or np.inf),
             settled_to=ROUGH * tolerance,
             draft=not number,
+            condense=False,
             max_wall=None,
         )
         made = Integration(self.system, self.start, request)

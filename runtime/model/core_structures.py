@@ -70,6 +70,38 @@ class System(c.Structure):
         ("stop", _P),
         ("residual_evaluations", _L),
         ("jacobian_evaluations", _L),
+        ("left", _P),
+    ]
+
+
+class Left(c.Structure):
+    """sd_left."""
+
+    _fields_ = [("residual", _P), ("jacobian", _P), ("steep", _P)]
+
+
+class Span(c.Structure):
+    """sd_span."""
+
+    _fields_ = [("full", _I), ("kept", _I), ("number", _I)]
+
+
+class Straight(c.Structure):
+    """sd_straight."""
+
+    _fields_ = [("place", _I), ("number", _I), ("terms", _I), ("source", _P), ("factor", _P), ("constant", _P)]
+
+
+class Condensed(c.Structure):
+    """sd_condensed."""
+
+    _fields_ = [
+        ("left", Left),
+        ("full", _P),
+        *[(name, _I) for name in ["unknowns", "rows", "unknown_spans", "row_spans", "straights"]],
+        *[(name, _P) for name in ["unknown", "row", "straight"]],
+        ("products", _L),
+        *[(name, _P) for name in ["from_", "to", "share", "y", "yd", "r", "jy", "jyd"]],
     ]
 
 
@@ -113,6 +145,17 @@ class Stepper(c.Structure):
         *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
         *[(name, _P) for name in ["moves", "part_moves"]],
         ("collocated", _I),
+    ]
+
+
+class Expanded(c.Structure):
+    """sd_expanded."""
+
+    _fields_ = [
+        ("face", Stepper),
+        *[(name, _P) for name in ["inner", "condensed", "y", "yd", "z", "zd", "memory", "node_y", "node_yd"]],
+        *[(name, _P) for name in ["met", "magnitude"]],
+        ("nodes", _I),
     ]
 
 
@@ -336,6 +379,9 @@ class Settle(c.Structure):
         ("constraints", _D),
         ("calls", _L),
         ("failures", _L),
+        ("seen", _P),
+        ("room", _P),
+        ("whole", _I),
         ("drift", _D),
     ]
 

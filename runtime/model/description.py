@@ -113,11 +113,16 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration."""
+    """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration; reads:
+    families of unknowns, curved: row families to which it adds more than constants and constants times unknowns (None:
+    not known).
+    """
 
     loops: tuple[tuple[Index, Index], ...]
     dy: tuple[tuple[Reference, Reference], ...]
     dyd: tuple[tuple[Reference, Reference], ...]
+    reads: frozenset[int] | None = None
+    curved: frozenset[int] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +198,8 @@ def _kernel(value: Mapping[str, Any]) -> Kernel:
     loops = tuple(
         (_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ()))
     )
-    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())))
+    reads, curved = (frozenset(value[name]) if name in value else None for name in ("reads", "curved"))
+    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), reads, curved)
 
 
 def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:

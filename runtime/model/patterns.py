@@ -103,8 +103,8 @@ def places(
 
     shapes: of row families and unknown families; tables: `to` and `at`.
     """
-    all_rows: list[Longs] = []
-    all_columns: list[Longs] = []
+    all_rows: list[Ints] = []
+    all_columns: list[Ints] = []
     for kernel in kernels:
         entries = kernel.dy if which == "dy" else kernel.dyd
         if not entries:
@@ -117,7 +117,7 @@ def places(
                 + _positions(pair[side], shapes[side][pair[side].family], loops, number, ix)
                 for pair in entries
             ]
-            into.append(np.stack([item.astype(np.int32) for item in found], axis=1).ravel())
+            into.append(np.stack(found, axis=1, dtype=np.int32).ravel())
     empty = np.zeros(0, dtype=np.int32)
     return Places(
         np.concatenate(all_rows) if all_rows else empty, np.concatenate(all_columns) if all_columns else empty

@@ -9,6 +9,7 @@ import ctypes as c
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
@@ -67,7 +68,8 @@ class Settler:
 
     settled: the System in form "settled"; magnitude [unknowns] of y; rate_magnitude [rates];
     state [unknowns] bool: unknowns that carry the state and should move least; light [unknowns] bool: displacements
-    without inertia among others that have some, which move more easily.
+    without inertia among others that have some, which move more easily.  condensed: what is left of the settled form;
+    the other unknowns follow.
     """
 
     def __init__(
@@ -78,13 +80,22 @@ class Settler:
         time_scale: float,
         state: NDArray[np.bool_],
         light: NDArray[np.bool_] | None = None,
+        condensed: Condensed | None = None,
     ) -> None:
-        self.system = settled
+        self.system, self._points = settled, settled.unknowns
+        self._left = settled if condensed is None else condensed
         self.rates = rates_of(settled)
-        n, k = settled.unknowns, int(self.rates.size)
+        if condensed is not None:
+            self.rates = condensed.rates()
+            magnitude, state = magnitude[condensed.kept], state[condensed.kept]
+            light = None if light is None else light[condensed.kept]
+        n, k = self._left.unknowns, int(self.rates.size)
         self._n, self._moves = n, n + k
         self.pattern: Pattern
-        self.pattern, self._slots, self._sort = settled.once("saddle", lambda: (*self._saddle(), self._sorts()))
+        self._key = () if condensed is None else condensed.key
+        self.pattern, self._slots, self._sort = settled.once(
+            ("saddle", *self._key), lambda: (*self._saddle(), self._sorts())
+        )
         self._weight = np.ones(self._moves)
         if light is not None:
             self._weight[:n][light] = LIGHT
@@ -96,15 +107,15 @@ class Settler:
 
     def _saddle(self) -> tuple[Pattern, list[Ints]]:
         """Pattern of [D G^T; G -eps] and the places of the parts."""
-        pattern, n = self.system.pattern, self._n
-        number = self._moves + self.system.rows
+        pattern, n = self._left.pattern, self._n
+        number = self._moves + self._left.rows
         columns, rows = pattern.columns_of(), pattern.row
         rate_at = np.full(n, -1, dtype=np.int64)
         rate_at[self.rates] = n + np.arange(self.rates.size)
         with_rate = rate_at[columns] >= 0
         x, r = rows + self._moves, columns
         xd, rd = rows[with_rate] + self._moves, rate_at[columns[with_rate]]
-        diagonal_x, diagonal_r = np.arange(self._moves), self._moves + np.arange(self.system.rows)
+        diagonal_x, diagonal_r = np.arange(self._moves), self._moves + np.arange(self._left.rows)
         parts = [
             Places(x, r),
             Places(r, x),
@@ -128,10 +139,10 @@ class Settler:
             found[first : first + self.system.description.rows[family].size] = sort
         if self.system.form.name == "rated":
             found[: self.system.rows][inertial_rates(self.system)] = 3
-        return found
+        return found if isinstance(self._left, System) else found[self._left.kept_rows]
 
     def _allocate(self) -> None:
-        order = self.system.once("saddle order", lambda: column_order(self.pattern))
+        order = self.system.once(("saddle order", *self._key), lambda: column_order(self.pattern))
         self._order = order
         self.linear = lib.core.sd_linear_new(
             self.pattern.unknowns,
@@ -139,7 +150,9 @@ class Settler:
         )
         if not self.linear:
             raise MemoryError
-        self.core = lib.core.sd_settle_new(c.byref(self.system.core), self.linear, int(self.rates.size))
+        self.core = lib.core.sd_settle_new(
+            c.byref(self._left.core), self.linear, int(self.rates.size), self._points
+        )
         if not self.core:
             raise MemoryError
         core = self.core.contents
@@ -156,19 +169,19 @@ class Settler:
 
     def _basis(self) -> tuple[Pattern, list[Ints], Ints]:
         """Pattern of G^T, the places of dF/dy and dF/dyd in it, the order of its columns."""
-        pattern = self.system.pattern
-        columns, rows = pattern.columns_of(), pattern.row.astype(np.int64)
+        pattern = self._left.pattern
+        columns, rows = pattern.columns_of(), pattern.row
         rate_at = np.full(self._n, -1, dtype=np.int64)
         rate_at[self.rates] = self._n + np.arange(self.rates.size)
         with_rate = rate_at[columns] >= 0
         parts = [Places(columns, rows), Places(rate_at[columns[with_rate]], rows[with_rate])]
-        found, slots = compress(self._moves, self.system.rows, parts)
+        found, slots = compress(self._moves, self._left.rows, parts)
         full = np.full(pattern.entries, -1, dtype=np.int32)
         full[with_rate] = slots[1]
         return found, [slots[0], full], tall_order(found)
 
     def _widen(self) -> None:
-        self._wide = self.system.once("basis", self._basis)
+        self._wide = self.system.once(("basis", *self._key), self._basis)
         pattern, slots, order = self._wide
         arrays = (pattern.column, pattern.row, order, *slots)
         if lib.core.sd_settle_widen(self.core, *(lib.pointer(item) for item in arrays)):
@@ -192,7 +205,7 @@ class Settler:
         if hold != 1.0:
             self.core.contents.hold, self.core.contents.ready = 1.0, 0
         self.system.failure.check()
-        return a[: self._n], b[: self._n], not failed
+        return a[: self._points], b[: self._points], not failed
 
     def __del__(self) -> None:
         if getattr(self, "core", None):

@@ -353,8 +353,8 @@ class Starter:
         values, free = self.jacobian(t, x), self.residual(t, x)
         told = np.where(self._of_missed, values, 0.0)
         sized = values - np.where(np.isfinite(told), told, 0.0)
-        numbers = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
-        if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *numbers):
+        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
+        if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
         return self._of_one_unit(np.abs(told), found) if self.missed.size else found
 

@@ -44,7 +44,8 @@ def test_what_follows_from_the_state_is_the_same_by_both_ways(settler):
     moved = y + follows * 0.1 * settler.scale[: y.size] * rng.normal(size=y.size)
     (a, ad), (b, bd) = both(settler, moved, yd)
     size = settler.scale[: y.size]
-    assert np.abs(a - b).max() <= 1e-11 * size.max() and np.abs((a - y)[~follows]).max() == 0.0
+    assert np.abs(a - b).max() <= 1e-11 * size.max()
+    assert np.abs((a - y)[~follows]).max() == 0.0
     assert np.abs((a - y) / size).max() < 1e-11  # where it came from: the start is consistent
     assert np.abs(ad - bd)[settler.rates].max() <= 1e-10 * max(np.abs(bd).max(), 1.0)
 
@@ -58,6 +59,8 @@ def test_a_state_off_its_constraints_moves_least_unless_slack_is_given(settler):
     assert np.abs((b - off)[state]).max() > 1e-5 * settler.scale[: y.size][state].max()
     settler.core.contents.slack, settler.core.contents.ready = 1.0, 0
     c, _, fine = settler.settle(0.0, off, yd)
-    assert fine and settler.core.contents.residual < 1e-12
+    assert fine
+    assert settler.core.contents.residual < 1e-12
     least, basic = (np.linalg.norm(((x - off) / settler.scale[: y.size])[state]) for x in (b, c))
-    assert least <= basic * (1.0 + 1e-6) and basic < 10.0 * least
+    assert least <= basic * (1.0 + 1e-6)
+    assert basic < 10.0 * least

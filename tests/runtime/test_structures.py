@@ -19,11 +19,17 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("Transition", "sd_transition"), ("Contact", "sd_contact"), ("Kink", "sd_kink")]
     pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
     pairs += [("Balance", "sd_balance"), ("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
-    headers = [f'#include "{name}.h"' for name in ("run", "bdf", "radau", "dopri", "energy", "many", "search")]
+    pairs += [("Condensed", "sd_condensed"), ("Expanded", "sd_expanded"), ("Span", "sd_span")]
+    pairs += [("Straight", "sd_straight")]
+    headers = [
+        f'#include "{name}.h"'
+        for name in ("run", "bdf", "radau", "dopri", "energy", "many", "search", "expanded")
+    ]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
         lines.append(f'printf("%zu\\n", sizeof({tag}));')
-        lines += [f'printf("%zu\\n", offsetof({tag}, {field[0]}));' for field in getattr(lib, name)._fields_]
+        fields = [field[0].removesuffix("_") for field in getattr(lib, name)._fields_]
+        lines += [f'printf("%zu\\n", offsetof({tag}, {field}));' for field in fields]
     source = tmp_path / "sizes.c"
     source.write_text("\n".join([*lines, "return 0; }"]))
     subprocess.run(["gcc", f"-I{CORE}", str(source), "-o", str(tmp_path / "sizes")], check=True)

@@ -1,0 +1,1 @@
+"""Unknowns that are constant sums of others, and the system without them."""

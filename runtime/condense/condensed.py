@@ -1,0 +1,289 @@
+"""A form of a model without what can be eliminated, as the core's steppers and the settling see it.
+
+The system of core/condensed.h: kept unknowns z, kept rows, e = c + T z for the others.  Stretches of families
+whose sums read stretches of families become one loop each, whatever their number.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask, eliminate, steady
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.patterns import Pattern, Places, compress
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import column_order
+
+LEAST = 50
+"""Unknowns from which it is worth the trouble."""
+GAIN = 0.7
+"""Part of the unknowns that may be left."""
+RATE_OF = {"phi_acceleration": "phi_rate", "psi_rate": "psi", "gamma_rate": "gamma", "momentum_rate": "momentum"}
+"""Group of rows -> group of which they are the time derivative."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sums:
+    """e = c + T z of one set of numbers.  place, constant [eliminated]; start, source, factor: the terms of each, of
+    unknowns kept or before it; kept: places of z; unread: of what is neither.
+    """
+
+    place: Longs
+    constant: Floats
+    start: Longs
+    source: Longs
+    factor: Floats
+    kept: Longs
+    unread: Longs
+
+    def of_kept(self, unknowns: int) -> tuple[Longs, Longs, Floats]:
+        """T by rows: start [eliminated + 1], place in z, factor."""
+        from scipy.sparse import csr_array
+
+        number = np.full(unknowns, -1)
+        number[self.kept] = np.arange(self.kept.size)
+        later = np.full(unknowns, -1)
+        later[self.place] = np.arange(self.place.size)
+        row = np.repeat(np.arange(self.place.size), np.diff(self.start))
+
+        def part(numbers: Longs, size: int) -> csr_array:
+            here = numbers[self.source] >= 0
+            entries = self.factor[here], (row[here], numbers[self.source[here]])
+            return csr_array(entries, shape=(self.place.size, size))
+
+        direct, through = part(number, self.kept.size), part(later, self.place.size)
+        total, power = direct, direct
+        while power.nnz:
+            power = through @ power
+            total = total + power
+        total.sort_indices()
+        return total.indptr.astype(np.int64), total.indices.astype(np.int64), total.data
+
+
+def sums(system: System, found: Elimination, t: float, jy: Floats) -> Sums:
+    """The numbers of an elimination: jy [entries]."""
+    zero = np.zeros(system.unknowns)
+    pivot = jy[found.pivot]
+    rest = system.residual(t, zero, zero)[found.row]
+    factor = -jy[found.entry] / np.repeat(pivot, np.diff(found.start))
+    left = np.ones(system.unknowns, dtype=bool)
+    left[found.place] = left[found.unread] = False
+    source = system.pattern.columns_of()[found.entry].astype(np.int64)
+    return Sums(found.place, -rest / pivot, found.start, source, factor, np.flatnonzero(left), found.unread)
+
+
+def _spans(full: Longs) -> tuple[Longs, Longs, Longs]:
+    """Stretches of ascending places: first place, first number, length."""
+    begin = np.flatnonzero(np.concatenate([[True], np.diff(full) != 1])) if full.size else np.zeros(0, dtype=np.int64)
+    return full[begin], begin, np.diff(np.concatenate([begin, [full.size]]))
+
+
+class Condensed:
+    """The kept unknowns and rows of a system; what Method and Settler ask of a System, with places of its own.
+
+    kept, kept_rows: their places in the whole system; core: the core's structure of it.
+    """
+
+    def __init__(self, system: System, found: Sums, kept_rows: Longs) -> None:
+        self.whole, self.sums, self.kept, self.kept_rows = system, found, found.kept, kept_rows
+        self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
+        self._keep: list[object] = []
+        self._products()
+        self._make()
+
+    def _hold(self, array: Ints | Floats) -> int | None:
+        self._keep.append(array)
+        return lib.pointer(array)
+
+    def _products(self) -> None:
+        """The pattern, and which entries of the whole matrix add to which of it with what factor."""
+        system, found = self.whole, self.sums
+        columns, rows = system.pattern.columns_of(), system.pattern.row
+        row_at = np.full(system.rows, -1)
+        row_at[self.kept_rows] = np.arange(self.rows)
+        at = np.full(system.unknowns, -1)
+        at[self.kept] = np.arange(self.unknowns)
+        place = np.full(system.unknowns, -1)
+        place[found.place] = np.arange(found.place.size)
+        direct = np.flatnonzero((row_at[rows] >= 0) & (at[columns] >= 0))
+        through = np.flatnonzero((row_at[rows] >= 0) & (place[columns] >= 0))
+        start, source, factor = found.of_kept(system.unknowns)
+        number = place[columns[through]]
+        count = start[number + 1] - start[number]
+        term = np.repeat(start[number] - (np.cumsum(count) - count), count) + np.arange(count.sum())
+        entry = np.concatenate([direct, np.repeat(through, count)])
+        column = np.concatenate([at[columns[direct]], source[term]])
+        share = np.concatenate([np.ones(direct.size), factor[term]])
+        order = np.argsort(entry, kind="stable")
+        entry, column, share = entry[order], column[order], share[order]
+        self.pattern: Pattern
+        self.pattern, slots = compress(self.rows, self.unknowns, [Places(row_at[rows[entry]], column)])
+        self._from, self._to, self._share = entry.astype(np.int32), slots[0], np.ascontiguousarray(share)
+
+    def _spans(self, full: Longs) -> tuple[c.Array[Any], int]:
+        first, begin, number = _spans(full)
+        made = (lib.Span * max(first.size, 1))()
+        for k, span in enumerate(zip(first.tolist(), begin.tolist(), number.tolist(), strict=True)):
+            made[k] = lib.Span(*span)
+        self._keep.append(made)
+        return made, int(first.size)
+
+    def _straights(self) -> tuple[c.Array[Any], int]:
+        """Stretches of eliminated unknowns whose terms read stretches."""
+        found = self.sums
+        count, number = np.diff(found.start), found.place.size
+        same = np.diff(found.place) == 1
+        same &= np.diff(count) == 0
+        # within a stretch each term reads one further than the term above it
+        inner = np.repeat(np.concatenate([[False], same]), count)
+        above = np.arange(found.source.size) - np.repeat(np.concatenate([[0], count[:-1]]), count)
+        steps = np.ones(found.source.size, dtype=bool)
+        steps[inner] = found.source[inner] == found.source[above[inner]] + 1
+        broken = np.zeros(number, dtype=bool)
+        broken[np.repeat(np.arange(number), count)[~steps]] = True
+        begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
+        ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
+        made = (lib.Straight * max(begin.size, 1))()
+        factors, sources = np.empty(found.factor.size), found.source.astype(np.int32)
+        constants = np.ascontiguousarray(found.constant)
+        at, base, first = self._hold(factors), self._hold(constants), self._hold(sources)
+        assert at is not None
+        assert base is not None
+        assert first is not None
+        for k, (low, high) in enumerate(zip(begin.tolist(), ends.tolist(), strict=True)):
+            terms, entry = int(count[low]), int(found.start[low])
+            block = found.factor[entry : entry + terms * (high - low)].reshape(high - low, terms)
+            factors[entry : entry + block.size] = block.T.ravel()
+            made[k] = lib.Straight(
+                int(found.place[low]), high - low, terms, first + 4 * entry, at + 8 * entry, base + 8 * low
+            )
+        self._keep.append(made)
+        return made, int(begin.size)
+
+    def _make(self) -> None:
+        whole = self.whole
+        unknown, row, straight = self._spans(self.kept), self._spans(self.kept_rows), self._straights()
+        room = max(whole.form.extended, whole.unknowns) + 8
+        self.condensed = lib.Condensed(
+            full=c.addressof(whole.core),
+            unknowns=self.unknowns,
+            rows=self.rows,
+            unknown_spans=unknown[1],
+            row_spans=row[1],
+            straights=straight[1],
+            unknown=c.addressof(unknown[0]),
+            row=c.addressof(row[0]),
+            straight=c.addressof(straight[0]),
+            products=self._from.size,
+            from_=self._hold(self._from),
+            to=self._hold(self._to),
+            share=self._hold(self._share),
+            y=self._hold(np.zeros(room)),
+            yd=self._hold(np.zeros(room)),
+            r=self._hold(np.zeros(whole.rows + 1)),
+            jy=self._hold(np.zeros(whole.pattern.entries + 1)),
+            jyd=self._hold(np.zeros(whole.pattern.entries + 1)),
+        )
+        self.core = lib.System(
+            unknowns=self.unknowns,
+            rows=self.rows,
+            entries=self.pattern.entries,
+            column=lib.pointer(self.pattern.column),
+            row=lib.pointer(self.pattern.row),
+            scales=whole.core.scales,
+            stop=whole.core.stop,
+        )
+        lib.core.sd_condensed_bind(c.byref(self.condensed), c.byref(self.core))
+
+    @property
+    def key(self) -> tuple[int, int, int]:
+        """What of it an order of elimination depends on, beside the whole form."""
+        return self.unknowns, self.rows, self.pattern.entries
+
+    def rates(self) -> Ints:
+        """Numbers of kept unknowns whose derivatives occur."""
+        columns, rows = self.whole.pattern.columns_of(), self.whole.pattern.row
+        here = np.zeros(self.whole.rows, dtype=bool)
+        here[self.kept_rows] = True
+        moving = np.zeros(self.whole.unknowns, dtype=bool)
+        moving[columns[self.whole.structural()[1] & here[rows]]] = True
+        return np.flatnonzero(moving[self.kept]).astype(np.int32)
+
+    def name(self, number: int) -> str:
+        """Name of a kept unknown."""
+        return self.whole.name(int(self.kept[number]))
+
+    def row_label(self, number: int) -> RowLabel:
+        """Label of a kept row."""
+        return self.whole.row_label(int(self.kept_rows[number]))
+
+
+@dataclass(frozen=True, slots=True)
+class Forms:
+    """What an integration sees, and what its points are settled with."""
+
+    stepped: Condensed
+    settled: Condensed
+
+    def order(self) -> Ints | None:
+        """Elimination order of the stepped form's matrices [kept], found once."""
+        stepped, whole = self.stepped, self.stepped.whole
+        leaving = bool(whole.form.scales)
+        return whole.once(("order", *stepped.key), lambda: column_order(stepped.pattern, leaving=leaving))
+
+
+def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
+    """A model as written (form 3) without what constant sums define; None where little would be gained, or where the
+    rest does not follow from what is kept alone.
+    """
+    if system.unknowns < LEAST or system.form.name != "3" or system.left_out or system._may_hold[0].size:
+        return None
+    if not steady(system.description):
+        return None
+    whole = system.another("2v")
+    jy, _ = whole.jacobian(t, y, yd)
+    found = eliminate(whole, jy)
+    if found.place.size + found.unread.size < (1.0 - GAIN) * whole.unknowns or not np.isfinite(jy[found.entry]).all():
+        return None
+    numbers = sums(whole, found, t, jy)
+    if not np.isfinite(numbers.constant).all():
+        return None
+    rows = np.ones(whole.rows, dtype=bool)
+    rows[found.row] = False
+    rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
+    settled = system.another("settled")
+    kept = _settled_rows(whole, settled, ~rows, numbers)
+    if kept is None:
+        return None
+    return Forms(Condensed(whole, numbers, np.flatnonzero(rows)), Condensed(settled, numbers, np.flatnonzero(kept)))
+
+
+def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:
+    """Rows of the settled form that are left [rows]; None where observers read rates that only the others determine."""
+    description = settled.description
+    first = {(group, family): at for group, family, at in stepped.form.groups}
+    kept = np.ones(settled.rows, dtype=bool)
+    for group, family, at in settled.form.groups:
+        home, size = first.get((RATE_OF.get(group, group), family)), description.rows[family].size
+        if home is not None:
+            kept[at : at + size] = ~gone[home : home + size]
+    columns, rows = settled.pattern.columns_of(), settled.pattern.row
+    lost = np.zeros(settled.unknowns, dtype=bool)
+    lost[numbers.unread] = True
+    kept[rows[lost[columns]]] = False
+    derived = np.zeros(settled.unknowns, dtype=bool)
+    derived[numbers.place] = True
+    moving = settled.structural()[1]
+    dropped = np.zeros(settled.rows, dtype=bool)
+    dropped[rows[moving & derived[columns]]] = True
+    dropped &= kept
+    read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.reads or ()}
+    open_ = columns[moving & dropped[rows] & ~derived[columns]]
+    if read & set(settled.family_of[open_].tolist()):
+        return None
+    return kept & ~dropped

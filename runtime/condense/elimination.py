@@ -1,0 +1,174 @@
+"""Which unknowns are constant sums of others, found by whole families.
+
+A row made of constants and constants times unknowns (`curved` of the manifest tells the others) defines an unknown of a
+family where it holds that family once; so a row family defines as many at once, and loops stay loops.  What a row
+defines must read nothing that is defined through it: the families that take part form a graph without cycles.  An
+unknown whose derivative some row reads is kept: it carries the state, and the error test sees it.
+
+Displacements that no row and no observer reads (the charge through a resistor) need not be integrated: where every
+constraint between displacements is such a row, its rate takes its place (form 2v), and they are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Description, Floats
+from sysdyn.runtime.model.forms import FORMS
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
+
+Mask = NDArray[np.bool_]
+Longs = NDArray[np.int64]
+HEALTHY = 1e-7
+"""Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less."""
+OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
+PREFERRED = ("kappa", "mu", "e", "f")
+"""Kinds in the order in which they are defined by rows that could define more than one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Elimination:
+    """Of one form.  place, row, pivot [eliminated]: each unknown, the row that defines it and its entry there, those
+    that it reads before it; start [eliminated + 1], entry: the other entries of each row; unread: displacements left
+    out with their rows q' = f.
+    """
+
+    place: Longs
+    row: Longs
+    pivot: Longs
+    start: Longs
+    entry: Longs
+    unread: Longs
+
+
+def unread_families(description: Description, blocks: Iterable[str]) -> tuple[int, ...]:
+    """Families of displacements that neither these blocks nor any observer reads."""
+    read: set[int] = set()
+    for block in (*blocks, *OBSERVERS):
+        for kernel in description.blocks.get(block, ()):
+            if kernel.reads is None:
+                return ()
+            read |= kernel.reads
+    return tuple(k for k in description.families_of("q") if k not in read)
+
+
+def affine(system: System) -> Mask:
+    """Rows [rows] that constants make of unknowns; rows q' - f are not among them."""
+    found = np.zeros(system.rows, dtype=bool)
+    for group, family, first in system.form.groups:
+        blocks = [block for block, into in FORMS[system.form.name] if into == group]
+        kernels = [kernel for block in blocks for kernel in system.description.blocks.get(block, ())]
+        if all(kernel.curved is not None and family not in kernel.curved for kernel in kernels):
+            found[first : first + system.description.rows[family].size] = True
+    return found
+
+
+def steady(description: Description) -> bool:
+    """Every constraint between displacements is a constant sum of them: its rate holds it for good."""
+    kernels = [kernel for block in ("phi", "phi_rate") for kernel in description.blocks.get(block, ())]
+    return all(kernel.curved is not None and not kernel.curved for kernel in kernels)
+
+
+def eliminate(system: System, jy: Floats) -> Elimination:
+    """What can leave a form; jy [entries] at any point."""
+    columns, rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
+    moving = system.structural()[1]
+    unread = unread_families(system.description, (call.block for call in system.form.calls))
+    gone = np.isin(system.family_of, unread) & system.are("q")
+    usable = affine(system)
+    usable[rows[moving]] = False
+    kept = gone.copy()
+    kept[columns[moving]] = kept[system.form.k_q] = True
+    size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
+    by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
+    weight = size * by_row[rows] * by_column[columns]
+    largest = np.zeros(system.rows)
+    np.maximum.at(largest, rows, weight)
+    healthy = (weight > 0.0) & (weight >= HEALTHY * largest[rows])
+    search = _Search(system, usable[rows] & healthy & ~kept[columns])
+    return search.found(np.flatnonzero(gone))
+
+
+def _rank(system: System, family: int) -> int:
+    kind = system.description.families[family].kind
+    return PREFERRED.index(kind) if kind in PREFERRED else len(PREFERRED)
+
+
+class _Search:
+    """Unknowns and the rows that define them, as far as they are found; reads[a]: families that define family a.
+
+    allowed [entries]: the row may define the unknown.
+    """
+
+    def __init__(self, system: System, allowed: Mask) -> None:
+        self.columns, self.rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
+        self.of, self.allowed = system.family_of[self.columns], allowed
+        self.start = np.concatenate([[0], np.cumsum(np.bincount(self.rows, minlength=system.rows))])
+        self.entry = np.argsort(self.rows, kind="stable")
+        self.defined, self.free = np.zeros(system.unknowns, dtype=bool), np.ones(system.rows, dtype=bool)
+        self.reads: dict[int, set[int]] = {}
+        self.parts: list[tuple[int, Longs]] = []
+        spans = [(first, first + system.description.rows[family].size) for _, family, first in system.form.groups]
+        pairs = [(family, span) for span in spans for family in self._families(*span)]
+        sizes = {pair: self._candidates(*pair).size for pair in pairs}
+        for family, span in sorted(pairs, key=lambda pair: (-sizes[pair], _rank(system, pair[0]), pair)):
+            if sizes[family, span]:
+                self._take(family, span)
+
+    def _families(self, first: int, last: int) -> set[int]:
+        return set(self.of[self.entry[self.start[first] : self.start[last]]].tolist()) - {-1}
+
+    def _candidates(self, family: int, span: tuple[int, int]) -> Longs:
+        """Entries through which these rows can define unknowns of a family: alone in their row, and read by nothing
+        that they read; of several rows that could define an unknown the first.
+        """
+        entries = self.entry[self.start[span[0]] : self.start[span[1]]]
+        own, of = self.rows[entries] - span[0], self.of[entries]
+        here = of == family
+        once = np.bincount(own[here], minlength=span[1] - span[0]) == 1
+        blocked = [k for k in self._families(*span) if k != family and family in self._through(k)]
+        once[own[np.isin(of, blocked)]] = False
+        found = entries[here & once[own]]
+        found = found[self.allowed[found] & ~self.defined[self.columns[found]] & self.free[self.rows[found]]]
+        return np.asarray(found[np.unique(self.columns[found], return_index=True)[1]])
+
+    def _take(self, family: int, span: tuple[int, int]) -> None:
+        chosen = self._candidates(family, span)
+        if not chosen.size:
+            return
+        self.defined[self.columns[chosen]] = True
+        self.free[self.rows[chosen]] = False
+        entries = self.entry[self.start[span[0]] : self.start[span[1]]]
+        taken = entries[np.isin(self.rows[entries], self.rows[chosen])]
+        self.reads.setdefault(family, set()).update(set(self.of[taken].tolist()) - {family})
+        self.parts.append((family, chosen))
+
+    def _through(self, family: int) -> set[int]:
+        """Families that a family is defined through."""
+        seen: set[int] = set()
+        todo = [family]
+        while todo:
+            new = self.reads.get(todo.pop(), set()) - seen
+            seen |= new
+            todo += new
+        return seen
+
+    def _depth(self, family: int) -> int:
+        return max((1 + self._depth(k) for k in self.reads.get(family, ())), default=0)
+
+    def found(self, unread: Longs) -> Elimination:
+        """The unknowns, families that others read first, each in the order of its places."""
+        none = np.zeros(0, dtype=np.int64)
+        pivot = np.concatenate([none, *(part for _, part in self.parts)])
+        depth = np.concatenate([none, *(np.full(part.size, self._depth(family)) for family, part in self.parts)])
+        pivot = pivot[np.lexsort((self.columns[pivot], depth))]
+        row = self.rows[pivot]
+        count = self.start[row + 1] - self.start[row]
+        entry = self.entry[np.repeat(self.start[row] - (np.cumsum(count) - count), count) + np.arange(count.sum())]
+        entry = entry[~np.isin(entry, pivot)]
+        start = np.concatenate([[0], np.cumsum(count - 1)])
+        return Elimination(self.columns[pivot], row, pivot, start, entry, unread)

@@ -1,0 +1,100 @@
+/* Elimination of unknowns that are constant sums of others: see condensed.h. */
+#include "condensed.h"
+
+#include <string.h>
+
+/* x := constant + factors * sources, with one or two terms in one pass over memory */
+static void evaluate(const sd_straight *straight, double *x, int rate)
+{
+    int32_t n = straight->number;
+    double *restrict out = x + straight->place;
+    const double *restrict c = straight->constant, *restrict f = straight->factor;
+    if (rate)
+        for (int32_t i = 0; i < n; i++)
+            out[i] = 0.0;
+    else
+        memcpy(out, c, (size_t)n * sizeof *out);
+    int32_t k = 0;
+    for (; k + 1 < straight->terms; k += 2) {
+        const double *restrict a = x + straight->source[k], *restrict b = x + straight->source[k + 1];
+        const double *restrict fa = f + (size_t)k * n, *restrict fb = fa + n;
+        for (int32_t i = 0; i < n; i++)
+            out[i] += fa[i] * a[i] + fb[i] * b[i];
+    }
+    for (; k < straight->terms; k++) {
+        const double *restrict a = x + straight->source[k], *restrict fa = f + (size_t)k * n;
+        for (int32_t i = 0; i < n; i++)
+            out[i] += fa[i] * a[i];
+    }
+}
+
+void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
+{
+    for (int32_t s = 0; s < condensed->straights; s++)
+        evaluate(&condensed->straight[s], x, rate);
+}
+
+static void scatter(const sd_condensed *condensed, const double *z, double *x)
+{
+    for (int32_t s = 0; s < condensed->unknown_spans; s++) {
+        const sd_span *span = &condensed->unknown[s];
+        memcpy(x + span->full, z + span->kept, (size_t)span->number * sizeof *x);
+    }
+}
+
+static void gather(int32_t spans, const sd_span *span, const double *x, double *z)
+{
+    for (int32_t s = 0; s < spans; s++)
+        memcpy(z + span[s].kept, x + span[s].full, (size_t)span[s].number * sizeof *x);
+}
+
+void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate)
+{
+    scatter(condensed, z, x);
+    sd_condensed_complete(condensed, x, rate);
+}
+
+void sd_condensed_gather(const sd_condensed *condensed, const double *x, double *z)
+{
+    gather(condensed->unknown_spans, condensed->unknown, x, z);
+}
+
+/* the point (z, zd) in y, yd; rates of eliminated unknowns are read by no row */
+static void place(const sd_condensed *condensed, const double *z, const double *zd)
+{
+    sd_condensed_expand(condensed, z, condensed->y, 0);
+    scatter(condensed, zd, condensed->yd);
+}
+
+static void residual(const sd_left *left, double t, const double *z, const double *zd, double *r)
+{
+    const sd_condensed *condensed = (const sd_condensed *)left;
+    place(condensed, z, zd);
+    sd_residual(condensed->full, t, condensed->y, condensed->yd, condensed->r);
+    gather(condensed->row_spans, condensed->row, condensed->r, r);
+}
+
+static void jacobian(const sd_left *left, double t, const double *z, const double *zd, double *jz, double *jzd)
+{
+    const sd_condensed *condensed = (const sd_condensed *)left;
+    place(condensed, z, zd);
+    sd_jacobian(condensed->full, t, condensed->y, condensed->yd, condensed->jy, condensed->jyd);
+    for (int64_t p = 0; p < condensed->products; p++) {
+        jz[condensed->to[p]] += condensed->share[p] * condensed->jy[condensed->from[p]];
+        jzd[condensed->to[p]] += condensed->share[p] * condensed->jyd[condensed->from[p]];
+    }
+}
+
+static void steep(const sd_left *left, double t, const double *z, const double *rate, double *s, sd_terms *terms)
+{
+    const sd_condensed *condensed = (const sd_condensed *)left;
+    place(condensed, z, rate);
+    terms(condensed->full, t, condensed->y, condensed->yd, condensed->r);
+    gather(condensed->row_spans, condensed->row, condensed->r, s);
+}
+
+void sd_condensed_bind(sd_condensed *condensed, sd_system *system)
+{
+    condensed->left = (sd_left){residual, jacobian, steep};
+    system->left = &condensed->left;
+}
