@@ -103,8 +103,8 @@ def places(
 
     shapes: of row families and unknown families; tables: `to` and `at`.
     """
-    all_rows: list[Longs] = []
-    all_columns: list[Longs] = []
+    all_rows: list[Ints] = []
+    all_columns: list[Ints] = []
     for kernel in kernels:
         entries = kernel.dy if which == "dy" else kernel.dyd
         if not entries:
