@@ -345,8 +345,8 @@ class Starter:
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
         if self._sums is None and not self.missed.size:
-            numbers = t, lib.pointer(x), LARGEST * largest, lib.pointer(found)
-            if lib.core.sd_start_scale(c.addressof(self.core), lib.pointer(nominal), *tables, *numbers):
+            point = t, lib.pointer(x), LARGEST * largest, lib.pointer(found)
+            if lib.core.sd_start_scale(c.addressof(self.core), lib.pointer(nominal), *tables, *point):
                 raise MemoryError
             self.settled.failure.check()
             return found

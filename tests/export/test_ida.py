@@ -99,6 +99,8 @@ def disagreement(names, values, expected):
     return max(errors)
 
 
+FINER = 1e-9
+"""At looser tolerances round-off of the start decides whether IDA's corrector gets past the diode's first turn."""
 LONG = os.environ.get("SYSDYN_LONG") == "1"
 CASES = [(s, i) for k, s in enumerate(CHANGED) for i in ("3", "2", "1") if LONG or int(i) % 3 != k % 3]
 
@@ -111,5 +113,6 @@ def test_references(tmp_path, system, index):
     assert other
     assert compiled(tmp_path, f"seed/{system}", "--scene", "reference", "--index", index, *other) == 0
     known = Outside(tmp_path).places
-    names, values = integrated(tmp_path, 1e-8, {k: v for k, v in given.items() if k in known}, instants)
+    rtol = FINER if system == "diode_circuit" else 1e-8
+    names, values = integrated(tmp_path, rtol, {k: v for k, v in given.items() if k in known}, instants)
     assert disagreement(names, values, expected) < (1e-3 if index == "3" else 1e-5)
