@@ -4,6 +4,7 @@
 counts.  The line of 100000 sections is left out.
 """
 
+import io
 import sys
 from collections import Counter
 
@@ -12,7 +13,9 @@ from sysdyn.cli.options import EVERY
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.running import Request, ready
 from sysdyn.cli.run.starting import start
+from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import Report
 
 LEFT_OUT = ("transmission_line.sd",)
@@ -38,9 +41,9 @@ def _strategy(path, document, scene, formulation):
     return begun.state.strategy if begun else None
 
 
-def _started(name, document, scene, formulation):
+def _started(name, document, scene, formulation, report=None):
     """A target prepared without a compiler, and its start; None where there is none."""
-    report = Report()
+    report = Report() if report is None else report
     with ex.fresh():
         target = targets.one(document, name, None, scene, report)
         prepared = target and ready(Request(name, formulation=formulation, backend="numpy"), target, report)
@@ -53,7 +56,8 @@ def _started(name, document, scene, formulation):
 def started(text, formulation):
     """The start of a text, which must have one."""
     report = Report()
-    _, begun = _started("model.sd", load.document(Source("model.sd", text), report), None, formulation)
+    document = load.document(decode("model.sd", io.BytesIO(text.encode())), report)
+    _, begun = _started("model.sd", document, None, formulation, report)
     assert begun is not None, list(report)
     return begun
 
