@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
 
 Mask = NDArray[np.bool_]
@@ -33,6 +34,8 @@ EPS = 1e-13
 NORM = RANK**2 / EPS
 """Weight of the norm there.  Rows whose singular value is below the root of NORM EPS pass for redundant, as below RANK;
 and the system is as well conditioned as the rows, not as their squares (Bjorck, BIT 7, 1967)."""
+MET = 1e-9
+"""Of the aim: what a solution of the linearised rows may miss before it is sought in columns of one size."""
 GRANTED = 3.6e9
 """Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
 ITERATIONS = 40
@@ -176,11 +179,39 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
     np.add.at(size, i, v * v)
     size = np.where(size > 0.0, np.sqrt(size), 1.0)
     v, aim = v / size[i], aim / size
-    if max(shape) <= SINGULAR_VALUES:
-        a = np.zeros(shape)
-        np.add.at(a, (i, j), v)
+    dense = max(shape) <= SINGULAR_VALUES
+    found = _nearest(shape, (i, j, v), aim) if dense else _saddle_point(shape, (i, j, v), aim)
+    small = MET * np.abs(aim).max(initial=0.0)
+    if not _missed((i, j, v), found, aim) > small:
+        return found
+    # perhaps a change that the metric takes for nothing is needed: by columns of one size it is seen
+    scale = sparse_factors(i, j, np.abs(v), shape)[1]
+    scaled = i, j, v * scale[j]
+    other = scale * (_nearest(shape, scaled, aim, scale) if dense else _saddle_point(shape, scaled, aim))
+    return found if _missed((i, j, v), other, aim) > small else other
+
+
+def _missed(entries: tuple[Any, Any, Floats], u: Floats, aim: Floats) -> float:
+    """The largest part of aim [rows] that A u misses."""
+    i, j, v = entries
+    miss = -aim
+    np.add.at(miss, i, v * u[j])
+    return float(np.abs(miss).max(initial=0.0))
+
+
+def _nearest(
+    shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, length: Floats | None = None
+) -> Floats:
+    """The u of least norm with A u = aim by singular values; length [unknowns]: u times it is of least norm."""
+    i, j, v = entries
+    a = np.zeros(shape)
+    np.add.at(a, (i, j), v)
+    if length is None:
         return least_squares(a, aim, RANK)
-    return _saddle_point(shape, (i, j, v), aim)
+    left, sigma, right = decomposed(a)
+    k = count(sigma, RANK)
+    found, free = right[:k].T @ ((left[:, :k].T @ aim) / sigma[:k]), right[k:].T
+    return np.asarray(found - free @ least_squares(length[:, None] * free, length * found, RANK))
 
 
 def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
