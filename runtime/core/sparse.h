@@ -19,7 +19,7 @@ typedef struct sd_sparse {
     sd_number *l_value, *u_value, *diagonal;
     int64_t l_room, u_room;
     int32_t *stack, *head, *mark, *count; /* [rows] search */
-    sd_number *x;                /* [rows + 1] */
+    sd_number *x;                /* [n + rows + 1] */
     int pivoted;                 /* a valid pattern exists */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
     int32_t bad_row, bad_column;
