@@ -67,9 +67,9 @@ def affine(system: System) -> Mask:
     return found
 
 
-def steady(description: Description) -> bool:
+def steady(description: Description, blocks: tuple[str, ...] = ("phi", "phi_rate")) -> bool:
     """Every constraint between displacements is a constant sum of them: its rate holds it for good."""
-    kernels = [kernel for block in ("phi", "phi_rate") for kernel in description.blocks.get(block, ())]
+    kernels = [kernel for block in blocks for kernel in description.blocks.get(block, ())]
     return all(kernel.curved is not None and not kernel.curved for kernel in kernels)
 
 

@@ -20,6 +20,7 @@
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
 #define LEAP 8.0           /* the next one is tried that much longer, with fresh slopes at its end */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
+#define EASING 1.3         /* by which the step at which Newton failed is raised from step to step */
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
 #define KEEP_HIGH 1.2
@@ -195,6 +196,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->h_used = radau->h_before = 0.0;
     radau->error_accepted = 0.0;
     radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
+    radau->bound = INFINITY;
     leave_below(radau, radau->linear->idle ? LEAST_PIVOT : 0.0);
     radau->theta = 1.0;
 }
@@ -519,6 +521,8 @@ static void accept(sd_radau *radau, double error, int iterations)
     double next = h / ratio;
     if (radau->rejected)
         next = fmin(next, h);
+    radau->bound *= EASING;
+    next = fmin(next, radau->bound);
     double *oldest = radau->before, *slope = radau->slope[2];
     radau->before = radau->last;
     radau->last = oldest;
@@ -641,6 +645,7 @@ int sd_radau_step(sd_radau *radau)
                 leap = 1;
                 continue;
             }
+            radau->bound = radau->h;
             radau->h *= cause == SD_NEWTON ? retry : 0.25;
             if (++failures > 2)
                 radau->h *= 0.5;
