@@ -46,7 +46,7 @@ class Balance:
 
 
 def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Ints]:
-    """Label, unit and first element of each ledger; rows of the elements; ledger of each, and whether it is an inertia."""
+    """Label, unit and first element of each ledger; rows of the elements; of each its ledger, if it is an inertia."""
     description = system.description
     heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
     families = [description.rows[k] for k in description.rows_of("ledger")]
