@@ -168,8 +168,7 @@ class Module:
         assert self._numbers.state is not None
         y = self._numbers.full_y.copy()
         y[self._numbers.state.places] = state
-        jy, jyd = system.jacobian(t, y, self._numbers.full_yd)
-        return Underlying(system, np.ones(system.unknowns), jy, jyd).slopes(t, y, self._numbers.full_yd)
+        return Underlying(system, np.ones(system.unknowns)).slopes(t, y, self._numbers.full_yd)
 
 
 def compile_model(

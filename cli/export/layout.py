@@ -109,16 +109,12 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
 
 def _slopes(system: System, state: ConsistentState, yd: Floats) -> Floats:
     """The slopes of all differential unknowns, those of momenta and their flows too."""
-    y, _ = state.for_form(system)
-    jy, jyd = system.jacobian(state.t, y, yd)
-    return Underlying(system, np.ones(system.unknowns), jy, jyd).slopes(state.t, y, yd)[1]
+    return Underlying(system, np.ones(system.unknowns)).slopes(state.t, state.for_form(system)[0], yd)[1]
 
 
 def _state(system: System, state: ConsistentState) -> State:
     """The tables of the underlying equation.  NoSuchForm where its Jacobian is too large to be written."""
-    y, yd = state.for_form(system)
-    jy, jyd = system.jacobian(state.t, y, yd)
-    selection = Underlying(system, np.ones(system.unknowns), jy, jyd).selection
+    selection = Underlying(system, np.ones(system.unknowns)).selection
     places = np.flatnonzero(np.isin(system.kinds, STATE)).astype(np.int32)
     return State(places, selection, *_pattern(system, selection, places))
 

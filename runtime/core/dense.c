@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define SWEEPS 8             /* of the equilibration: 1e200 becomes 6 */
+#define REFINED 2            /* rounds of iterative refinement: a weak direction is known as well as its residual is */
 #define TURNS 60             /* sweeps of rotations; they converge quadratically, within ten */
 #define TOLERANCE 1e-9       /* runtime/numerics/rank.py */
 #define CERTAIN 1e-12
@@ -168,40 +169,43 @@ int sd_rank(int32_t m, int32_t n, const double *a, double least)
     return found;
 }
 
-int sd_nearest(int32_t m, int32_t n, double *a, double *aim, double least, double *x)
+/* x [n] += the least-norm solution for a right side [m], by orthogonal rows of V^T a (wide) or of V^T a^T */
+static void answer(int32_t m, int32_t n, const double *turned, const double *v, const double *sigma, double floor_,
+                   const double *aim, double *x)
+{
+    int wide = m <= n;
+    for (int32_t i = 0; i < (wide ? m : n); i++) {
+        if (!(sigma[i] > floor_))
+            continue;
+        const double *vector = wide ? turned + (size_t)i * n : v + (size_t)i * n;
+        double share = wide ? dot(m, v + (size_t)i * m, aim) : dot(m, turned + (size_t)i * m, aim);
+        share = share / sigma[i] / sigma[i];
+        for (int32_t j = 0; j < n; j++)
+            x[j] += share * vector[j];
+    }
+}
+
+int sd_nearest(int32_t m, int32_t n, const double *a, const double *aim, double least, double *x)
 {
     if (!finite((size_t)m * (size_t)n, a) || !finite((size_t)m, aim))
         return -1;
     memset(x, 0, (size_t)n * sizeof *x);
-    int32_t few = m < n ? m : n;
+    int32_t few = m < n ? m : n, many = m < n ? n : m;
     size_t number = (size_t)m * (size_t)n;
-    double *memory = malloc(((size_t)few * few + (size_t)few + number + 1) * sizeof *memory);
+    double *memory = malloc(((size_t)few * few + (size_t)few + number + (size_t)m + 1) * sizeof *memory);
     if (!memory)
         return -2;
-    double *v = memory, *sigma = v + (size_t)few * few, *turned = sigma + few;
-    if (m <= n) {
-        /* V^T a has orthogonal rows: x = sum over them of row (V^T aim) / sigma^2 */
-        sd_orthogonal_rows(m, n, a, v, sigma);
-        double floor_ = least * largest(m, sigma);
-        for (int32_t i = 0; i < m; i++) {
-            if (!(sigma[i] > floor_))
-                continue;
-            double share = dot(m, v + (size_t)i * m, aim) / sigma[i] / sigma[i];
-            for (int32_t j = 0; j < n; j++)
-                x[j] += share * a[(size_t)i * n + j];
-        }
-    } else {
-        /* V^T a^T has orthogonal rows u sigma: x = V sigma^-1 u^T aim */
+    double *v = memory, *sigma = v + (size_t)few * few, *turned = sigma + few, *rest = turned + number;
+    if (m <= n)
+        memcpy(turned, a, number * sizeof *turned);
+    else
         transpose(m, n, a, turned);
-        sd_orthogonal_rows(n, m, turned, v, sigma);
-        double floor_ = least * largest(n, sigma);
-        for (int32_t i = 0; i < n; i++) {
-            if (!(sigma[i] > floor_))
-                continue;
-            double share = dot(m, turned + (size_t)i * m, aim) / sigma[i] / sigma[i];
-            for (int32_t j = 0; j < n; j++)
-                x[j] += share * v[(size_t)i * n + j];
-        }
+    sd_orthogonal_rows(few, many, turned, v, sigma);
+    double floor_ = least * largest(few, sigma);
+    for (int round = 0; round <= REFINED; round++) {
+        for (int32_t i = 0; i < m; i++)
+            rest[i] = aim[i] - dot(n, a + (size_t)i * n, x);
+        answer(m, n, turned, v, sigma, floor_, rest, x);
     }
     free(memory);
     return 0;

@@ -23,9 +23,9 @@ void sd_sparse_factors(int32_t m, int32_t n, int32_t entries, const int32_t *row
 /* how many singular values of a [m, n] are above `least` of the largest; -1: entries that are no numbers; -2: memory */
 int sd_rank(int32_t m, int32_t n, const double *a, double least);
 
-/* x [n] of least norm with the least |a x - aim|, a [m, n]; singular values below `least` of the largest are zero.  a and
- * aim are overwritten.  Returns 0; -1: entries that are no numbers; -2: no memory. */
-int sd_nearest(int32_t m, int32_t n, double *a, double *aim, double least, double *x);
+/* x [n] of least norm with the least |a x - aim|, a [m, n]; singular values below `least` of the largest are zero.  Returns
+ * 0; -1: entries that are no numbers; -2: no memory. */
+int sd_nearest(int32_t m, int32_t n, const double *a, const double *aim, double least, double *x);
 
 /* 1: the square matrix of these entries [column n + 1, row], equilibrated, is regular: no singular value below `least` of
  * the largest; 0: it is not; -1: entries that are no numbers; -2: memory */

@@ -289,3 +289,58 @@ int32_t sd_peel(int32_t rows, int32_t columns, int32_t entries, const int32_t *r
     free(room);
     return left;
 }
+
+int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *matched)
+{
+    size_t n = (size_t)columns, m = (size_t)rows;
+    int32_t *room = malloc((4 * n + 2 * m + 6) * sizeof *room);
+    if (!room)
+        return -1;
+    /* cheap, at [columns]: the next entry to look at, ahead and in the search; came [columns]: column before it on the path */
+    int32_t *cheap = room, *at = cheap + n, *came = at + n, *path = came + n, *of = path + n, *seen = of + m, found = 0;
+    memcpy(cheap, column, n * sizeof *cheap);
+    for (int32_t r = 0; r < rows; r++)
+        of[r] = seen[r] = NONE;
+    for (int32_t c = 0; c < columns; c++)
+        matched[c] = NONE;
+    for (int32_t root = 0; root < columns; root++) {
+        int32_t depth = 0, end = NONE;
+        path[0] = root;
+        at[root] = column[root];
+        while (depth >= 0 && end == NONE) {
+            int32_t c = path[depth];
+            while (cheap[c] < column[c + 1] && of[row[cheap[c]]] != NONE)
+                cheap[c]++;
+            if (cheap[c] < column[c + 1]) { /* a row that is free */
+                end = row[cheap[c]];
+                break;
+            }
+            int32_t next = NONE;
+            while (at[c] < column[c + 1] && next == NONE) {
+                int32_t r = row[at[c]++];
+                if (seen[r] != root) {
+                    seen[r] = root;
+                    next = r;
+                }
+            }
+            if (next == NONE) {
+                depth--;
+                continue;
+            }
+            came[depth] = next;
+            path[++depth] = of[next];
+            at[of[next]] = column[of[next]];
+        }
+        if (end == NONE)
+            continue;
+        found++;
+        for (; depth >= 0; depth--) { /* each column of the path takes the row of the next one */
+            int32_t c = path[depth];
+            of[end] = c;
+            matched[c] = end;
+            end = depth ? came[depth - 1] : NONE;
+        }
+    }
+    free(room);
+    return found;
+}

@@ -23,6 +23,8 @@ DENSE = 300
 """Unknowns up to which matrices are full; larger models are taken as they come."""
 NOTHING = 1e-9
 """Of a unit vector: a contact's share of what is open."""
+ALIKE = 9
+"""Digits to which shares are compared."""
 GENERIC = 0.7310585786300049
 """Of dF/dyd beside dF/dy: at it a regular pencil is a regular matrix."""
 
@@ -96,7 +98,8 @@ class Determined:
         contacts, (open_, turned) = self.contacts, what
         values, before = contacts.observer(t, *point), contacts.active.copy()
         part = self._open(t, *point)[1]
-        order = [k for k in np.argsort(-part, kind="stable") if part[k] > NOTHING]
+        # of equal shares the first counts, not what round-off makes the larger
+        order = [k for k in np.argsort(-np.round(part, ALIKE), kind="stable") if part[k] > NOTHING]
         for pivots in (False, True):
             for k in sorted(order, key=lambda k: k in turned):
                 contact = contacts.contacts[k]

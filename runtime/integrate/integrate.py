@@ -93,7 +93,7 @@ class Integration:
         self._light = origin.light
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
         self.forms = self._condensed()
-        self._linear(origin.jy, origin.jyd)
+        self._linear()
         # flows without inertia in loops of stores follow from the rate of their balance alone
         contacts = request.events.contacts if request.events is not None else ()
         rated = bool(contacts) and "dynamics_rate" in system.description.blocks
@@ -130,10 +130,10 @@ class Integration:
         found, self._time = self.origin.sized(self.request.t_end)
         return np.maximum(found, self._least)
 
-    def _linear(self, jy: Floats, jyd: Floats) -> None:
+    def _linear(self) -> None:
         self.underlying: Underlying | None = None
         if self.request.method in ON_UNDERLYING:
-            self.underlying = Underlying(self.system, self.magnitude, jy, jyd)
+            self.underlying = Underlying(self.system, self.magnitude)
             self.linear, self._order = self.underlying.linear, None
             return
         pattern = self.stepped.pattern

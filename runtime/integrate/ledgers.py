@@ -45,28 +45,28 @@ class Balance:
         return next((t for t, value in self.risen if not value <= limit), None)
 
 
-def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[tuple[RowFamily, int]], Ints]:
-    """Label, unit and first element of each ledger; row and position of each element, and its ledger."""
+def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Ints]:
+    """Label, unit and first element of each ledger; rows of the elements; of each its ledger, if it is an inertia."""
     description = system.description
     heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
     families = [description.rows[k] for k in description.rows_of("ledger")]
-    labels = [(row, k) for row in families for k in range(row.size)]
-    of = np.array([int(row.kind.split()[0]) for row, _ in labels] + [0], dtype=np.int32)
-    return [(row.label, row.unit, row.at(0)) for row in heads], labels, of
+    sizes = [row.size for row in families]
+    of = np.repeat([*(int(row.kind.split()[0]) for row in families), 0], [*sizes, 1]).astype(np.int32)
+    inertia = np.repeat([*("inertia" in row.kind for row in families), False], [*sizes, 1]).astype(np.int32)
+    return [(row.label, row.unit, row.at(0)) for row in heads], families, of, inertia
 
 
 class Ledgers:
     """The core's structure for the ledgers of a system."""
 
     def __init__(self, system: System) -> None:
-        self._heads, self._labels, of = system.once("ledgers", lambda: _kept(system))
-        count, elements = len(self._heads), len(self._labels)
+        self._heads, self._families, of, self._inertia = system.once("ledgers", lambda: _kept(system))
+        count, elements = len(self._heads), of.size - 1
         names = ("gross", "largest", "stored", "balance", "highest", "dissipated", "supplied")
         self._arrays = {name: np.zeros(count + 1) for name in names}
         self._arrays |= {name: np.zeros(elements + 1) for name in ("most", "value", "before")}
         self._element = np.full(count + 1, -1, dtype=np.int32)
         self._of = of
-        self._inertia = np.array(["inertia" in row.kind for row, _ in self._labels] + [False], dtype=np.int32)
         self._contents = system.observer("ledger") if elements else None
         self.core = lib.Ledgers(
             count=count,
@@ -86,8 +86,15 @@ class Ledgers:
         found = int(self.core.lost)
         if found < 0:
             return None
-        row, position = self._labels[found]
-        return row.at(position)
+        return self._label(found)
+
+    def _label(self, element: int) -> RowLabel:
+        """Of an element by its number."""
+        for row in self._families:
+            if element < row.size:
+                return row.at(element)
+            element -= row.size
+        raise IndexError(element)
 
     def balances(self) -> tuple[Balance, ...]:
         """What came of each ledger."""
@@ -105,8 +112,7 @@ class Ledgers:
         highest = max((r.value for r in records), default=0.0) if np.isfinite(value) else np.inf
         element = first
         if self._element[k] >= 0:
-            row, position = self._labels[self._element[k]]
-            element = row.at(position)
+            element = self._label(int(self._element[k]))
         risen = tuple((float(r.t), float(r.value) if np.isfinite(r.value) else np.inf) for r in records)
         return Balance(kind, title, unit, passed, turnover, highest, element, risen)
 

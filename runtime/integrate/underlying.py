@@ -113,15 +113,74 @@ class _Parts:
         )
 
 
-class Underlying:
-    """system: form "0"; magnitude [unknowns], kept and read by the core."""
+class Accelerations:
+    """The matrix of the equation by its entries; system: form "0"."""
 
-    def __init__(self, system: System, magnitude: Floats, jy: Floats, jyd: Floats) -> None:
-        self.system, self._magnitude = system, magnitude
+    def __init__(self, system: System) -> None:
+        self.system = system
         self._unknown, self._column, self._rate = system.once("solved for", lambda: _solved_for(system))
         (
             self._in_matrix, self._source, self._from_rate, self.pattern
         ) = system.once("selection", self._select)  # fmt: skip
+
+    def _select(self) -> tuple[NDArray[np.bool_], Ints, Ints, Pattern]:
+        """Which entries of dF/dy, dF/dy' stand in the matrix, where from, and its pattern."""
+        system = self.system
+        pattern, first = system.pattern, system.form.k_row.size
+        columns = pattern.columns_of()
+        in_y, in_rate = system.structural()
+        in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
+        of_rate = (self._rate > 0)[self._column[columns]]
+        take = in_matrix & np.where(of_rate, in_rate, in_y)
+        source, from_rate = np.flatnonzero(take).astype(np.int32), of_rate[take].astype(np.int32)
+        number = self._unknown.size
+        start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
+        rows = (pattern.row[take] - first).astype(np.int32)
+        return in_matrix, source, from_rate, Pattern(number, number, start, rows)
+
+    def _algebraic(self) -> NDArray[np.bool_]:
+        """Entries of the matrix whose unknown is no rate [entries]."""
+        return np.asarray((self._rate == 0)[self._column[self.system.pattern.columns_of()]] & self._in_matrix)
+
+    def values(self, jy: Floats, jyd: Floats) -> Floats:
+        """Entries of the matrix from those of dF/dy, dF/dy'."""
+        return np.where(self._from_rate > 0, jyd[self._source], jy[self._source])
+
+    def undetermined(self, jy: Floats, jyd: Floats) -> tuple[str, ...]:
+        """Unknowns, or x' for their derivatives, that the rows do not determine at a point; () where they do."""
+        number = self.pattern.unknowns
+        if number == 0:
+            return ()
+        if number <= SMALL and _regular(self.pattern, self.values(jy, jyd)):
+            return ()
+        alone = _unmatched(self.pattern) if number > DENSE else np.zeros(0)
+        if alone.any():
+            return self._largest(alone)
+        matrix = _balanced(self.pattern, self.values(jy, jyd))
+        if number > DENSE:
+            return self._largest(_sparse_null(self.pattern, matrix))
+        full = np.zeros((number, number))
+        full[self.pattern.row, self.pattern.columns_of()] = matrix
+        if not np.isfinite(full).all():
+            return ()
+        _, sigma, vectors = decomposed(full)
+        null = vectors[count(sigma, CERTAIN) :]
+        return self._largest(np.abs(null).max(axis=0) if null.size else np.zeros(number))
+
+    def _largest(self, null: Floats) -> tuple[str, ...]:
+        """Names of the largest entries of a null vector."""
+        if not null.any():
+            return ()
+        places = np.flatnonzero(null > 1e-3 * null.max())
+        return tuple(self.system.name(int(self._unknown[k])) + "'" * int(self._rate[k] > 0) for k in places)
+
+
+class Underlying(Accelerations):
+    """system: form "0"; magnitude [unknowns], kept and read by the core."""
+
+    def __init__(self, system: System, magnitude: Floats) -> None:
+        super().__init__(system)
+        self._magnitude = magnitude
         self._parts = system.own("parts", lambda: _Parts(system, self._algebraic()))
         order = system.once("order of accelerations", lambda: column_order(self.pattern))
         self._order = order
@@ -148,25 +207,6 @@ class Underlying:
         core.position, core.velocity = (item and c.addressof(item) for item in (parts.position, parts.velocity))
         core.direct, core.displaced = int(parts.direct), lib.pointer(parts.displaced)
 
-    def _algebraic(self) -> NDArray[np.bool_]:
-        """Entries of the matrix whose unknown is no rate [entries]."""
-        return np.asarray((self._rate == 0)[self._column[self.system.pattern.columns_of()]] & self._in_matrix)
-
-    def _select(self) -> tuple[NDArray[np.bool_], Ints, Ints, Pattern]:
-        """Which entries of dF/dy, dF/dy' stand in the matrix, where from, and its pattern."""
-        system = self.system
-        pattern, first = system.pattern, system.form.k_row.size
-        columns = pattern.columns_of()
-        in_y, in_rate = system.structural()
-        in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
-        of_rate = (self._rate > 0)[self._column[columns]]
-        take = in_matrix & np.where(of_rate, in_rate, in_y)
-        source, from_rate = np.flatnonzero(take).astype(np.int32), of_rate[take].astype(np.int32)
-        number = self._unknown.size
-        start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
-        rows = (pattern.row[take] - first).astype(np.int32)
-        return in_matrix, source, from_rate, Pattern(number, number, start, rows)
-
     @property
     def selection(self) -> Selection:
         """The tables of the core's structure."""
@@ -188,36 +228,6 @@ class Underlying:
     def evaluations(self) -> tuple[int, int]:
         """Residuals and Jacobians evaluated beside those of the system itself."""
         return int(self.applied.residual_evaluations), int(self.matrix.jacobian_evaluations)
-
-    def values(self, jy: Floats, jyd: Floats) -> Floats:
-        """Entries of the matrix from those of dF/dy, dF/dy'."""
-        return np.where(self._from_rate > 0, jyd[self._source], jy[self._source])
-
-    def undetermined(self, jy: Floats, jyd: Floats) -> tuple[str, ...]:
-        """Unknowns, or x' for their derivatives, that the rows do not determine at a point; () where they do."""
-        number = self.pattern.unknowns
-        if number == 0:
-            return ()
-        if number <= SMALL and _regular(self.pattern, self.values(jy, jyd)):
-            return ()
-        matrix = _balanced(self.pattern, self.values(jy, jyd))
-        if number > DENSE:
-            alone = _unmatched(self.pattern)
-            return self._largest(alone if alone.any() else _sparse_null(self.pattern, matrix))
-        full = np.zeros((number, number))
-        full[self.pattern.row, self.pattern.columns_of()] = matrix
-        if not np.isfinite(full).all():
-            return ()
-        _, sigma, vectors = decomposed(full)
-        null = vectors[count(sigma, CERTAIN) :]
-        return self._largest(np.abs(null).max(axis=0) if null.size else np.zeros(number))
-
-    def _largest(self, null: Floats) -> tuple[str, ...]:
-        """Names of the largest entries of a null vector."""
-        if not null.any():
-            return ()
-        places = np.flatnonzero(null > 1e-3 * null.max())
-        return tuple(self.system.name(int(self._unknown[k])) + "'" * int(self._rate[k] > 0) for k in places)
 
     def slopes(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
         """y, yd [unknowns] completed from the state in y: q' = f, f', p', s', kappa, mu, e.  SolverFailure."""
@@ -248,7 +258,7 @@ def obstacle(system: System, state: ConsistentState) -> tuple[str, ...]:
     """What keeps a model from having an underlying equation: unknowns not determined at a state.  system: form "0"."""
     y, yd = state.for_form(system)
     jy, jyd = system.jacobian(state.t, y, yd)
-    return Underlying(system, np.ones(system.unknowns), jy, jyd).undetermined(jy, jyd)
+    return Accelerations(system).undetermined(jy, jyd)
 
 
 def _regular(pattern: Pattern, values: Floats) -> bool:
@@ -269,12 +279,11 @@ def _unmatched(pattern: Pattern) -> NDArray[np.float64]:
 
     Round-off makes pivots of what is singular by structure: a line of 20000 sections passes for regular by its values.
     """
-    from scipy.sparse import csc_array
-    from scipy.sparse.csgraph import maximum_bipartite_matching
-
-    shape = (pattern.rows, pattern.unknowns)
-    graph = csc_array((np.ones(pattern.entries, dtype=np.int8), pattern.row, pattern.column), shape=shape).tocsr()
-    return np.asarray(maximum_bipartite_matching(graph, perm_type="row") < 0, dtype=np.float64)
+    matched = np.zeros(pattern.unknowns, dtype=np.int32)
+    places = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(matched)
+    if lib.core.sd_match(pattern.rows, pattern.unknowns, *places) < 0:
+        raise MemoryError
+    return np.asarray(matched < 0, dtype=np.float64)
 
 
 def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:
