@@ -144,6 +144,7 @@ def _load() -> Any:
         "sd_settle_new": (c.POINTER(Settle), [_P, _P, _I, _I]),
         "sd_condensed_bind": (None, [_P, _P]),
         "sd_expanded_new": (c.POINTER(Expanded), [_P, _P, _I]),
+        "sd_expanded_show": (None, [_P]),
         "sd_expanded_free": (None, [_P]),
         "sd_expanded_stepper": (_P, [_P]),
         "sd_expanded_start": (None, [_P, _D, _P, _P, _D]),
