@@ -59,6 +59,7 @@ def _kernel(pattern: Pattern) -> dict[str, Any]:
         "dy": [[_reference(r), _reference(c)] for r, c in pattern.dy],
         "dyd": [[_reference(r), _reference(c)] for r, c in pattern.dyd],
         "reads": list(pattern.reads),
+        "rates": list(pattern.rates),
         "curved": list(pattern.curved),
     }
 

@@ -73,8 +73,8 @@ class Routine:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """What one kernel adds to: its loops, rows, and the places of its entries; families of unknowns that it reads; row
-    families to which it adds anything but constants and constants times unknowns.
+    """What one kernel adds to: its loops, rows, and the places of its entries; families of unknowns that it reads and
+    whose rates it reads; row families to which it adds anything but constants and constants times unknowns.
     """
 
     loops: tuple[tuple[Index, Index], ...]
@@ -82,6 +82,7 @@ class Pattern:
     dy: tuple[tuple[Reference, Reference], ...]
     dyd: tuple[tuple[Reference, Reference], ...]
     reads: tuple[int, ...]
+    rates: tuple[int, ...]
     curved: tuple[int, ...]
 
 
@@ -154,10 +155,10 @@ class Programmer:
             found[part] = tuple((places[e.row], self.reference(e.column, loops)) for e in entries)
             numbered: list[tuple[Reference | int, Node]] = [(k, e.value) for k, e in enumerate(entries)]
             self._cut((block, part, number), bounds, numbered, [rows[e.row] for e in entries], len(entries))
-        unknowns = {n for s in kernel.rows for n in variables(s.expression) if n.op == "var"}
-        reads = {self.families[n.data[0], n.data[1]] for n in unknowns}
-        curved = {s.row for s in kernel.rows if not is_affine(s.expression, self.changing)}
-        return Pattern(bounds, places, found["dy"], found["dyd"], tuple(sorted(reads)), tuple(sorted(curved)))
+        unknowns = {n.data for s in kernel.rows for n in variables(s.expression) if n.op == "var"}
+        read = [sorted({self.families[owner, kind] for owner, kind, of in unknowns if of == k}) for k in (0, 1)]
+        curved = sorted({s.row for s in kernel.rows if not is_affine(s.expression, self.changing)})
+        return Pattern(bounds, places, found["dy"], found["dyd"], tuple(read[0]), tuple(read[1]), tuple(curved))
 
     def formula(self, block: str, number: int, nest: Nest, expression: Node) -> None:
         """One value an iteration, in the order of the iterations (formulas.py)."""

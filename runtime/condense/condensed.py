@@ -23,6 +23,7 @@ LEAST = 50
 """Unknowns from which it is worth the trouble."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
+OBSERVING = ("observe", "observe_rate", "audit", "ledger")
 RATE_OF = {"phi_acceleration": "phi_rate", "psi_rate": "psi", "gamma_rate": "gamma", "momentum_rate": "momentum"}
 """Group of rows -> group of which they are the time derivative."""
 
@@ -160,17 +161,44 @@ class Condensed:
             block = found.factor[entry : entry + terms * (high - low)].reshape(high - low, terms)
             factors[entry : entry + block.size] = block.T.ravel()
             made[k] = lib.Straight(
-                int(found.place[low]), high - low, terms, first + 4 * entry, at + 8 * entry, base + 8 * low
+                int(found.place[low]),
+                high - low,
+                terms,
+                first + 4 * entry,
+                at + 8 * entry,
+                base + 8 * low if constants[low:high].any() else None,
             )
         self._keep.append(made)
         return made, int(begin.size)
 
+    def _observed_rates(self) -> bool:
+        """Whether what is observed reads rates of eliminated unknowns."""
+        blocks = self.whole.description.blocks
+        kernels = [kernel for name in OBSERVING for kernel in blocks.get(name, ())]
+        read = {family for kernel in kernels for family in kernel.rates or ()}
+        return bool(read & set(self.whole.family_of[self.sums.place].tolist()))
+
+    def _trimmed(self) -> lib.System:
+        """The whole system without rows q' - f that are not kept."""
+        whole, form = self.whole, self.whole.form
+        kept = np.zeros(whole.rows, dtype=bool)
+        kept[self.kept_rows] = True
+        here = kept[form.k_row]
+        parts = (form.k_row, form.k_q, form.k_f, *whole.slots[:2])
+        row, q, f, slot_q, slot_f = (self._hold(np.ascontiguousarray(part[here])) for part in parts)
+        made = lib.System.from_buffer_copy(whole.core)
+        made.kinematics = int(here.sum())
+        made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
+        made.k_scale = self._hold(np.ones(here.size))
+        return made
+
     def _make(self) -> None:
         whole = self.whole
+        self._trim = self._trimmed()
         unknown, row, straight = self._spans(self.kept), self._spans(self.kept_rows), self._straights()
         room = max(whole.form.extended, whole.unknowns) + 8
         self.condensed = lib.Condensed(
-            full=c.addressof(whole.core),
+            full=c.addressof(self._trim),
             unknowns=self.unknowns,
             rows=self.rows,
             unknown_spans=unknown[1],
@@ -179,6 +207,7 @@ class Condensed:
             unknown=c.addressof(unknown[0]),
             row=c.addressof(row[0]),
             straight=c.addressof(straight[0]),
+            observed_rates=int(self._observed_rates()),
             products=self._from.size,
             from_=self._hold(self._from),
             to=self._hold(self._to),
@@ -282,7 +311,7 @@ def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -
     dropped = np.zeros(settled.rows, dtype=bool)
     dropped[rows[moving & derived[columns]]] = True
     dropped &= kept
-    read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.reads or ()}
+    read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.rates or ()}
     open_ = columns[moving & dropped[rows] & ~derived[columns]]
     if read & set(settled.family_of[open_].tolist()):
         return None

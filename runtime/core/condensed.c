@@ -3,29 +3,33 @@
 
 #include <string.h>
 
-/* x := constant + factors * sources, with one or two terms in one pass over memory */
+/* x := factors * sources + constant, up to three terms in one pass over memory */
 static void evaluate(const sd_straight *straight, double *x, int rate)
 {
-    int32_t n = straight->number;
+    int32_t n = straight->number, terms = straight->terms;
     double *restrict out = x + straight->place;
-    const double *restrict c = straight->constant, *restrict f = straight->factor;
-    if (rate)
+    const double *restrict f = straight->factor, *restrict c = rate ? NULL : straight->constant;
+    const double *restrict a = terms > 0 ? x + straight->source[0] : NULL, *restrict fa = f;
+    const double *restrict b = terms > 1 ? x + straight->source[1] : NULL, *restrict fb = f + n;
+    const double *restrict d = terms > 2 ? x + straight->source[2] : NULL, *restrict fd = f + 2 * (size_t)n;
+    if (terms == 0)
+        memset(out, 0, (size_t)n * sizeof *out);
+    else if (terms == 1)
         for (int32_t i = 0; i < n; i++)
-            out[i] = 0.0;
+            out[i] = fa[i] * a[i];
+    else if (terms == 2)
+        for (int32_t i = 0; i < n; i++)
+            out[i] = fa[i] * a[i] + fb[i] * b[i];
     else
-        memcpy(out, c, (size_t)n * sizeof *out);
-    int32_t k = 0;
-    for (; k + 1 < straight->terms; k += 2) {
-        const double *restrict a = x + straight->source[k], *restrict b = x + straight->source[k + 1];
-        const double *restrict fa = f + (size_t)k * n, *restrict fb = fa + n;
         for (int32_t i = 0; i < n; i++)
-            out[i] += fa[i] * a[i] + fb[i] * b[i];
-    }
-    for (; k < straight->terms; k++) {
-        const double *restrict a = x + straight->source[k], *restrict fa = f + (size_t)k * n;
+            out[i] = fa[i] * a[i] + fb[i] * b[i] + fd[i] * d[i];
+    for (int32_t k = 3; k < terms; k++) {
+        const double *restrict more = x + straight->source[k], *restrict fm = f + (size_t)k * n;
         for (int32_t i = 0; i < n; i++)
-            out[i] += fa[i] * a[i];
+            out[i] += fm[i] * more[i];
     }
+    for (int32_t i = 0; c && i < n; i++)
+        out[i] += c[i];
 }
 
 void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
@@ -52,6 +56,14 @@ void sd_condensed_expand(const sd_condensed *condensed, const double *z, double 
 {
     scatter(condensed, z, x);
     sd_condensed_complete(condensed, x, rate);
+}
+
+void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd)
+{
+    sd_condensed_expand(condensed, z, y, 0);
+    scatter(condensed, zd, yd);
+    if (condensed->observed_rates)
+        sd_condensed_complete(condensed, yd, 1);
 }
 
 void sd_condensed_gather(const sd_condensed *condensed, const double *x, double *z)

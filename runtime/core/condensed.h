@@ -26,13 +26,14 @@ typedef struct sd_straight {
     int32_t place, number, terms;
     const int32_t *source;  /* [terms] */
     const double *factor;   /* [terms][number] */
-    const double *constant; /* [number] */
+    const double *constant; /* [number], NULL: zeros */
 } sd_straight;
 
 typedef struct sd_condensed {
     sd_left left;
     sd_system *full;
     int32_t unknowns, rows, unknown_spans, row_spans, straights;
+    int32_t observed_rates; /* 0: nobody reads rates of eliminated unknowns before a point is settled */
     const sd_span *unknown, *row;
     const sd_straight *straight;
     int64_t products;
@@ -47,6 +48,8 @@ void sd_condensed_bind(sd_condensed *condensed, sd_system *system);
 /* all unknowns x of the full system from kept values z; rate: x and z are derivatives.  What is neither kept nor
  * eliminated stays as it is */
 void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate);
+/* y, yd of a point that is observed but not settled: rates only as far as they are read */
+void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd);
 /* the eliminated ones of x from its kept ones */
 void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate);
 void sd_condensed_gather(const sd_condensed *condensed, const double *x, double *z);

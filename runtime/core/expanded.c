@@ -7,18 +7,24 @@
 
 #define NODES 4 /* most points of a method's own quadrature */
 
-/* the last point of the inner stepper, and the points of its quadrature */
-static void show(sd_expanded *expanded)
+void sd_expanded_show(sd_expanded *expanded)
+{
+    sd_condensed_expand(expanded->condensed, expanded->inner->y, expanded->y, 0);
+    sd_condensed_expand(expanded->condensed, expanded->inner->yd, expanded->yd, 1);
+}
+
+/* what is looked at after each step: magnitudes, the points of the quadrature */
+static void follow(sd_expanded *expanded)
 {
     sd_stepper *inner = expanded->inner;
-    sd_condensed_expand(expanded->condensed, inner->y, expanded->y, 0);
-    sd_condensed_expand(expanded->condensed, inner->yd, expanded->yd, 1);
-    for (int32_t i = 0; expanded->met && i < expanded->face.n; i++)
-        sd_met(fabs(expanded->y[i]), &expanded->met[i], &expanded->magnitude[i]);
-    for (int32_t k = 0; k < inner->nodes && k < expanded->nodes; k++) {
-        sd_condensed_expand(expanded->condensed, inner->node_y[k], expanded->node_y[k], 0);
-        sd_condensed_expand(expanded->condensed, inner->node_yd[k], expanded->node_yd[k], 1);
+    if (expanded->met) {
+        sd_condensed_expand(expanded->condensed, inner->y, expanded->y, 0);
+        for (int32_t i = 0; i < expanded->face.n; i++)
+            sd_met(fabs(expanded->y[i]), &expanded->met[i], &expanded->magnitude[i]);
     }
+    for (int32_t k = 0; k < inner->nodes && k < expanded->nodes; k++)
+        sd_condensed_show(expanded->condensed, inner->node_y[k], inner->node_yd[k], expanded->node_y[k],
+                          expanded->node_yd[k]);
 }
 
 static int step(void *self)
@@ -26,7 +32,7 @@ static int step(void *self)
     sd_expanded *expanded = self;
     int cause = expanded->inner->step(expanded->inner->self);
     if (cause == SD_FINE)
-        show(expanded);
+        follow(expanded);
     return cause;
 }
 
@@ -34,8 +40,7 @@ static void dense(const void *self, double t, double *y, double *yd)
 {
     const sd_expanded *expanded = self;
     expanded->inner->dense(expanded->inner->self, t, expanded->z, expanded->zd);
-    sd_condensed_expand(expanded->condensed, expanded->z, y, 0);
-    sd_condensed_expand(expanded->condensed, expanded->zd, yd, 1);
+    sd_condensed_show(expanded->condensed, expanded->z, expanded->zd, y, yd);
 }
 
 static void refine(void *self, sd_settle *settle)

@@ -115,6 +115,7 @@ static void integrate(sd_run *run, double to)
     const sd_stepper *stepper = run->stepper;
     double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from);
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
+    run->sampled = 0;
     if (!run->audit || half == 0.0)
         return;
     if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {
@@ -139,6 +140,7 @@ static void integrate(sd_run *run, double to)
     }
     sample(run, to);
     weigh(run, half / 6.0);
+    run->sampled = to == *stepper->t;
 }
 
 /* The same where an event ends the step at `to`: Gauss's rule of degree 5 on settled points.  Within a step the stages
@@ -396,6 +398,7 @@ static void measure(sd_run *run, double from, double t)
 {
     run->t_from = from;
     run->t_to = t;
+    run->sampled = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
     if (t < *run->stepper->t && run->settle && !run->stepper->part_y)
@@ -404,7 +407,9 @@ static void measure(sd_run *run, double from, double t)
         integrate(run, t);
     run->dissipated += run->integral[2];
     run->supplied += run->integral[3];
-    if (run->audit) {
+    if (run->audit && run->sampled) {
+        memcpy(run->after, run->sample, (size_t)run->audited * sizeof(double));
+    } else if (run->audit) {
         run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
         audit(run, t, run->aux, run->aux_d, run->after);
     }

@@ -48,6 +48,7 @@ typedef struct sd_run {
     int32_t room;
     /* progress */
     int32_t rows, next, pending, started, fresh;   /* fresh: at a point started from, no step yet */
+    int32_t sampled;                               /* aux and sample are of the end of the last step */
     double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
     double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
     double t_from, t_row;                          /* t_row: instant of the last row */

@@ -83,6 +83,8 @@ class Method:
 
     def point(self) -> tuple[Floats, Floats]:
         """y, yd [unknowns] of the last accepted point."""
+        if self.expanded:
+            lib.core.sd_expanded_show(self.expanded)
         stepper = self.expanded.contents.face if self.expanded else self.contents.stepper
         return lib.reader(stepper.y, self._n).copy(), lib.reader(stepper.yd, self._n).copy()
 

@@ -113,15 +113,16 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration; reads:
-    families of unknowns, curved: row families to which it adds more than constants and constants times unknowns (None:
-    not known).
+    """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration; reads,
+    rates: families of unknowns and of their derivatives that it reads, curved: row families to which it adds more than
+    constants and constants times unknowns (None: not known).
     """
 
     loops: tuple[tuple[Index, Index], ...]
     dy: tuple[tuple[Reference, Reference], ...]
     dyd: tuple[tuple[Reference, Reference], ...]
     reads: frozenset[int] | None = None
+    rates: frozenset[int] | None = None
     curved: frozenset[int] | None = None
 
 
@@ -198,8 +199,8 @@ def _kernel(value: Mapping[str, Any]) -> Kernel:
     loops = tuple(
         (_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ()))
     )
-    reads, curved = (frozenset(value[name]) if name in value else None for name in ("reads", "curved"))
-    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), reads, curved)
+    told = (frozenset(value[name]) if name in value else None for name in ("reads", "rates", "curved"))
+    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), *told)
 
 
 def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:

@@ -1,0 +1,136 @@
+"""What constant sums define leaves the system: results are those of the equations, every unknown is there again."""
+
+import numpy as np
+import pytest
+from model_runs import FOUR, trace_of
+from scipy.interpolate import CubicSpline
+from scipy.linalg import expm
+from sysdyn.runtime.condense import condensed as condensing
+from sysdyn.runtime.integrate import integrate
+
+N = 30
+LINE = """
+from std.electrical import resistor, inductor, capacitor, voltage
+model line {
+  param n = %d
+  node v[0..n]: electrical
+%s  source: voltage(v = 1 V*sin(5 rad/s*t)) v[0] -> ground
+  for i in 1..n {
+    %s
+    C[i]: capacitor(C = (1 F + 0.5 F*i/n)/n) v[i] -> ground
+    init C[i].e = 0 V
+  }
+}
+scene go of line {
+  time 0 s to 1 s
+  accuracy 1e-7
+  trace v[n].e as end, v[n/2].e as middle, %s as current, audit.energy, audit.constraints
+}
+"""
+LADDER = LINE % (N, "", "R[i]: resistor(R = (1 ohm + 1 ohm*i/n)/n) v[i - 1] -> v[i]", "R[n/2].f")
+WAVES = LINE % (
+    N,
+    "  node w[1..n]: electrical\n",
+    "L[i]: inductor(L = 1 H / n) v[i - 1] -> w[i]\n"
+    "    R[i]: resistor(R = 0.1 ohm / n) w[i] -> v[i]\n"
+    "    init L[i].f = 0 A",
+    "L[n/2].f",
+)
+
+
+def _capacitors():
+    return (1.0 + 0.5 * np.arange(1, N + 1) / N) / N
+
+
+def _driven(matrix, drive):
+    """x(1) of x' = A x + b sin 5t from rest, by the exponential of the system with its source."""
+    n = len(matrix)
+    whole = np.zeros((n + 2, n + 2))
+    whole[:n, :n], whole[:n, n] = matrix, drive
+    whole[n, n + 1], whole[n + 1, n] = 5.0, -5.0
+    return expm(whole) @ np.eye(n + 2)[n + 1]
+
+
+def ladder():
+    """Voltages of the ladder at 1 s, and the current through its middle resistor."""
+    c, r = _capacitors(), (1.0 + np.arange(1, N + 1) / N) / N
+    flow = np.diag(1.0 / r) @ (np.eye(N, k=-1) - np.eye(N))
+    balance = np.eye(N) - np.eye(N, k=1)
+    found = _driven(np.diag(1.0 / c) @ balance @ flow, np.diag(1.0 / c) @ balance[:, 0] / r[0])
+    current = (found[N // 2 - 2] - found[N // 2 - 1]) / r[N // 2 - 1]
+    return found[N - 1], found[N // 2 - 1], current
+
+
+def waves():
+    """The same of the line of inductors."""
+    c = _capacitors()
+    matrix = np.zeros((2 * N, 2 * N))
+    matrix[:N, :N] = -0.1 * np.eye(N)
+    matrix[:N, N:] = N * (np.eye(N, k=-1) - np.eye(N))
+    matrix[N:, :N] = np.diag(1.0 / c) @ (np.eye(N) - np.eye(N, k=1))
+    found = _driven(matrix, N * np.eye(2 * N)[0])
+    return found[2 * N - 1], found[N + N // 2 - 1], found[N // 2 - 1]
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize(("text", "exact"), [(LADDER, ladder), (WAVES, waves)], ids=["ladder", "waves"])
+def test_a_line_meets_its_exponential(tmp_path, text, exact, formulation, method):
+    trace = trace_of(tmp_path, text, formulation=formulation, method=method)
+    for name, value in zip(("end", "middle", "current"), exact(), strict=True):
+        assert trace[name].values[-1] == pytest.approx(value, abs=3e-7 * trace[name].nominal), name
+    assert np.abs(trace["audit.constraints"].values).max() < 1e-12
+
+
+@pytest.mark.parametrize(("text", "left"), [(LADDER, 1.2), (WAVES, 2.2)], ids=["ladder", "waves"])
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_what_is_left_of_a_node(tmp_path, monkeypatch, text, left, formulation):
+    """One unknown a node of a ladder, two of a line of inductors; rows and matrix are those of all unknowns."""
+    met = []
+
+    def watched(system, t, y, yd):
+        found = condensing.condensed(system, t, y, yd)
+        met.append((found, t, y.copy(), yd.copy()))
+        return found
+
+    monkeypatch.setattr(integrate, "condensed", watched)
+    trace_of(tmp_path, text, formulation=formulation, method="radau")
+    forms, t, y, yd = met[-1]
+    assert forms.stepped.unknowns < left * N
+    _same_rows(forms.stepped, t, y.size, yd.size)
+
+
+def _same_rows(left, t, n, _):
+    """Residual and matrix at any point of the kept unknowns against those of the whole system there."""
+    random = np.random.default_rng(0)
+    z, zd = random.normal(size=left.unknowns), random.normal(size=left.unknowns)
+    whole, found = left.whole, left.sums
+    y, yd = np.zeros(n), np.zeros(n)
+    y[left.kept], yd[left.kept] = z, zd
+    for k, place in enumerate(found.place):  # in order: each reads those before it
+        terms = slice(found.start[k], found.start[k + 1])
+        y[place] = found.constant[k] + found.factor[terms] @ y[found.source[terms]]
+    r = whole.residual(t, y, yd)
+    defining = np.setdiff1d(np.arange(whole.rows), left.kept_rows)
+    gone = whole.form.k_row[np.isin(whole.form.k_q, found.unread)]
+    scale = np.abs(r).max()
+    assert np.abs(r[np.setdiff1d(defining, gone)]).max() < 1e-13 * scale
+    jy, _ = whole.jacobian(t, y, yd)
+    dense = np.zeros((left.rows, left.unknowns))
+    dense[left.pattern.row, left.pattern.columns_of()] = left.values(jy)
+    moved = random.normal(size=left.unknowns)
+    y2 = y.copy()
+    y2[left.kept] += moved
+    for k, place in enumerate(found.place):
+        terms = slice(found.start[k], found.start[k + 1])
+        y2[place] = found.constant[k] + found.factor[terms] @ y2[found.source[terms]]
+    change = (whole.residual(t, y2, yd) - r)[left.kept_rows]  # the models are linear
+    assert dense @ moved == pytest.approx(change, abs=1e-12 * np.abs(change).max())
+
+
+def test_a_charge_that_is_traced_is_integrated(tmp_path):
+    """The charge through a resistor: the integral of its current."""
+    trace = trace_of(tmp_path, LADDER.replace("audit.energy", "R[n/2].q as charge"), method="radau")
+    t, at = np.unique(np.asarray(trace.time), return_index=True)
+    current, charge = (trace[name].values[at] for name in ("current", "charge"))
+    assert charge[-1] - charge[0] == pytest.approx(CubicSpline(t, current).integrate(t[0], t[-1]), rel=1e-4)
