@@ -55,6 +55,23 @@ def test_every_room_stands_on_the_page_of_its_house():
             assert f"`{room.name}/`" in (room.parent / "README.md").read_text(encoding="utf-8"), room
 
 
+def test_the_five_walks_lead_to_files_and_names_that_exist():
+    """Each begins at a page that leads on to the next, and names what is to be changed where it is defined."""
+    page = (ROOT / "cli" / "walks.md").read_text(encoding="utf-8")
+    assert page.count("\n## ") == 5
+    for file in re.findall(r"`([a-z_A-Z/]+\.(?:py|c|h|md|toml))`", page):
+        assert (ROOT / file).is_file(), file
+    found = re.findall(r"`([a-z_/]+\.(?:py|c))`: `(\w+)`(?: and `(\w+)`)?", page)
+    assert len(found) > 20
+    for file, *names in found:
+        text = (ROOT / file).read_text(encoding="utf-8")
+        for name in filter(None, names):
+            if file.endswith(".c"):
+                assert re.search(rf"^(?:static )?\w+ \*?{name}\(", text, re.MULTILINE), (file, name)
+            else:
+                assert re.search(rf"^(?:class |def )?{name}\b", text, re.MULTILINE), (file, name)
+
+
 def test_the_way_of_a_parameter_is_the_one_that_is_taken(tmp_path, monkeypatch):
     """The steps of cli/README.md are called, each for the first time after the one before it."""
     page = (ROOT / "cli" / "README.md").read_text(encoding="utf-8")

@@ -16,6 +16,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.rank import decomposed
 
 SHOWN = 4
 """Unknowns of the last good state that a finding lists."""
@@ -139,9 +140,9 @@ class LastState:
         j = gradients(self.y)
         if not np.isfinite(j).all():
             return []
-        left, sizes, _ = np.linalg.svd(j)
+        left, sizes, _ = decomposed(j)
         least = sizes[-1] if len(found) <= len(names) else 0.0
-        before = 1.0 if start is None else np.linalg.svd(gradients(start), compute_uv=False)[-1]
+        before = 1.0 if start is None else decomposed(gradients(start))[1][-1]
         if not least < LOST * before:
             return []
         weights = np.abs(left[:, -1])

@@ -24,6 +24,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.rank import least_squares
 from sysdyn.runtime.start.impulses import group_rows
 from sysdyn.runtime.start.restart import Restart
 
@@ -493,7 +494,7 @@ class Handler:
             jy, _ = settled.jacobian(t, y, yd)
             matrix = settled.dense(jy)[np.ix_(rows, p)]
             y = y.copy()
-            y[p] -= np.linalg.lstsq(matrix, settled.residual(t, y, yd)[rows], rcond=None)[0]
+            y[p] -= least_squares(matrix, settled.residual(t, y, yd)[rows])
         return y
 
     def _renew(self, t: float, y: Floats, yd: Floats) -> None:

@@ -122,7 +122,7 @@ def _without(vectors: Floats, rows: Mask) -> Floats:
     """What of the span of columns [n, number] is zero in these rows."""
     if not rows.any():
         return vectors
-    _, sigma, right = np.linalg.svd(vectors[rows])
+    _, sigma, right = decomposed(vectors[rows])
     size = np.zeros(vectors.shape[1])
     size[: sigma.size] = sigma
     return np.asarray(vectors @ right[size <= SAME * max(float(np.abs(vectors).max()), 1e-300)].T)
@@ -132,8 +132,8 @@ def _pairs(vectors: Floats) -> NDArray[np.bool_]:
     """Which e_k - e_l lie in the span of columns [items, number]."""
     if not vectors.shape[1]:
         return np.zeros((vectors.shape[0],) * 2, dtype=bool)
-    basis, size, _ = np.linalg.svd(vectors, full_matrices=False)
-    basis = basis[:, size > SAME * max(float(size.max(initial=0.0)), 1e-300)]
+    basis, size, _ = decomposed(vectors)
+    basis = basis[:, : count(size, SAME)]
     p = basis @ basis.T
     diagonal = np.diag(p)
     return np.asarray(np.abs(diagonal[:, None] + diagonal[None, :] - 2.0 * p - 2.0) < SAME)

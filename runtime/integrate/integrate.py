@@ -98,7 +98,7 @@ class Integration:
         contacts = request.events.contacts if request.events is not None else ()
         rated = bool(contacts) and "dynamics_rate" in system.description.blocks
         self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
-        if system.once("steady", lambda: steady(system.description, ("phi", "phi_rate", "psi"))):
+        if request.events is None and system.once("steady", lambda: steady(system.description, ("phi", "phi_rate", "psi"))):
             self.settler.core.contents.slack = SLACK * request.tolerance
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         self._stepper()

@@ -230,7 +230,7 @@ def _zeros(
 def _kept_at_zero(a: Floats, b: Floats, kept: Floats, markov: float) -> Complexes:
     """Eigenvalues of the motion that keeps the output at zero; kept [r, n]: c, c a, ..., c a^(r-1)."""
     size = np.linalg.norm(kept, axis=1)
-    _, _, vt = np.linalg.svd(kept / size[:, None])
+    _, _, vt = decomposed(kept / size[:, None])
     basis = vt[len(kept) :].T
     if not basis.size:
         return np.zeros(0, complex)

@@ -22,7 +22,7 @@ from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.least_change import DENSE, FOLDS, Problem, Work, solve
-from sysdyn.runtime.numerics.rank import null_space
+from sysdyn.runtime.numerics.rank import least_squares, null_space
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 
@@ -199,7 +199,7 @@ class Resting:
         if not null.size:
             return y
         away = (y - self.first) / problem.scale
-        back = y - problem.scale * (null @ np.linalg.lstsq(null, away, rcond=1e-9)[0])
+        back = y - problem.scale * (null @ least_squares(null, away))
         return back if self._met(back) else y
 
     def _turned(self, y: Floats) -> Floats:
@@ -231,7 +231,7 @@ class Resting:
         move = ((other.state.y - one.state.y) / size)[told]
         if one.free:
             null = (self._null(one.state.y, problem) / size[:, None])[told]
-            move = move - null @ np.linalg.lstsq(null, move, rcond=1e-9)[0]
+            move = move - null @ least_squares(null, move)
         return bool(np.abs(move).max(initial=0.0) > SAME)
 
 

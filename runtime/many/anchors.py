@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Initial, Ints
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.least_change import RANK
+from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.settled import Settler
 
 Mask = NDArray[np.bool_]
@@ -18,8 +20,6 @@ AGREES = 1e-12
 """Of its magnitude: an initial value that moved by less did not move."""
 OPEN = 1e-7
 """Component of a null vector of unit length from which an unknown is open."""
-RANK = 1e-10
-"""Singular values below this part of the largest are none."""
 LARGEST = 400
 """Unknowns with their rates that are looked at: full matrices."""
 STATE = ("q", "f", "p", "s")
@@ -81,6 +81,5 @@ def _null(matrix: Floats) -> Floats:
         return np.zeros((0, 0))
     if not matrix.shape[0]:
         return np.eye(matrix.shape[1])
-    _, sigma, vectors = np.linalg.svd(matrix)
-    rank = int((sigma > RANK * sigma.max(initial=0.0)).sum())
-    return np.asarray(vectors[rank:])
+    _, sigma, vectors = decomposed(matrix)
+    return np.asarray(vectors[count(sigma, RANK) :])

@@ -32,10 +32,13 @@ RANK = 1e-11
 EPS = 1e-13
 """Of redundant rows in the saddle-point system, relative to rows of size one: above the round-off of its pivots."""
 NORM = RANK**2 / EPS
-"""Weight of the norm there.  Rows whose singular value is below the root of NORM EPS pass for redundant, as below RANK;
-and the system is as well conditioned as the rows, not as their squares (Bjorck, BIT 7, 1967)."""
-MET = 1e-9
-"""Of the aim: what a solution of the linearised rows may miss before it is sought in columns of one size."""
+"""Weight of the norm there for rows that leave little.  Singular values below the root of NORM EPS pass for redundant,
+as below RANK, and the system is as well conditioned as the rows, not as their squares (Bjorck, BIT 7, 1967); of the
+least norm it knows seven digits."""
+MET = 1e-10
+"""Of the aim: what a solution of the linearised rows may miss before another way is tried."""
+FAR = 0.1
+"""Part of what the first way misses from which another is taken though it does not meet the rows either."""
 GRANTED = 3.6e9
 """Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
 ITERATIONS = 40
@@ -179,43 +182,53 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
     np.add.at(size, i, v * v)
     size = np.where(size > 0.0, np.sqrt(size), 1.0)
     v, aim = v / size[i], aim / size
-    dense = max(shape) <= SINGULAR_VALUES
-    found = _nearest(shape, (i, j, v), aim) if dense else _saddle_point(shape, (i, j, v), aim)
-    small = MET * np.abs(aim).max(initial=0.0)
-    if not _missed((i, j, v), found, aim) > small:
-        return found
-    # perhaps a change that the metric takes for nothing is needed: by columns of one size it is seen
-    scale = sparse_factors(i, j, np.abs(v), shape)[1]
-    scaled = i, j, v * scale[j]
-    other = scale * (_nearest(shape, scaled, aim, scale) if dense else _saddle_point(shape, scaled, aim))
-    return found if _missed((i, j, v), other, aim) > small else other
+    back = size * power
+    small = MET * float(np.abs(aim * back).max(initial=0.0))
+    tried = []
+    for way in _DENSE if max(shape) <= SINGULAR_VALUES else _SPARSE:
+        found = way(shape, (i, j, v), aim)
+        miss = -aim
+        np.add.at(miss, i, v * found[j])
+        missed = float(np.abs(miss * back).max(initial=0.0))
+        if not missed > small:
+            return found
+        tried.append((missed, found))
+    least = min(tried, key=lambda item: item[0])
+    return least[1] if least[0] < FAR * tried[0][0] else tried[0][1]
 
 
-def _missed(entries: tuple[Any, Any, Floats], u: Floats, aim: Floats) -> float:
-    """The largest part of aim [rows] that A u misses."""
-    i, j, v = entries
-    miss = -aim
-    np.add.at(miss, i, v * u[j])
-    return float(np.abs(miss).max(initial=0.0))
+_Way = Callable[[tuple[int, int], tuple[Any, Any, Floats], Floats], Floats]
+"""From a shape, the entries of rows of size one and their aim: the u of least norm."""
 
 
-def _nearest(
-    shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, length: Floats | None = None
-) -> Floats:
-    """The u of least norm with A u = aim by singular values; length [unknowns]: u times it is of least norm."""
+def _singular_values(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
     i, j, v = entries
     a = np.zeros(shape)
     np.add.at(a, (i, j), v)
-    if length is None:
-        return least_squares(a, aim, RANK)
+    return least_squares(a, aim, RANK)
+
+
+def _of_one_size(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    """The same where columns of one size say which rows are redundant: a change that the metric takes for nothing may
+    be the only one that meets a row.
+    """
+    i, j, v = entries
+    size = sparse_factors(i, j, np.abs(v), shape)[1]
+    a = np.zeros(shape)
+    np.add.at(a, (i, j), v * size[j])
     left, sigma, right = decomposed(a)
     k = count(sigma, RANK)
     found, free = right[:k].T @ ((left[:, :k].T @ aim) / sigma[:k]), right[k:].T
-    return np.asarray(found - free @ least_squares(length[:, None] * free, length * found, RANK))
+    return np.asarray(size * (found - free @ least_squares(size[:, None] * free, size * found, RANK)))
 
 
-def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
-    """The u of least norm with A u = aim from [a I A^T; A -eps], dense up to DENSE unknowns."""
+def _to_the_rank(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    """The saddle point whose rows hold as far as RANK says, its norm the least to some digits only."""
+    return _saddle_point(shape, entries, aim, NORM)
+
+
+def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, weight: float = 1.0) -> Floats:
+    """The u of least norm with A u = aim from [weight I, A^T; A, -eps], dense up to DENSE unknowns."""
     rows, unknowns = shape
     i, j, v = entries
     here = np.arange(unknowns), unknowns + np.arange(rows)
@@ -223,7 +236,7 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
         np.concatenate([here[0], j, unknowns + i, here[1]]),
         np.concatenate([here[0], unknowns + i, j, here[1]]),
     )
-    values = np.concatenate([np.full(unknowns, NORM), v, v, np.full(rows, -EPS)])
+    values = np.concatenate([np.full(unknowns, weight), v, v, np.full(rows, -EPS)])
     apply: Callable[[Floats], Floats]
     back: Callable[[Floats], Floats]
     if max(shape) <= DENSE:
@@ -243,6 +256,11 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
         right = np.concatenate([np.zeros(unknowns), aim - EPS * found[unknowns:]])
         found = found + back(right - apply(found))
     return found[:unknowns]
+
+
+_DENSE: tuple[_Way, ...] = (_singular_values, _of_one_size)
+_SPARSE: tuple[_Way, ...] = (_saddle_point, _to_the_rank)
+"""What is tried until the rows hold."""
 
 
 def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) -> Solution:

@@ -1,10 +1,13 @@
 import ctypes
+import hashlib
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
-from sysdyn.runtime.model import core_library as lib
+from sysdyn.compiler.program import emit_c_support, emit_numpy
+from sysdyn.runtime.model import carrier, core_structures
 
 CORE = Path(__file__).parents[2] / "runtime" / "core"
 
@@ -20,15 +23,15 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
     pairs += [("Balance", "sd_balance"), ("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
     pairs += [("Condensed", "sd_condensed"), ("Expanded", "sd_expanded"), ("Span", "sd_span")]
-    pairs += [("Straight", "sd_straight")]
+    pairs += [("Straight", "sd_straight"), ("Watch", "sd_watch"), ("Collocation", "sd_collocation")]
     headers = [
         f'#include "{name}.h"'
         for name in ("run", "bdf", "radau", "dopri", "energy", "many", "search", "expanded")
     ]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
+        fields = [field[0].removesuffix("_") for field in getattr(core_structures, name)._fields_]
         lines.append(f'printf("%zu\\n", sizeof({tag}));')
-        fields = [field[0].removesuffix("_") for field in getattr(lib, name)._fields_]
         lines += [f'printf("%zu\\n", offsetof({tag}, {field}));' for field in fields]
     source = tmp_path / "sizes.c"
     source.write_text("\n".join([*lines, "return 0; }"]))
@@ -38,7 +41,37 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     ).stdout.split()
     expected = []
     for name, _ in pairs:
-        structure = getattr(lib, name)
+        structure = getattr(core_structures, name)
         expected.append(ctypes.sizeof(structure))
         expected += [getattr(structure, field[0]).offset for field in structure._fields_]
     assert [int(item) for item in found] == expected
+
+
+CONTRACTS = {1: "f120d7e8743dcc9b7e04a34c255c84e3af69ad926c26cdc748f5e6e90c4a3cd4"}
+"""SHA-256 of model.h without white space, by SD_CONTRACT."""
+
+
+def test_a_change_of_the_contract_raises_its_number():
+    """What compiled models and this runtime agree on is all of model.h: what is made from another must be refused.
+
+    Where this fails: raise SD_CONTRACT in core/model.h, sd_contract in compiler/program/emit_c_support.py, CONTRACT in
+    emit_numpy.py and in runtime/model/carrier.py, and enter the number's hash here; a change of words alone enters its
+    hash for the number that stands.
+    """
+    header = (CORE / "model.h").read_text()
+    number = int(re.search(r"#define SD_CONTRACT (\d+)", header)[1])
+    assert hashlib.sha256("".join(header.split()).encode()).hexdigest() == CONTRACTS[number]
+    assert number == carrier.CONTRACT == max(CONTRACTS)
+    assert f"const int sd_contract = {number};" in emit_c_support.HEAD
+    assert f"CONTRACT = {number}" in emit_numpy.HEAD
+
+
+def test_every_structure_of_the_core_is_compared():
+    """Structures that ctypes mirrors, against those that the test above asks the compiler about."""
+    mirrored = {name for name in dir(core_structures) if _is_structure(getattr(core_structures, name))}
+    text = Path(__file__).read_text()
+    assert {name for name in mirrored if f'("{name}", "sd_' not in text} == set()
+
+
+def _is_structure(item):
+    return isinstance(item, type) and issubclass(item, ctypes.Structure) and item is not ctypes.Structure

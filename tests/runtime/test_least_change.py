@@ -1,0 +1,114 @@
+"""The least change under rows against closed forms: singular values, the saddle point, weights, work."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sysdyn.runtime.numerics import least_change as module
+from sysdyn.runtime.numerics.least_change import (
+    GRANTED,
+    OutOfTimeError,
+    Problem,
+    Work,
+    least_norm,
+    least_residual,
+    solve,
+    where_light,
+)
+
+
+def entries(matrix):
+    i, j = np.nonzero(matrix)
+    return i, j, matrix[i, j]
+
+
+def problem(residual, jacobian, guess, **more):
+    """All rows in all unknowns, of size and weight one."""
+    guess = np.asarray(guess, float)
+    rows, n = residual(guess).size, guess.size
+    i, j = np.indices((rows, n)).reshape(2, -1)
+    given = {
+        "use": np.ones(rows, bool), "free": np.ones(n, bool), "guess": guess,
+        "scale": np.ones(n), "weight": np.ones(n), **more,
+    }
+    return Problem(residual, lambda x: np.asarray(jacobian(x)).ravel(), i, j, rows, **given)
+
+
+@pytest.mark.parametrize("limit", [1000, 0], ids=["singular values", "saddle point"])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_least_norm_is_that_of_the_pseudoinverse(monkeypatch, limit, seed):
+    """u = A^T (A A^T)^-1 b, with a row that repeats another, rows in units from 1e-6 to 1e6."""
+    monkeypatch.setattr(module, "SINGULAR_VALUES", limit)
+    random = np.random.default_rng(seed)
+    a = random.standard_normal((4, 7))
+    b = random.standard_normal(4)
+    found = a.T @ np.linalg.solve(a @ a.T, b)
+    units = 10.0 ** random.uniform(-6, 6, 5)
+    with_copy = units[:, None] * np.vstack([a, a[1] - 2.0 * a[3]])
+    aim = units * np.append(b, b[1] - 2.0 * b[3])
+    assert least_norm((5, 7), entries(with_copy), aim) == pytest.approx(found, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("limit", [1000, 0], ids=["singular values", "saddle point"])
+@pytest.mark.parametrize("tail", [1e-3, 1e-5, 1e-7])
+def test_rows_that_leave_little_hold_as_those_that_leave_much(monkeypatch, limit, tail):
+    """x1 = 1, x1 + tail x2 = 1 + tail: x2 = 1, though it hardly stands in its row."""
+    monkeypatch.setattr(module, "SINGULAR_VALUES", limit)
+    a = np.array([[1.0, 0.0, 0.0], [1.0, tail, 0.0], [0.0, 0.0, 1.0]])
+    found = least_norm((3, 3), entries(a), np.array([1.0, 1.0 + tail, 0.0]))
+    assert np.abs(a @ found - [1.0, 1.0 + tail, 0.0]).max() < 1e-10
+    assert found[1] == pytest.approx(1.0, abs=1e-10 / tail)
+
+
+def test_what_the_metric_takes_for_nothing_is_found_in_columns_of_one_size():
+    """1e-13 x = 1e-13 beside y = 1: below RANK, but the only way to meet its row; the rest stays of least norm."""
+    a = np.array([[1.0, 1e-13, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 3.0, 4.0]])
+    found = least_norm((3, 4), entries(a), np.array([2.0, 1.0, 5.0]))
+    assert found == pytest.approx([1.0, 1e13, 0.6, 0.8], rel=1e-9)
+
+
+def test_the_nearest_point_of_a_circle():
+    """From (3, 4) to x^2 + y^2 = 1: (0.6, 0.8); with y as good as fixed: (0, 1)-wards along x."""
+    made = problem(lambda x: np.array([x @ x - 1.0]), lambda x: [2.0 * x], [3.0, 4.0])
+    found = solve(made, made.guess)
+    assert found.x == pytest.approx([0.6, 0.8], rel=1e-7)
+    assert found.residual < 1e-14
+    held = replace(made, guess=np.array([3.0, 0.8]), free=np.array([True, False]))
+    assert solve(held, held.guess).x == pytest.approx([0.6, 0.8], rel=1e-12)
+
+
+def test_weights_and_scales_say_who_moves():
+    """x + y = 1 from zero: parts in the ratio (scale/weight)^2."""
+    made = problem(
+        lambda x: np.array([x.sum() - 1.0]), lambda x: [[1.0, 1.0]], [0.0, 0.0],
+        scale=np.array([2.0, 1.0]), weight=np.array([1.0, 3.0]),
+    )
+    assert solve(made, made.guess).x == pytest.approx(np.array([4.0, 1.0 / 9.0]) / (4.0 + 1.0 / 9.0), rel=1e-12)
+
+
+def test_light_unknowns_cost_nothing():
+    """x + z = 1, y - z = 2: with z light, x and y share what x + y = 3 asks."""
+    made = problem(
+        lambda x: np.array([x[0] + x[2] - 1.0, x[1] - x[2] - 2.0]),
+        lambda x: [[1.0, 0.0, 1.0], [0.0, 1.0, -1.0]], [0.0, 0.0, 0.0],
+    )
+    assert where_light(made, np.zeros(3), np.array([False, False, True])) == pytest.approx([1.5, 1.5, 0.0], rel=1e-12)
+
+
+def test_rows_that_contradict_leave_the_least_residual():
+    """x = 0 and x = 1: x = 1/2 leaves 1/2 in each."""
+    made = problem(lambda x: np.array([x[0], x[0] - 1.0]), lambda x: [[1.0], [1.0]], [7.0])
+    assert least_residual(made, made.guess) == pytest.approx([0.5], abs=1e-6)
+
+
+def test_work_is_counted_by_size_and_ends_by_the_clock():
+    work = Work(share=0.5)
+    while not work.done:
+        work.iteration((2000, 2000), 10000)
+    one = 2e3 * 14000 + module.EVALUATION + module.EACH * 1e4
+    assert work.spent == pytest.approx(one * np.ceil(0.5 * max(GRANTED, module.ITERATIONS * one) / one), rel=1e-2)
+    late = Work(until=time.monotonic() - 1.0)
+    with pytest.raises(OutOfTimeError):
+        late.evaluation(1)
+    Work(until=time.monotonic() + 1e3).evaluation(1)
