@@ -20,7 +20,6 @@
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
 #define LEAP 8.0           /* the next one is tried that much longer, with fresh slopes at its end */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
-#define EASING 1.3         /* by which the step at which Newton failed is raised from step to step */
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
 #define KEEP_HIGH 1.2
@@ -196,7 +195,6 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->h_used = radau->h_before = 0.0;
     radau->error_accepted = 0.0;
     radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
-    radau->bound = INFINITY;
     leave_below(radau, radau->linear->idle ? LEAST_PIVOT : 0.0);
     radau->theta = 1.0;
 }
@@ -319,6 +317,13 @@ static double correct(sd_radau *radau)
     return n ? sqrt(sum / (3.0 * n)) : 0.0; /* nothing may move: samples alone */
 }
 
+/* stages of a step that changes nothing */
+static void from_last_point(sd_radau *radau)
+{
+    for (int s = 0; s < SD_STAGES; s++)
+        memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
+}
+
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 static int iterate(sd_radau *radau, int full, int *used, double *retry)
 {
@@ -329,6 +334,10 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
     int most = patient ? PATIENT : ITERATIONS, converged = 0;
     for (int m = 1; m <= most + (radau->system->scales > 0); m++) {
         int cause = residuals(radau);
+        if (cause == SD_NONFINITE && m == 1 && radau->system->scales > 0) { /* extrapolated too far */
+            from_last_point(radau);
+            cause = residuals(radau);
+        }
         if (cause)
             return cause;
         if (converged && rows_hold(radau, tolerance, 0))
@@ -429,8 +438,7 @@ static int iterate_damped(sd_radau *radau, int *used)
     double size;
     int cause = residuals(radau);
     if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
-        for (int s = 0; s < SD_STAGES; s++)
-            memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
+        from_last_point(radau);
         cause = SD_FINE;
     }
     for (int m = 1; m <= WALK && cause == SD_FINE; m++) {
@@ -521,8 +529,6 @@ static void accept(sd_radau *radau, double error, int iterations)
     double next = h / ratio;
     if (radau->rejected)
         next = fmin(next, h);
-    radau->bound *= EASING;
-    next = fmin(next, radau->bound);
     double *oldest = radau->before, *slope = radau->slope[2];
     radau->before = radau->last;
     radau->last = oldest;
@@ -579,6 +585,15 @@ static void project(sd_radau *radau)
             radau->slope[0][i] = radau->yd[i] = radau->point_d[i];
 }
 
+/* stages that the step begins with: extrapolated, but where laws are steep and that led nowhere the last point */
+static void guess(sd_radau *radau, int again)
+{
+    if (again && radau->system->scales > 0)
+        from_last_point(radau);
+    else
+        sd_radau_extrapolate(radau, radau->h);
+}
+
 int sd_radau_step(sd_radau *radau)
 {
     int singular = 0, iterations = 0, failures = 0, leap = 0;
@@ -596,7 +611,7 @@ int sd_radau_step(sd_radau *radau)
         int cause = SD_FINE;
         retry = 0.5;
         int fresh = !radau->old_jacobian;
-        sd_radau_extrapolate(radau, radau->h);
+        guess(radau, failures > 0 && leap != 1);
         if (!radau->ready || radau->h != radau->h_factored)
             cause = factorise(radau, failures > 0 || leap == 1);
         if (cause == SD_FINE) {
@@ -645,7 +660,6 @@ int sd_radau_step(sd_radau *radau)
                 leap = 1;
                 continue;
             }
-            radau->bound = radau->h;
             radau->h *= cause == SD_NEWTON ? retry : 0.25;
             if (++failures > 2)
                 radau->h *= 0.5;
@@ -654,7 +668,7 @@ int sd_radau_step(sd_radau *radau)
         }
     }
     radau->cause = SD_FINE;
-    radau->creeping = failures > 0 && error < IDLE ? radau->creeping + 1 : 0;
+    radau->creeping = failures > (radau->system->scales > 0 ? TRIES : 0) && error < IDLE ? radau->creeping + 1 : 0;
     accept(radau, error, iterations);
     if (radau->project)
         project(radau);

@@ -38,7 +38,7 @@ typedef struct sd_radau {
                                                * SD_UNPULLED: and is interpolated whatever pulls */
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
-    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size, bound;
+    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
     int32_t ready, old_jacobian, rejected;
     int32_t creeping;                               /* steps in a row for which Newton failed at first */
     double *phi, *yd;         /* [n] the last accepted point */

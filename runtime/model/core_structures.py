@@ -245,7 +245,7 @@ class Radau(c.Structure):
         *[(name, _D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
         *[(name, _P) for name in ["atol", "magnitude", "met", "test", "power", "smooth"]],
         *[(name, _D) for name in ["tolerance", "t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
-        *[(name, _D) for name in ["error_accepted", "theta", "state_size", "bound"]],
+        *[(name, _D) for name in ["error_accepted", "theta", "state_size"]],
         *[(name, _I) for name in ["ready", "old_jacobian", "rejected", "creeping"]],
         *[(name, _P) for name in ["phi", "yd", "last", "before"]],
         ("slope", _P * STAGES),
