@@ -1,8 +1,8 @@
 """What large models cost before their first step: python tests/bench/large.py [--sections N ...] [--grid N]
 
-CPU seconds and largest resident memory of a process, imports included: `check` of the gallery's line; text to first step
-(`simulate --max-steps 1`) of the line at several lengths, and of a grid of N x N nodes, a resistance between neighbours,
-a capacitance to ground at each.
+CPU seconds and largest resident memory of a process, imports included: `check` of the gallery's line; text to first
+step (`simulate --max-steps 1`) of the line at several lengths, and of a grid of N x N nodes with a resistance between
+neighbours and a capacitance to ground at each.
 """
 
 from __future__ import annotations
