@@ -32,6 +32,8 @@ from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
+LARGE = 100_000
+"""Unknowns of a start beyond which its structures are let go: of a large model the room counts."""
 _FEW = 3
 """Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
@@ -453,4 +455,6 @@ def consistent_start(system: System, t0: float, near: ConsistentState | None = N
     counted = Starter(system, remember=True) if starter.missed.size else starter
     freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
+    if best.x.size > LARGE:
+        starter.forget()
     return ConsistentState(t0, y, yd, moved, best.residual, freedom, names)

@@ -128,6 +128,11 @@ class Starter:
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
 
+    def forget(self) -> None:
+        """Lets go of what stands in the structures of the text for this search alone."""
+        self.settled.forget()
+        self.system.forget_once("equations of the start", True)
+
     def _summed_rows(self, sums: _Sums) -> None:
         """The entries of sums of rows behind the others."""
         self.every[sums.rows] = True
