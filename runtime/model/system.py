@@ -111,7 +111,7 @@ class System:
         return self.once(name, make) if self.unknowns <= KEPT else make()
 
     def forget(self) -> None:
-        """Lets go of what follows from this form's structure, where no other run is to have it: found again if asked."""
+        """Lets go of what follows from this form's structure, where no other run has it: found again if asked."""
         if self.description.systems is None:
             layouts = self.description.layouts
             for key in [k for k in layouts if isinstance(k, tuple) and self.form.name in (k[0], k[1], *k[2:3])]:
