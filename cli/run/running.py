@@ -21,6 +21,7 @@ from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import differences, stopped, verdict
+from sysdyn.compiler.binding.columns import Read, value_of
 from sysdyn.compiler.binding.instants import instants
 from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.compiler.forms.kane import repeats
@@ -288,11 +289,25 @@ def stops(prepared: Prepared, options: Options, report: Report) -> np.ndarray:
     """Instants at which the text jumps or has kinks in time, and those of pulses that steps would pass over."""
     if _timeless(prepared):
         return np.zeros(0)
-    text = prepared.compiled.form, prepared.binding, options.t_start, options.t_end, prepared.network.tables
+    times, note = _stops(prepared, options.t_start, options.t_end)
+    if note:
+        report.note("N608", note, prepared.network.place)
+    return times
+
+
+def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | None]:
+    """The instants, and a note; those of the run before where no parameter that they follow from has changed."""
+    binding, kept = prepared.binding, prepared.layouts.setdefault("stops", {})
+    before = kept.get((t0, t1))
+    if before is not None and all(np.array_equal(value_of(binding, name), v) for name, v in before[1].items()):
+        return before[0]  # type: ignore[no-any-return]
+    read = Read(binding.parameters)
+    text = prepared.compiled.form, replace(binding, parameters=read), t0, t1, prepared.network.tables
     found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
-    if found.note:
-        report.note("N608", found.note, prepared.network.place)
-    return np.union1d(found.times, pulses(*text))
+    answer = np.union1d(found.times, pulses(*text)), found.note
+    kept.clear()
+    kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
+    return answer
 
 
 def _timeless(prepared: Prepared) -> bool:

@@ -51,6 +51,12 @@ class Read(Parameters):
         return super().lookup(node, args)
 
 
+def value_of(binding: Binding, name: str) -> Any:
+    """The value of a parameter, or of a number that the compiler itself asks for."""
+    own = binding.parameters
+    return own.hidden[name] if name in own.hidden else own.values[name]
+
+
 class Varied(Parameters):
     """Parameters of which some are other numbers, or columns over runs."""
 

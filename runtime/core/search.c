@@ -72,6 +72,22 @@ int sd_start_scale(const sd_rows_of_start *s, const double *nominal, const int32
     return failed;
 }
 
+int sd_start_sizes(const sd_rows_of_start *s, double t, const double *x, const double *scale, double *size)
+{
+    const sd_balance *m = &s->balance;
+    double *values = malloc(((size_t)m->entries + 1) * sizeof *values);
+    if (!values)
+        return -2;
+    int failed = sd_start_jacobian(s, t, x, values);
+    memset(size, 0, (size_t)m->rows * sizeof *size);
+    for (int32_t e = 0; e < m->entries; e++) {
+        double of = fabs(x[m->column[e]]);
+        size[m->row[e]] += fabs(values[e]) * (scale[m->column[e]] >= of || isnan(scale[m->column[e]]) ? scale[m->column[e]] : of);
+    }
+    free(values);
+    return failed;
+}
+
 /* What one iteration needs; the arrays of one block of memory. */
 typedef struct {
     int32_t rows, unknowns;                       /* in use, free */

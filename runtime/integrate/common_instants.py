@@ -115,9 +115,3 @@ def joined(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Int
     found[np.searchsorted(every, compared)] |= COMPARED
     return every, found
 
-
-def drafted(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Ints]:
-    """What a draft stores of a trace's instants and kinds: those of comparison."""
-    every, found = joined(instants, kinds, compared)
-    use = (found & COMPARED) > 0
-    return every[use], found[use]

@@ -14,7 +14,7 @@ import numpy as np
 from sysdyn.runtime.events.kinks import LIVE
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import Sampled
-from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, drafted, joined, known
+from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, joined, known
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.origin import Origin
@@ -117,6 +117,7 @@ class Runs:
         self.common = known(self.instants, options)
         """Instants [s] at which runs are compared; while it is open, those from which a draft takes its own."""
         self.open = options.every is not None
+        self._joined: tuple[Floats, tuple[Floats, Ints]] | None = None
         self.compared_at: Floats | None = None
 
     def take(self, way: Way) -> None:
@@ -137,7 +138,7 @@ class Runs:
         options, draft = self.options, self.controlled and self.done is None
         instants, kinds = self.instants, self.kinds
         if self.controlled and self.common is not None:
-            instants, kinds = (drafted if draft else joined)(instants, kinds, self.common)
+            instants, kinds = self.with_common(self.common, draft=draft)
         left = None if options.max_wall is None else options.max_wall - (time.monotonic() - self.began)
         return Request(
             t_end=options.t_end,
@@ -163,6 +164,14 @@ class Runs:
             max_order=1 if self.method == "euler" else lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
+
+    def with_common(self, compared: Floats, *, draft: bool) -> tuple[Floats, Ints]:
+        """Instants and kinds with those of comparison; of a draft these alone."""
+        if self._joined is None or self._joined[0] is not compared:
+            self._joined = compared, joined(self.instants, self.kinds, compared)
+        instants, kinds = self._joined[1]
+        use = (kinds & COMPARED) > 0
+        return (instants[use], kinds[use]) if draft else (instants, kinds)
 
     @property
     def most_steps(self) -> int | None:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, RATIO, STRETCH
-from sysdyn.runtime.integrate.common_instants import drafted, joined
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
@@ -196,7 +195,7 @@ class Batch:
         request: Request = runs.request(tolerance, None, longest)
         instants, kinds = runs.instants, runs.kinds
         if runs.common is not None:
-            instants, kinds = (joined if number else drafted)(instants, kinds, runs.common)
+            instants, kinds = runs.with_common(runs.common, draft=not number)
         request = replace(
             request,
             instants=instants,

@@ -110,6 +110,18 @@ class System:
         """The same where keeping it costs no room to speak of; else made anew."""
         return self.once(name, make) if self.unknowns <= KEPT else make()
 
+    def forget(self) -> None:
+        """Lets go of what follows from this form's structure, where no other run has it: found again if asked."""
+        if self.description.systems is None:
+            layouts = self.description.layouts
+            for key in [k for k in layouts if isinstance(k, tuple) and self.form.name in (k[0], k[1], *k[2:3])]:
+                del layouts[key]
+
+    def forget_once(self, *name: Hashable) -> None:
+        """The same of one thing that was made once."""
+        if self.description.systems is None:
+            self.description.layouts.pop(("once", name, self.form.name, self.left_out), None)
+
     def own(self, name: Hashable, make: Callable[[], Found]) -> Found:
         """What is made of this system's structures in the core, whatever the numbers: once for all runs it serves."""
         if name not in self._own:

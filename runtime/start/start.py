@@ -35,6 +35,8 @@ _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
 UNPERTURBED = 2
 """Trials of a stage that begin at the guess itself: the restricted problem, the whole one."""
+LARGE = 100_000
+"""Unknowns of a start beyond which its structures are let go: of a large model the room counts."""
 _FEW = 3
 """Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
@@ -510,4 +512,6 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     counted = Starter(system, remember=True) if starter.missed.size else starter
     freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
+    if best.x.size > LARGE:
+        starter.forget()
     return ConsistentState(t0, y, yd, moved, best.residual, freedom, names, strategy)

@@ -128,6 +128,11 @@ class Starter:
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
 
+    def forget(self) -> None:
+        """Lets go of what stands in the structures of the text for this search alone."""
+        self.settled.forget()
+        self.system.forget_once("equations of the start", True)
+
     def _summed_rows(self, sums: _Sums) -> None:
         """The entries of sums of rows behind the others."""
         self.every[sums.rows] = True
@@ -200,6 +205,20 @@ class Starter:
         summed = self._sums.weights[:, self._sums.place] * values[self._sums.entries]
         values[self._sums.entries] = 0.0
         return np.concatenate([values, summed.ravel()])
+
+    def sizes(self, t: float, x: Floats, scale: Floats) -> Floats:
+        """Size of the terms of each row [rows], by the larger of magnitudes and values."""
+        size = np.zeros(self.settled.rows)
+        if self._sums is not None:
+            values = np.abs(self.jacobian(t, x))
+            np.add.at(size, self.rows, values * np.maximum(scale, np.abs(x))[self.columns])
+            return size
+        x, scale = (np.ascontiguousarray(item, dtype=np.float64) for item in (x, scale))
+        numbers = lib.pointer(x), lib.pointer(scale), lib.pointer(size)
+        if lib.core.sd_start_sizes(c.addressof(self.core), t, *numbers):
+            raise MemoryError
+        self.settled.failure.check()
+        return size
 
     def with_sums(self, values: Floats) -> Floats:
         """Values of all rows [rows, k] with the sums of rows in their places."""
@@ -402,6 +421,5 @@ def weighted(
 
 def row_scale(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
     """One over the size of the terms of each row [rows]."""
-    size = np.zeros(starter.settled.rows)
-    np.add.at(size, starter.rows, np.abs(starter.jacobian(t, x)) * np.maximum(scale, np.abs(x))[starter.columns])
+    size = starter.sizes(t, x, scale)
     return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)

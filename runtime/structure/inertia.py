@@ -64,6 +64,9 @@ def _least(
     np.add.at(m, (i, j), v)
     if not np.isfinite(m).all():
         return None
+    diagonal = np.diag(m)
+    if (2.0 * diagonal > np.abs(m).sum(axis=1)).all() and (m == m.T).all():
+        return None  # what dominates its rows has a minimum (Gershgorin)
     # scaled to a unit diagonal, so that grams and tons are judged alike
     scale = 1.0 / np.sqrt(np.where(np.abs(np.diag(m)) > 0.0, np.abs(np.diag(m)), 1.0))
     found, vectors = np.linalg.eigh(0.5 * (m + m.T) * scale[:, None] * scale[None, :])

@@ -1,0 +1,73 @@
+"""What large models cost before their first step: python tests/bench/large.py [--sections N ...] [--grid N]
+
+CPU seconds and largest resident memory of a process, imports included: `check` of the gallery's line; text to first
+step (`simulate --max-steps 1`) of the line at several lengths, and of a grid of N x N nodes with a resistance between
+neighbours and a capacitance to ground at each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+LINE = Path(__file__).parents[2] / "models" / "gallery" / "transmission_line.sd"
+GRID = """from std.electrical import resistor, capacitor, voltage
+
+model grid {{
+  param n = {n}
+  node v[1..n, 1..n]: electrical
+  source: voltage(v = 1 V*smoothstep(t/(1 ms))) v[1, 1] -> ground
+  for i in 1..n {{
+    for j in 1..n - 1 {{
+      across[i, j]: resistor(R = 1 kohm) v[i, j] -> v[i, j + 1]
+      down[j, i]: resistor(R = 1 kohm) v[j, i] -> v[j + 1, i]
+    }}
+    for j in 1..n {{
+      C[i, j]: capacitor(C = 1 uF) v[i, j] -> ground
+    }}
+  }}
+}}
+
+scene edge of grid {{
+  time 0 s to 10 ms
+  trace v[n, n].e
+}}
+"""
+
+
+def cost(*arguments: str) -> str:
+    """CPU seconds and MB of one command."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # a process of its own reads the memory of the one command that it runs
+    script = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], stdout=-3, stderr=-3); "
+    script += "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+    command = [sys.executable, "-c", script, sys.executable, "-m", "sysdyn", *arguments]
+    memory = int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return f"{spent:8.2f} s CPU {memory / 1024.0:8.0f} MB"
+
+
+def main() -> int:
+    """The table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sections", type=int, nargs="*", default=[10_000, 100_000])
+    parser.add_argument("--grid", type=int, default=100)
+    asked = parser.parse_args()
+    print("check, 100000 sections     ", cost("check", str(LINE)), flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        first = "--max-steps", "1", "-o", str(Path(folder) / "first.h5")
+        for n in asked.sections:
+            print(f"first step, {n:8d} sections", cost("simulate", str(LINE), "--set", f"n={n}", *first), flush=True)
+        grid = Path(folder) / "grid.sd"
+        grid.write_text(GRID.format(n=asked.grid))
+        print(f"first step, {asked.grid:4d} x {asked.grid:4d} nodes ", cost("simulate", str(grid), *first), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

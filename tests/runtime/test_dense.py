@@ -1,0 +1,111 @@
+"""The core's kernels for small matrices, orders, matchings and magnitudes beside NumPy, SciPy and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, diags_array, eye_array, kron
+from scipy.sparse.csgraph import maximum_bipartite_matching
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.numerics import ordering, rank
+
+
+def of_rank(random, m, n, k, spread):
+    """A matrix [m, n] of rank k whose singular values fall to `spread`."""
+    left, right = (np.linalg.qr(random.standard_normal((s, k)))[0] for s in (m, n))
+    return np.ascontiguousarray(left * np.geomspace(1.0, spread, k) @ right.T)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 7), (7, 3), (20, 20), (32, 30)])
+@pytest.mark.parametrize("spread", [1.0, 1e-5])
+def test_rank_and_nearest_solution(shape, spread):
+    random = np.random.default_rng(4)
+    for k in range(1, min(shape) + 1, 3):
+        matrix = of_rank(random, *shape, k, spread)
+        assert rank.rank(matrix) == k
+        aim, x = random.standard_normal(shape[0]), np.zeros(shape[1])
+        given = lib.pointer(matrix), lib.pointer(aim)
+        assert lib.core.sd_nearest(*shape, *given, 1e-11, lib.pointer(x)) == 0
+        expected = np.linalg.lstsq(matrix, aim, rcond=1e-11)[0]
+        assert np.abs(x - expected).max() < 1e-10 / spread * np.abs(expected).max()
+        assert np.abs(matrix.T @ (matrix @ x - aim)).max() < 1e-13 * np.abs(x).max() + 1e-14
+
+
+def test_what_is_no_number_is_said():
+    with pytest.raises(rank.NotFiniteError):
+        rank.rank(np.array([[1.0, np.nan], [0.0, 1.0]]))
+
+
+@pytest.mark.parametrize(
+    ("e", "index"),
+    [([[1.0]], 0), ([[0.0]], 1), ([[0.0, 1.0], [0.0, 0.0]], 2), (np.diag([1.0, 1.0], 1), 3), (np.eye(6), 0)],
+)
+def test_index_of_pencils_in_weierstrass_form(e, index):
+    """N x' + x has the nilpotency of N as its index, in any bases and units."""
+    e = np.array(e)
+    n = len(e)
+    random = np.random.default_rng(2)
+    p, q = (random.standard_normal((n, n)) * 10.0 ** random.uniform(-6, 6, n) for _ in range(2))
+    e, b = p.T @ e @ q, p.T @ q
+    pattern = np.arange(0, n * n + 1, n, dtype=np.int32), np.tile(np.arange(n, dtype=np.int32), n)
+    values = [np.ascontiguousarray(item.T).ravel() for item in (e, b)]
+    arrays = [lib.pointer(item) for item in (*pattern, *values)]
+    assert lib.core.sd_pencil_index(n, *arrays, 6) == index
+
+
+def grid(k):
+    line = diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, 1], shape=(k, k))
+    return csc_array(kron(line, eye_array(k)) + kron(eye_array(k), line))
+
+
+def fill(matrix, order):
+    """Entries of the Cholesky factor of A^T A: what partial pivoting may fill."""
+    full = (abs(matrix.T) @ abs(matrix)).toarray()[np.ix_(order, order)] + 300.0 * np.eye(order.size)
+    return np.count_nonzero(np.linalg.cholesky(full))
+
+
+@pytest.mark.parametrize("kind", ["line", "grid"])
+def test_order_is_a_permutation_that_fills_little(kind):
+    matrix = grid(20) if kind == "grid" else csc_array(diags_array([1.0] * 3, offsets=[-1, 0, 1], shape=(400, 400)))
+    n = matrix.shape[0]
+    order = ordering._large(Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)))
+    assert np.array_equal(np.sort(order), np.arange(n))
+    found = fill(matrix, order)
+    assert found <= (3 * n if kind == "line" else 0.7 * fill(matrix, np.arange(n)))
+
+
+def test_matchings_are_as_large_as_can_be():
+    random = np.random.default_rng(0)
+    for _ in range(200):
+        m, n = random.integers(1, 25, 2)
+        a = csc_array((random.random((m, n)) < random.uniform(0.02, 0.3)).astype(float))
+        column, row, found = a.indptr.astype(np.int32), a.indices.astype(np.int32), np.zeros(n, dtype=np.int32)
+        number = lib.core.sd_match(m, n, *map(lib.pointer, (column, row, found)))
+        assert number == (maximum_bipartite_matching(a.tocsr(), perm_type="row") >= 0).sum()
+        there = np.flatnonzero(found >= 0)
+        assert np.unique(found[there]).size == there.size == number
+        assert (a.toarray()[found[there], there] != 0.0).all()
+
+
+def test_rows_that_are_peeled_are_independent():
+    random = np.random.default_rng(1)
+    for _ in range(100):
+        m, n = random.integers(1, 9, 2)
+        a = np.where(random.random((m, n)) < 0.3, random.uniform(0.5, 1.0, (m, n)), 0.0)
+        row, column = (item.astype(np.int32) for item in np.nonzero(a))
+        peeled = np.zeros(m, dtype=np.int32)
+        value = a[row, column]
+        arrays = [lib.pointer(item) for item in (row, column, value)]
+        left = lib.core.sd_peel(m, n, row.size, *arrays, 1e-3, lib.pointer(peeled))
+        assert left == m - peeled.sum()
+        rest = a[peeled == 0]
+        rest_rank = np.linalg.matrix_rank(rest) if rest.size else 0
+        assert np.linalg.matrix_rank(a) == peeled.sum() + rest_rank
+
+
+def test_magnitudes_balance_their_rows():
+    """u = R i and i = C u' with u = 5: the current is 5/R, and behind it what the second row makes of that."""
+    balance = Balance(2, np.array([0, 0, 1, 1]), np.array([0, 1, 1, 2]), np.array([0, 1, 2]))
+    size = np.array([1.0, 100.0, 1.0, 1e-3])
+    found = balance.propagate(np.array([5.0, 0.0, 0.0]), size, np.zeros(2))
+    assert found == pytest.approx([5.0, 0.05, 50.0])
