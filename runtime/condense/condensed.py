@@ -23,6 +23,8 @@ LEAST = 50
 """Unknowns from which it is worth the trouble."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
+DEFINED = "leaves runs: a constant sum of others"
+UNREAD = "leaves runs: nothing reads it"
 OBSERVING = ("observe", "observe_rate", "audit", "ledger")
 RATE_OF = {"phi_acceleration": "phi_rate", "psi_rate": "psi", "gamma_rate": "gamma", "momentum_rate": "momentum"}
 """Group of rows -> group of which they are the time derivative."""
@@ -300,6 +302,21 @@ def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
     if kept is None:
         return None
     return Forms(Condensed(whole, numbers, np.flatnonzero(rows)), Condensed(settled, numbers, np.flatnonzero(kept)))
+
+
+def departures(system: System) -> list[tuple[str, str]]:
+    """What leaves the runs of a model as written that have neither events nor jumps: names and why."""
+    zero = np.zeros(system.unknowns)
+    found = condensed(system, 0.0, zero, zero)
+    if found is None:
+        return []
+    parts = ((found.stepped.sums.place, DEFINED), (found.stepped.sums.unread, UNREAD))
+    names = [family.name for family in system.description.families]
+    return [
+        (f"{names[k]} ({number} of {system.description.families[k].size})", why)
+        for places, why in parts
+        for k, number in zip(*np.unique(system.family_of[places], return_counts=True), strict=True)
+    ]
 
 
 def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:

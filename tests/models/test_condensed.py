@@ -5,6 +5,7 @@ import pytest
 from model_runs import FOUR, trace_of
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
+from sysdyn.cli.main import run
 from sysdyn.runtime.condense import condensed as condensing
 from sysdyn.runtime.integrate import integrate
 
@@ -134,3 +135,13 @@ def test_a_charge_that_is_traced_is_integrated(tmp_path):
     t, at = np.unique(np.asarray(trace.time), return_index=True)
     current, charge = (trace[name].values[at] for name in ("current", "charge"))
     assert charge[-1] - charge[0] == pytest.approx(CubicSpline(t, current).integrate(t[0], t[-1]), rel=1e-4)
+
+
+def test_explain_says_what_left(tmp_path, capsys):
+    path = tmp_path / "ladder.sd"
+    path.write_text(LADDER)
+    assert run(["compile", str(path), "--scene", "go", "--explain", "-o", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    text = said.out + said.err
+    assert f"v.multiplier ({N - 1} of {N - 1})  leaves runs: a constant sum of others" in " ".join(text.split(" "))
+    assert "leaves runs: nothing reads it" in text
