@@ -185,6 +185,12 @@ int *sd_linear_pivoted(sd_linear *linear)
     return linear->sparse ? &linear->sparse->pivoted : NULL;
 }
 
+void sd_linear_paired(sd_linear *linear)
+{
+    if (linear->sparse)
+        linear->sparse->diagonal = 1;
+}
+
 static void scaled_solve(sd_linear *linear, sd_number *x)
 {
     if (linear->dense)

@@ -108,14 +108,16 @@ static int grow(int64_t need, int64_t *room, int32_t **rows, sd_number **values)
     return 0;
 }
 
-/* the row that pivots: the sparsest among those whose entry is near the largest; -1 where all are zero */
-static int32_t choose(const sd_sparse *lu, int32_t top, double *largest)
+/* the row that pivots in column c: the sparsest among those whose entry is near the largest; -1 where all are zero */
+static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *largest)
 {
     int32_t best = -1;
     *largest = 0.0;
     for (int32_t i = top; i < lu->n; i++)
         if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
             *largest = sd_size(lu->x[lu->stack[i]]);
+    if (lu->diagonal && lu->place[c] < 0 && *largest > 0.0 && sd_size(lu->x[c]) >= THRESHOLD * *largest)
+        return c;
     for (int32_t i = top; i < lu->n && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
         if (lu->place[r] >= 0 || sd_size(lu->x[r]) < THRESHOLD * *largest)
@@ -161,7 +163,7 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
                 lu->x[lu->l_row[p]] -= lu->l_value[p] * u;
         }
         double largest;
-        int32_t pivot = choose(lu, top, &largest);
+        int32_t pivot = choose(lu, c, top, &largest);
         double relative = size > 0.0 ? largest / size : 0.0;
         if (relative < lu->smallest) {
             lu->smallest = relative;

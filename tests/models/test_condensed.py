@@ -145,3 +145,40 @@ def test_explain_says_what_left(tmp_path, capsys):
     text = said.out + said.err
     assert f"v.multiplier ({N - 1} of {N - 1})  leaves runs: a constant sum of others" in " ".join(text.split(" "))
     assert "leaves runs: nothing reads it" in text
+
+
+GRID = """
+from std.electrical import resistor, capacitor, voltage
+model grid {
+  param n = 15
+  node v[1..n, 1..n]: electrical
+  node feed: electrical
+  source: voltage(v = 1 V*sin(5 rad/s*t)) feed -> ground
+  Rin: resistor(R = 0.1 ohm) feed -> v[1, 1]
+  for i in 1..n { for j in 1..n {
+    C[i, j]: capacitor(C = 1 F / n / n) v[i, j] -> ground
+    init C[i, j].e = 0 V
+  } }
+  for i in 2..n { for j in 1..n { Rx[i, j]: resistor(R = 1 ohm) v[i - 1, j] -> v[i, j] } }
+  for i in 1..n { for j in 2..n { Ry[i, j]: resistor(R = 1 ohm) v[i, j - 1] -> v[i, j] } }
+}
+scene go of grid {
+  time 0 s to 1 s
+  accuracy 1e-7
+  trace v[n, n].e as far, v[1, 1].e as near
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+def test_a_grid_meets_its_exponential(tmp_path, method):
+    """One unknown a node; rows pivot with the unknowns they belong to."""
+    n = 15
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    chain[0, 0] = chain[-1, -1] = 1.0
+    matrix = -(np.kron(chain, np.eye(n)) + np.kron(np.eye(n), chain))
+    matrix[0, 0] -= 10.0
+    exact = _driven(n * n * matrix, 10.0 * n * n * np.eye(n * n)[0])
+    trace = trace_of(tmp_path, GRID, method=method)
+    assert trace["far"].values[-1] == pytest.approx(exact[n * n - 1], abs=3e-7 * trace["far"].nominal)
+    assert trace["near"].values[-1] == pytest.approx(exact[0], abs=3e-7)
