@@ -20,7 +20,9 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
 from sysdyn.dsl.model.network import Event, Switch
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.condense.condensed import departures
 from sysdyn.runtime.model.failures import NoSuchForm
+from sysdyn.runtime.model.system import System
 
 STAGES = ("network", "reflected", "coordinates", "energies", "descriptor", "program")
 
@@ -87,13 +89,16 @@ def command(
 
 
 def _account(prepared: Prepared) -> str:
-    """What became of nodes, branches and coordinates, by which rule."""
+    """What became of nodes, branches, coordinates and unknowns, by which rule."""
     compiled = prepared.compiled
     rows = [("8.7", r.what, r.why) for r in prepared.left_out]
     rows += [(s.rule, s.what, s.became) for s in compiled.steps]
     held = {f.owner for f in compiled.form.families if f.kind == "q"}
     unseen = [c.name for c in compiled.energies.coordinates if c.name not in held]
     rows += [("8.7", f"displacement of {name}", "pruned: nothing reads it; its flow is the unknown") for name in unseen]
+    if not prepared.network.events and not prepared.network.switches:
+        system = System(prepared.manifest, prepared.arrays, prepared.carrier)
+        rows += [("sum", what, why) for what, why in departures(system)]
     return aligned(rows) if rows else "coordinate style: nothing was merged or pruned"
 
 

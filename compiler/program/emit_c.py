@@ -55,6 +55,7 @@ def _routine(k: int, routine: Routine, form: DescriptorForm) -> str:
     unused = [n for n in ("p", "ix", "at", "to", "t", "y", "yd") if n not in writer.used]
     lines += [f"    {''.join(f'(void){n}; ' for n in unused).strip()}"] if unused else []
     lines += writer.bases
+    lines += [f"    double {name} = 0.0;" for name in writer.sums.values()]
     for depth, (first, last) in enumerate(routine.loops):
         name = _loop(depth)
         head = f"for (ptrdiff_t {name} = {bound(first, _loop)}; {name} <= {bound(last, _loop)}; ++{name}) {{"
@@ -63,6 +64,7 @@ def _routine(k: int, routine: Routine, form: DescriptorForm) -> str:
     if out == "v" and routine.loops:
         lines.append("    " * (len(routine.loops) + 1) + f"v += {routine.entries};")
     lines += ["    " * (depth + 1) + "}" for depth in reversed(range(len(routine.loops)))]
+    lines += [f"    if ({name} != 0.0)\n        {place} += {name};" for place, name in writer.sums.items()]
     if out == "v":
         lines.append("    return v;")
     return "\n".join([*lines, "}", ""])
@@ -78,6 +80,11 @@ def _comment(routine: Routine, form: DescriptorForm) -> str:
     return f"{word(form.formulation, routine.block)}, {routine.part}: {', '.join(rows)}{more}"
 
 
+def _stands(place: Reference) -> bool:
+    """No loop moves it."""
+    return all(index.loop < 0 for index in place.indices)
+
+
 class _Writer:
     """Statements of one routine as C; places that no loop enters are computed before the loops."""
 
@@ -85,7 +92,13 @@ class _Writer:
         self.routine = routine
         self.bases: list[str] = []
         self.used: set[str] = {"ix"} if routine.loops else set()
+        self.sums: dict[str, str] = {}
         self._names: dict[str, str] = {}
+        stores = [s.place for s in routine.body if isinstance(s, Store) and isinstance(s.place, Reference)]
+        places = {place.family: {other for other in stores if other.family == place.family} for place in stores}
+        alone = {family: found.pop() for family, found in places.items() if routine.loops and len(found) == 1}
+        self._summed = {family for family, place in alone.items() if _stands(place)}
+        """Families of rows of which the loops reach one place."""
 
     def body(self, statements: Sequence[Statement], indent: str) -> list[str]:
         """Lines of statements."""
@@ -105,8 +118,15 @@ class _Writer:
         """r[place] += value, or v[entry] = value."""
         value = _operand(s.value)
         if isinstance(s.place, Reference):
-            return f"r[{self.place(s.place, 'to')}] += {value};"
+            place = f"r[{self.place(s.place, 'to')}]"
+            return f"{self._sum(place) if s.place.family in self._summed else place} += {value};"
         return f"v[{s.place}] = {value};"
+
+    def _sum(self, place: str) -> str:
+        """The variable in which the loops sum what they add to one place: memory would be the slowest part of it."""
+        if place not in self.sums:
+            self.sums[place] = f"s{len(self.sums)}"
+        return self.sums[place]
 
     def fold(self, s: Fold, indent: str) -> list[str]:
         """A loop that accumulates."""

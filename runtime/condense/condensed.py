@@ -17,12 +17,14 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.ordering import column_order
+from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
 
 LEAST = 50
 """Unknowns from which it is worth the trouble."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
+DEFINED = "leaves runs: a constant sum of others"
+UNREAD = "leaves runs: nothing reads it"
 OBSERVING = ("observe", "observe_rate", "audit", "ledger")
 RATE_OF = {"phi_acceleration": "phi_rate", "psi_rate": "psi", "gamma_rate": "gamma", "momentum_rate": "momentum"}
 """Group of rows -> group of which they are the time derivative."""
@@ -93,9 +95,43 @@ class Condensed:
     def __init__(self, system: System, found: Sums, kept_rows: Longs) -> None:
         self.whole, self.sums, self.kept, self.kept_rows = system, found, found.kept, kept_rows
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
+        self.paired = False
         self._keep: list[object] = []
         self._products()
+        if self.unknowns == self.rows > SMALL:
+            self._pair()
         self._make()
+
+    def _pair(self) -> None:
+        """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import maximum_bipartite_matching
+
+        form, columns, rows = self.whole.form, self.whole.pattern.columns_of(), self.whole.pattern.row
+        row_at, at = np.full(self.whole.rows, -1), np.full(self.whole.unknowns, -1)
+        row_at[self.kept_rows], at[self.kept] = np.arange(self.rows), np.arange(self.unknowns)
+        moving = self.whole.structural()[1]
+        row = row_at[np.concatenate([form.k_row, rows[moving]])]
+        column = at[np.concatenate([form.k_q, columns[moving]])]
+        here = (row >= 0) & (column >= 0)
+        row, column = row[here], column[here]
+        alone = np.bincount(row, minlength=self.rows)[row] == 1
+        alone &= np.bincount(column, minlength=self.rows)[column] == 1
+        own = np.full(self.unknowns, -1)
+        own[column[alone]] = row[alone]
+        free = np.ones(self.rows, dtype=bool)
+        free[row[alone]] = False
+        left, open_ = np.flatnonzero(own < 0), np.flatnonzero(free)
+        entries = (own[self.pattern.columns_of()] < 0) & free[self.pattern.row]
+        number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1
+        where = number[self.pattern.columns_of()[entries]], place[self.pattern.row[entries]]
+        rest = csr_array((np.ones(where[0].size), where), shape=(left.size, left.size))
+        found = maximum_bipartite_matching(rest, perm_type="column") if left.size else left
+        if (found < 0).any():
+            return
+        own[left] = open_[found]
+        self.kept_rows, self.paired = self.kept_rows[own], True
+        self._products()
 
     def _hold(self, array: Ints | Floats) -> int | None:
         self._keep.append(array)
@@ -262,8 +298,13 @@ class Forms:
     def order(self) -> Ints | None:
         """Elimination order of the stepped form's matrices [kept], found once."""
         stepped, whole = self.stepped, self.stepped.whole
-        leaving = bool(whole.form.scales)
-        return whole.once(("order", *stepped.key), lambda: column_order(stepped.pattern, leaving=leaving))
+
+        def made() -> Ints | None:
+            if stepped.paired:
+                return paired_order(stepped.pattern)
+            return column_order(stepped.pattern, leaving=bool(whole.form.scales))
+
+        return whole.once(("order", *stepped.key), made)
 
 
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
@@ -290,6 +331,21 @@ def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
     if kept is None:
         return None
     return Forms(Condensed(whole, numbers, np.flatnonzero(rows)), Condensed(settled, numbers, np.flatnonzero(kept)))
+
+
+def departures(system: System) -> list[tuple[str, str]]:
+    """What leaves the runs of a model as written that have neither events nor jumps: names and why."""
+    zero = np.zeros(system.unknowns)
+    found = condensed(system, 0.0, zero, zero)
+    if found is None:
+        return []
+    parts = ((found.stepped.sums.place, DEFINED), (found.stepped.sums.unread, UNREAD))
+    names = [family.name for family in system.description.families]
+    return [
+        (f"{names[k]} ({number} of {system.description.families[k].size})", why)
+        for places, why in parts
+        for k, number in zip(*np.unique(system.family_of[places], return_counts=True), strict=True)
+    ]
 
 
 def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:

@@ -122,18 +122,21 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
     memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
 }
 
-/* y, yd := the polynomial through the past, at the new t */
+/* y, yd := the polynomial through the past, at the new t; in pieces that stay in the nearest cache */
 static void predict(sd_bdf *bdf)
 {
-    int32_t n = bdf->n;
-    memcpy(bdf->predicted, bdf->phi[0], (size_t)n * sizeof(double));
-    memset(bdf->predicted_d, 0, (size_t)n * sizeof(double));
-    for (int32_t k = 1; k <= bdf->order; k++) {
-        const double *phi = bdf->phi[k];
-        double gamma = bdf->gamma[k];
-        for (int32_t i = 0; i < n; i++) {
-            bdf->predicted[i] += phi[i];
-            bdf->predicted_d[i] += gamma * phi[i];
+    for (int32_t first = 0; first < bdf->n; first += SD_PIECE) {
+        int32_t n = bdf->n - first < SD_PIECE ? bdf->n - first : SD_PIECE;
+        double *restrict y = bdf->predicted + first, *restrict yd = bdf->predicted_d + first;
+        memcpy(y, bdf->phi[0] + first, (size_t)n * sizeof *y);
+        memset(yd, 0, (size_t)n * sizeof *yd);
+        for (int32_t k = 1; k <= bdf->order; k++) {
+            const double *restrict phi = bdf->phi[k] + first;
+            double gamma = bdf->gamma[k];
+            for (int32_t i = 0; i < n; i++) {
+                y[i] += phi[i];
+                yd[i] += gamma * phi[i];
+            }
         }
     }
 }
@@ -371,21 +374,27 @@ int sd_bdf_step(sd_bdf *bdf)
 /* Polynomial through the last order + 1 points, in divided differences. */
 void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
 {
-    int32_t n = bdf->n, k = bdf->order_used > 0 ? bdf->order_used : 1;
+    int32_t k = bdf->taken == 0 ? 0 : bdf->order_used > 0 ? bdf->order_used : 1;
     double delta = t - bdf->t, c = 1.0, d = 0.0, gamma = bdf->psi[0] != 0.0 ? delta / bdf->psi[0] : 0.0;
-    memcpy(y, bdf->phi[0], (size_t)n * sizeof *y);
-    memset(yd, 0, (size_t)n * sizeof *yd);
-    if (bdf->taken == 0)
-        k = 0;
+    double value[SD_MAX_ORDER + 2], rate[SD_MAX_ORDER + 2];
     for (int32_t j = 1; j <= k; j++) {
-        d = d * gamma + c / bdf->psi[j - 1];
-        c *= gamma;
+        rate[j] = d = d * gamma + c / bdf->psi[j - 1];
+        value[j] = c *= gamma;
         gamma = (delta + bdf->psi[j - 1]) / bdf->psi[j];
-        for (int32_t i = 0; i < n; i++) {
-            y[i] += c * bdf->phi[j][i];
-            yd[i] += d * bdf->phi[j][i];
+    }
+    for (int32_t first = 0; first < bdf->n; first += SD_PIECE) {
+        int32_t n = bdf->n - first < SD_PIECE ? bdf->n - first : SD_PIECE;
+        double *restrict out = y + first, *restrict out_d = yd + first;
+        memcpy(out, bdf->phi[0] + first, (size_t)n * sizeof *y);
+        memset(out_d, 0, (size_t)n * sizeof *yd);
+        for (int32_t j = 1; j <= k; j++) {
+            const double *restrict phi = bdf->phi[j] + first;
+            for (int32_t i = 0; i < n; i++) {
+                out[i] += value[j] * phi[i];
+                out_d[i] += rate[j] * phi[i];
+            }
         }
     }
     if (bdf->taken == 0)
-        memcpy(yd, bdf->yd, (size_t)n * sizeof *yd);
+        memcpy(yd, bdf->yd, (size_t)bdf->n * sizeof *yd);
 }

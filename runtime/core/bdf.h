@@ -19,6 +19,7 @@
 #include "stepper.h"
 
 #define SD_MAX_ORDER 5
+#define SD_PIECE 512 /* unknowns of which all differences fit the nearest cache */
 
 typedef struct sd_bdf {
     sd_system *system;

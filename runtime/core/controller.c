@@ -8,21 +8,13 @@
 /* Root mean square of (x + plus - minus) in the error weights over the tested unknowns; plus, minus may be NULL. */
 double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *plus, const double *minus)
 {
-    double sum = 0.0;
+    double sum[4] = {0.0, 0.0, 0.0, 0.0}, h = bdf->h; /* four at once: one sum would wait for itself */
     for (int32_t i = 0; i < bdf->n; i++) {
-        if (bdf->test[i] < 0)
-            continue;
-        double v = x[i];
-        if (plus)
-            v += plus[i];
-        if (minus)
-            v -= minus[i];
-        v *= bdf->weight[i];
-        if (bdf->test[i])
-            v *= bdf->h;
-        sum += v * v;
+        double v = x[i] + (plus ? plus[i] : 0.0) - (minus ? minus[i] : 0.0);
+        v = bdf->test[i] < 0 ? 0.0 : v * (bdf->test[i] ? bdf->weight[i] * h : bdf->weight[i]);
+        sum[i % 4] += v * v;
     }
-    return bdf->tested ? sqrt(sum / bdf->tested) : 0.0;
+    return bdf->tested ? sqrt((sum[0] + sum[1] + sum[2] + sum[3]) / bdf->tested) : 0.0;
 }
 
 /* Error of the step and the order that promises more (never a higher one here).  1: the step passes. */
@@ -102,13 +94,18 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
     }
     bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : fmin(h_next, bdf->h_max);
     /* the differences at the new point */
-    if (k < SD_MAX_ORDER)
-        memcpy(bdf->phi[k + 1], bdf->ee, (size_t)bdf->n * sizeof(double));
-    for (int32_t i = 0; i < bdf->n; i++)
-        bdf->phi[k][i] += bdf->ee[i];
-    for (int32_t j = k - 1; j >= 0; j--)
-        for (int32_t i = 0; i < bdf->n; i++)
-            bdf->phi[j][i] += bdf->phi[j + 1][i];
+    for (int32_t first = 0; first < bdf->n; first += SD_PIECE) {
+        int32_t n = bdf->n - first < SD_PIECE ? bdf->n - first : SD_PIECE;
+        const double *restrict above = bdf->ee + first;
+        if (k < SD_MAX_ORDER)
+            memcpy(bdf->phi[k + 1] + first, above, (size_t)n * sizeof(double));
+        for (int32_t j = k; j >= 0; j--) {
+            double *restrict phi = bdf->phi[j] + first;
+            for (int32_t i = 0; i < n; i++)
+                phi[i] += above[i];
+            above = phi;
+        }
+    }
 }
 
 /* A first step: a thousandth of the span, or such that the local error h^2 y''/2 is within tolerance, with y'' guessed

@@ -185,18 +185,28 @@ int *sd_linear_pivoted(sd_linear *linear)
     return linear->sparse ? &linear->sparse->pivoted : NULL;
 }
 
+void sd_linear_paired(sd_linear *linear)
+{
+    if (linear->sparse)
+        linear->sparse->diagonal = 1;
+}
+
 static void scaled_solve(sd_linear *linear, sd_number *x)
 {
     if (linear->dense)
         dense_solve(linear, x, linear->work);
     else
-        sd_sparse_solve(linear->sparse, x, linear->work);
+        sd_sparse_solve(linear->sparse, x, linear->work, NULL, NULL);
 }
 
 void sd_linear_solve(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
     sd_number *rest = linear->work2;
+    if (linear->sparse && linear->smallest >= REFINE) {
+        sd_sparse_solve(linear->sparse, x, linear->work, linear->row_scale, linear->column_scale);
+        return;
+    }
     for (int32_t i = 0; i < n; i++)
         rest[i] = x[i] *= linear->row_scale[i];
     scaled_solve(linear, x);

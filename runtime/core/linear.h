@@ -42,6 +42,8 @@ void sd_linear_free(sd_linear *linear);
 int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_linear_solve(sd_linear *linear, sd_number *x);
+/* row k belongs to unknown k, and pivots there where it can; of sparse ones */
+void sd_linear_paired(sd_linear *linear);
 /* set to 0: the next factorisation chooses its pivots anew; NULL for dense ones, which always do */
 int *sd_linear_pivoted(sd_linear *linear);
 

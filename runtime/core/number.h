@@ -24,6 +24,7 @@ static inline double sd_size(sd_number x)
 #define sd_linear_factor sd_linear_z_factor
 #define sd_linear_solve sd_linear_z_solve
 #define sd_linear_pivoted sd_linear_z_pivoted
+#define sd_linear_paired sd_linear_z_paired
 #define sd_sparse sd_sparse_z
 #define sd_sparse_new sd_sparse_z_new
 #define sd_sparse_free sd_sparse_z_free

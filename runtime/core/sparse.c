@@ -18,7 +18,7 @@ void sd_sparse_free(sd_sparse *lu)
     free(lu->u_row);
     free(lu->l_value);
     free(lu->u_value);
-    free(lu->diagonal);
+    free(lu->inverse);
     free(lu);
 }
 
@@ -33,12 +33,12 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
     lu->order = calloc(2 * m + 5 * all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    lu->diagonal = calloc(2 * m + all + 1, sizeof(sd_number));
+    lu->inverse = calloc(2 * m + all + 1, sizeof(sd_number));
     lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
     lu->u_row = malloc((size_t)lu->u_room * sizeof(int32_t));
     lu->l_value = malloc((size_t)lu->l_room * sizeof(sd_number));
     lu->u_value = malloc((size_t)lu->u_room * sizeof(sd_number));
-    if (!lu->order || !lu->l_start || !lu->diagonal || !lu->l_row || !lu->u_row || !lu->l_value || !lu->u_value) {
+    if (!lu->order || !lu->l_start || !lu->inverse || !lu->l_row || !lu->u_row || !lu->l_value || !lu->u_value) {
         sd_sparse_free(lu);
         return NULL;
     }
@@ -49,7 +49,7 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     lu->mark = lu->head + all;
     lu->count = lu->mark + all;
     lu->u_start = lu->l_start + m + 1;
-    lu->x = lu->diagonal + m;
+    lu->x = lu->inverse + m;
     memcpy(lu->order, order, m * sizeof *order);
     for (int32_t e = 0; e < column[n]; e++)
         lu->count[row[e]]++;
@@ -109,14 +109,16 @@ static int grow(int64_t need, int64_t *room, int32_t **rows, sd_number **values)
     return 0;
 }
 
-/* the row that pivots: the sparsest among those whose entry is near the largest; -1 where all are zero */
-static int32_t choose(const sd_sparse *lu, int32_t top, double *largest)
+/* the row that pivots in column c: the sparsest among those whose entry is near the largest; -1 where all are zero */
+static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *largest)
 {
     int32_t best = -1;
     *largest = 0.0;
     for (int32_t i = top; i < lu->rows; i++)
         if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
             *largest = sd_size(lu->x[lu->stack[i]]);
+    if (lu->diagonal && lu->place[c] < 0 && *largest > 0.0 && sd_size(lu->x[c]) >= THRESHOLD * *largest)
+        return c;
     for (int32_t i = top; i < lu->rows && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
         if (lu->place[r] >= 0 || sd_size(lu->x[r]) < THRESHOLD * *largest)
@@ -162,14 +164,14 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
                 lu->x[lu->l_row[p]] -= lu->l_value[p] * u;
         }
         double largest;
-        int32_t pivot = choose(lu, top, &largest);
+        int32_t pivot = choose(lu, c, top, &largest);
         double relative = size > 0.0 ? largest / size : 0.0;
         if (relative < lu->null_pivot) { /* it follows from the others */
             for (int32_t i = top; i < rows; i++)
                 lu->x[lu->stack[i]] = 0.0;
             nu = lu->u_start[k];
             lu->source[k] = -1;
-            lu->diagonal[k] = INFINITY;
+            lu->inverse[k] = 0.0;
             lu->l_start[k + 1] = (int32_t)nl;
             lu->u_start[k + 1] = (int32_t)nu;
             continue;
@@ -186,15 +188,15 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
             lu->bad_column = c;
             return 1;
         }
-        sd_number diagonal = lu->x[pivot];
-        lu->diagonal[k] = diagonal;
+        sd_number inverse = 1.0 / lu->x[pivot];
+        lu->inverse[k] = inverse;
         lu->place[pivot] = k;
         lu->source[k] = pivot;
         for (int32_t i = top; i < rows; i++) {
             int32_t r = lu->stack[i];
             if (lu->place[r] < 0) {
                 lu->l_row[nl] = r;
-                lu->l_value[nl++] = lu->x[r] / diagonal;
+                lu->l_value[nl++] = lu->x[r] * inverse;
             }
             lu->x[r] = 0.0;
         }
@@ -235,18 +237,18 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
             for (int32_t l = lu->l_start[j]; l < lu->l_start[j + 1]; l++)
                 x[lu->l_row[l]] -= lu->l_value[l] * u;
         }
-        sd_number diagonal = x[k];
+        sd_number diagonal = x[k], inverse = 1.0 / diagonal;
         double largest = sd_size(diagonal);
         x[k] = 0.0;
-        lu->diagonal[k] = diagonal;
+        lu->inverse[k] = inverse;
         for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++) {
             sd_number v = x[lu->l_row[l]];
             x[lu->l_row[l]] = 0.0;
-            lu->l_value[l] = v / diagonal;
-            largest = fmax(largest, sd_size(v));
+            lu->l_value[l] = v * inverse;
+            largest = sd_size(v) > largest ? sd_size(v) : largest;
         }
         double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
-        lu->smallest = fmin(lu->smallest, relative);
+        lu->smallest = relative < lu->smallest ? relative : lu->smallest;
         if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
             memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);
             lu->pivoted = 0;
@@ -257,16 +259,22 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     return 0;
 }
 
-void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work)
+void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
-    for (int32_t k = 0; k < lu->n; k++)
-        work[k] = x[lu->source[k]];
-    for (int32_t k = 0; k < lu->n; k++)
+    int32_t n = lu->n;
+    for (int32_t k = 0; k < n; k++) {
+        int32_t r = lu->source[k];
+        work[k] = row_scale ? x[r] * row_scale[r] : x[r];
+    }
+    for (int32_t k = 0; k < n; k++) {
+        sd_number v = work[k];
         for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
-            work[lu->l_row[l]] -= lu->l_value[l] * work[k];
-    for (int32_t k = lu->n - 1; k >= 0; k--) {
-        sd_number v = work[k] / lu->diagonal[k];
-        x[lu->order[k]] = v;
+            work[lu->l_row[l]] -= lu->l_value[l] * v;
+    }
+    for (int32_t k = n - 1; k >= 0; k--) {
+        sd_number v = work[k] * lu->inverse[k];
+        int32_t c = lu->order[k];
+        x[c] = column_scale ? v * column_scale[c] : v;
         for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
             work[lu->u_row[p]] -= lu->u_value[p] * v;
     }
@@ -279,7 +287,7 @@ void sd_sparse_basic(const sd_sparse *lu, const sd_number *b, sd_number *x, sd_n
         sd_number v = b[lu->order[k]];
         for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
             v -= lu->u_value[p] * work[lu->u_row[p]];
-        work[k] = v / lu->diagonal[k];
+        work[k] = v * lu->inverse[k];
     }
     for (int32_t k = lu->n - 1; k >= 0; k--) {
         for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)

@@ -16,11 +16,12 @@ typedef struct sd_sparse {
                                     -1 of a column that was left out */
     int32_t *l_start, *u_start;  /* [n + 1] */
     int32_t *l_row, *u_row;      /* pivot positions; u in the order of elimination, diagonal apart */
-    sd_number *l_value, *u_value, *diagonal;
+    sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
     int64_t l_room, u_room;
     int32_t *stack, *head, *mark, *count; /* [rows] search */
     sd_number *x;                /* [n + rows + 1] */
     int pivoted;                 /* a valid pattern exists */
+    int diagonal;                /* row c pivots in column c wherever its entry will do: the order is one of A + A^T */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
     int32_t bad_row, bad_column;
 } sd_sparse;
@@ -31,7 +32,8 @@ void sd_sparse_free(sd_sparse *lu);
 int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value);
 /* new values on the old pattern: 0 done, 1 a pivot became unhealthy */
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value);
-void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work);
+/* x := column_scale * (LU)^-1 (row_scale * x); the scales NULL: ones */
+void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale);
 /* x [rows] with A^T x = b [n], zero where no pivot is; equations of columns that were left out are not judged; work [n] */
 void sd_sparse_basic(const sd_sparse *lu, const sd_number *b, sd_number *x, sd_number *work);
 

@@ -54,6 +54,10 @@ class Method:
         self._n = system.unknowns
         if isinstance(system, Condensed):
             self._n = system.whole.unknowns
+            if system.paired:
+                lib.core.sd_linear_paired(linear)
+                if self._complex:
+                    lib.core.sd_linear_z_paired(self._complex)
             condensed = c.addressof(system.condensed)
             self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
             if not self.expanded:

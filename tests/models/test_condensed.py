@@ -5,6 +5,7 @@ import pytest
 from model_runs import FOUR, trace_of
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
+from sysdyn.cli.main import run
 from sysdyn.runtime.condense import condensed as condensing
 from sysdyn.runtime.integrate import integrate
 
@@ -134,3 +135,50 @@ def test_a_charge_that_is_traced_is_integrated(tmp_path):
     t, at = np.unique(np.asarray(trace.time), return_index=True)
     current, charge = (trace[name].values[at] for name in ("current", "charge"))
     assert charge[-1] - charge[0] == pytest.approx(CubicSpline(t, current).integrate(t[0], t[-1]), rel=1e-4)
+
+
+def test_explain_says_what_left(tmp_path, capsys):
+    path = tmp_path / "ladder.sd"
+    path.write_text(LADDER)
+    assert run(["compile", str(path), "--scene", "go", "--explain", "-o", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    text = said.out + said.err
+    assert f"v.multiplier ({N - 1} of {N - 1})  leaves runs: a constant sum of others" in " ".join(text.split(" "))
+    assert "leaves runs: nothing reads it" in text
+
+
+GRID = """
+from std.electrical import resistor, capacitor, voltage
+model grid {
+  param n = 15
+  node v[1..n, 1..n]: electrical
+  node feed: electrical
+  source: voltage(v = 1 V*sin(5 rad/s*t)) feed -> ground
+  Rin: resistor(R = 0.1 ohm) feed -> v[1, 1]
+  for i in 1..n { for j in 1..n {
+    C[i, j]: capacitor(C = 1 F / n / n) v[i, j] -> ground
+    init C[i, j].e = 0 V
+  } }
+  for i in 2..n { for j in 1..n { Rx[i, j]: resistor(R = 1 ohm) v[i - 1, j] -> v[i, j] } }
+  for i in 1..n { for j in 2..n { Ry[i, j]: resistor(R = 1 ohm) v[i, j - 1] -> v[i, j] } }
+}
+scene go of grid {
+  time 0 s to 1 s
+  accuracy 1e-7
+  trace v[n, n].e as far, v[1, 1].e as near
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+def test_a_grid_meets_its_exponential(tmp_path, method):
+    """One unknown a node; rows pivot with the unknowns they belong to."""
+    n = 15
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    chain[0, 0] = chain[-1, -1] = 1.0
+    matrix = -(np.kron(chain, np.eye(n)) + np.kron(np.eye(n), chain))
+    matrix[0, 0] -= 10.0
+    exact = _driven(n * n * matrix, 10.0 * n * n * np.eye(n * n)[0])
+    trace = trace_of(tmp_path, GRID, method=method)
+    assert trace["far"].values[-1] == pytest.approx(exact[n * n - 1], abs=3e-7 * trace["far"].nominal)
+    assert trace["near"].values[-1] == pytest.approx(exact[0], abs=3e-7)

@@ -1,0 +1,168 @@
+"""What a step of a large line costs: python tests/bench/steps.py [--sizes 300,3000,30000] [MODEL...]
+
+For each model of models/benchmark with `param n` and each size: unknowns as written and as stepped, CPU time of an
+accepted step of bdf and radau without rows (microseconds a section), over one integration at rtol 1e-6 or its first
+steps.  For rc_ladder beside IDA with KLU on a text of one unknown a node (peers/ladder.c), both over tolerances by half
+decades, and IDA over two policies of refactoring: the cheapest run whose error in the last voltage meets 1e-3, 1e-4,
+1e-5 of 0.2 V, its largest value; the reference is our radau at 1e-12.  Without SUNDIALS (Debian: libsundials-dev,
+libsuitesparse-dev) ours alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+sys.path.insert(0, str(Path(__file__).parent))
+from measuring import MODELS
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.running import Request, options_of, ready
+from sysdyn.cli.run.starting import start
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.simulate import simulate
+
+TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(5, 17))
+TARGETS = (1e-3, 1e-4, 1e-5)
+SIZE = 0.2
+"""Largest voltage of the ladder's last node (V): what errors are relative to."""
+REPEATED, FIRST = 3, 200
+"""Runs of which the fastest counts; steps that are timed."""
+LIBRARIES = ("ida", "nvecserial", "sunmatrixsparse", "sunlinsolklu", "generic")
+
+
+class _CaughtError(Exception):
+    """An integration that was made but not run."""
+
+
+class Line:
+    """A model at a size, ready to be integrated."""
+
+    def __init__(self, name: str, n: int, folder: Path) -> None:
+        path, report = MODELS / "benchmark" / f"{name}.sd", Report()
+        settings = (("n", str(n)),)
+        request = Request(str(path), "reference", output=str(folder / "trace.h5"), settings=settings)
+        target = targets.one(targets.read(str(path), report), str(path), None, "reference", report)
+        assert target is not None
+        with ex.fresh():
+            prepared = ready(request, target, report)
+            assert prepared is not None
+            options = options_of(request, target, prepared, report, time.monotonic(), None)
+            assert options is not None
+            self.started = start(prepared, options.t_start, report, options.redundancy)
+        self.prepared, self.options = prepared, replace(options, accuracy=None, sample_steps=False)
+
+    def integration(self, method: str, rtol: float) -> Integration:
+        """One integration, made as a simulation makes it."""
+        made: list[Integration] = []
+
+        def caught(integration: Integration, *_: object) -> None:
+            made.append(integration)
+            raise _CaughtError
+
+        options = replace(self.options, method=method, rtol=rtol)
+        with patch.object(Integration, "run", caught), suppress(_CaughtError):
+            simulate(
+                self.prepared.manifest, self.prepared.arrays, self.prepared.carrier, options,
+                start=self.started.state, facts=self.started.facts,
+            )  # fmt: skip
+        return made[0]
+
+    def run(
+        self, method: str, rtol: float, repeated: int = REPEATED, most: int = 1 << 40
+    ) -> tuple[float, int, Integration]:
+        """CPU seconds of the fastest of some runs of at most that many steps without rows, steps, the integration."""
+        least = float("inf")
+        for _ in range(repeated):
+            made = self.integration(method, rtol)
+            made.run_.contents.every_step = 0
+            began = time.process_time()
+            lib.core.sd_run_advance(made.run_, most, 1e9)
+            least = min(least, time.process_time() - began)
+        return least, made.method.contents.steps, made
+
+
+def last_voltage(made: Integration) -> float:
+    """Of the ladder: what the trace calls y_end."""
+    t = made.method.contents.t
+    y, yd, _ = made.settler.settle(t, *(x[: made.system.form.written] for x in made.method.point()))
+    names = [row.name for row in made.system.description.rows if row.block == "observe"]
+    return float(made.system.observe(t, y, yd)[names.index("y_end")])
+
+
+class Peer:
+    """peers/ladder.c; `program` None: SUNDIALS is not here."""
+
+    def __init__(self, folder: Path) -> None:
+        source = Path(__file__).parent / "peers" / "ladder.c"
+        libraries = [*(f"-lsundials_{name}" for name in LIBRARIES), "-lklu", "-lm"]
+        self.program: Path | None = folder / "ladder"
+        command = ["cc", "-O2", "-march=native", "-w", "-I/usr/include/suitesparse", str(source), "-o"]
+        if subprocess.run([*command, str(self.program), *libraries], capture_output=True, check=False).returncode:
+            self.program = None
+
+    def run(self, n: int, rtol: float, policy: str) -> tuple[float, int, float]:
+        """CPU seconds of the fastest of some, steps, last voltage."""
+        least, steps, value = float("inf"), -1, 0.0
+        for _ in range(REPEATED):
+            found = subprocess.run(
+                [str(self.program), str(n), repr(rtol), policy], capture_output=True, text=True, check=True
+            ).stdout.split()
+            least, steps, value = min(least, float(found[1])), int(found[0]), float(found[2])
+        return least, steps, value
+
+
+def race(line: Line, n: int, peer: Peer) -> None:
+    """The ladder at equal errors."""
+    exact = last_voltage(line.run("radau", 1e-12, 1)[2])
+    ours: dict[str, list[tuple[float, float]]] = {"bdf": [], "radau": []}
+    for method, found in ours.items():
+        for rtol in TOLERANCES:
+            seconds, _, made = line.run(method, rtol)
+            found.append((abs(last_voltage(made) - exact) / SIZE, seconds))
+    theirs = []
+    for rtol in TOLERANCES:
+        for policy in ("0.25", "0.01"):
+            seconds, steps, value = peer.run(n, rtol, policy)
+            theirs += [(abs(value - exact) / SIZE, seconds)] if steps > 0 else []
+    for target in TARGETS:
+        bdf, radau, ida = (
+            1e3 * min((seconds for error, seconds in runs if error <= target), default=float("nan"))
+            for runs in (*ours.values(), theirs)
+        )
+        times = f"bdf {bdf:.2f} ms, radau {radau:.2f} ms, IDA-KLU {ida:.2f} ms"
+        ratios = f"IDA/bdf {ida / bdf:.2f}, IDA/best {ida / min(bdf, radau):.2f}"
+        print(f"  error {target:.0e}: {times}; {ratios}", flush=True)
+
+
+def main() -> None:
+    """Prints a line a model, size and method."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--sizes", default="300,3000,30000")
+    parser.add_argument("models", nargs="*", default=["rc_ladder", "lc_line", "nltl"])
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        peer = Peer(Path(folder))
+        for name in asked.models:
+            for n in map(int, asked.sizes.split(",")):
+                line = Line(name, n, Path(folder))
+                for method in ("bdf", "radau"):
+                    seconds, steps, made = line.run(method, 1e-6, most=FIRST)
+                    unknowns = f"{made.system.unknowns} unknowns, {made.stepped.unknowns} stepped"
+                    each = f"{1e3 * seconds / steps:.4f} ms a step, {1e6 * seconds / steps / n:.3f} us a section"
+                    print(f"{name} {n} {method}: {unknowns}; {steps} steps, {each}", flush=True)
+                if name == "rc_ladder" and peer.program is not None:
+                    race(line, n, peer)
+
+
+if __name__ == "__main__":
+    main()
