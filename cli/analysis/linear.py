@@ -23,50 +23,19 @@ from sysdyn.compiler.binding.sensitivity import FIRST, LAST, Sensitivity
 from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
-from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
-from sysdyn.runtime.linear.pencil import motions, surely_parted, widely_parted
-from sysdyn.runtime.linear.tangent import (
-    NoLinearisation,
-    Outputs,
-    Reduced,
-    Rows,
-    Wide,
-    candidates_of,
-    chosen_states,
-    constant,
-    integral,
-    lost,
-    moving,
-    quadratures,
-    reduced,
-    rows_at,
-    widely_reduced,
-)
-from sysdyn.runtime.linear.witness import CONTRAST, Witness, agrees, spread, witness
+from sysdyn.runtime.linear.pencil import Descriptor
+from sysdyn.runtime.linear.states import constant, moving, quadratures
+from sysdyn.runtime.linear.tangent import Given, Outputs, Reduced, Wide, integral, rows_at
+from sysdyn.runtime.linear.witnessed import witnessed
 from sysdyn.runtime.model.forms import FORMS, Form
 from sysdyn.runtime.model.system import System
 
 Array = NDArray[np.float64]
 Input = tuple[str, tuple[int, ...]]
 _INPUT = re.compile(r"(.+?)(?:\[\s*(-?\d+(?:\s*,\s*-?\d+)*)\s*\])?")
-COUNTED = 200
-"""Unknowns up to which the states are counted twice."""
 MOVING = 1e-9
 """Largest rate of a state, in its size a second, that counts as rest."""
-
-
-@dataclass(frozen=True, slots=True)
-class Descriptor:
-    """E dy' = A dy + B du; dv = C dy + Cd dy' + D du; states [unknowns]: names of y."""
-
-    e: Array
-    a: Array
-    b: Array
-    c: Array
-    cd: Array
-    d: Array
-    states: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +100,10 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     by_input = tuple(
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
-    small = _witnessed(found, rows, slopes, by_input, out, labels)
+    fixed = constant(system, state)
+    still = fixed or not moving(system, state)  # the pencil of the form as written is right too
+    pencil = _descriptor(system, found, slopes, out, labels) if still else None
+    small = witnessed(Given(rows, system, state, by_input, out, labels, loose_of(found)), pencil, fixed=fixed)
     own = modes(small.a, small.decomposed)
     stores, energies = _energies(found, small, own, names)
     kept = _asked(found, names)
@@ -142,118 +114,6 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     transfers = tuple(_transfer(small, i, j) for i, j in pairs)
     moves = _felt_moves(system, small, found)
     return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves, stores, energies)
-
-
-def _witnessed(
-    found: Found,
-    rows: Rows,
-    slopes: Sequence[Sensitivity],
-    by_input: tuple[Array, ...],
-    out: Outputs,
-    labels: tuple[str, ...],
-) -> Reduced:
-    """The reduction; of linear equations one that the pencil's determinant does not contradict.  NoLinearisation."""
-    system, loose, small, why = found.system, loose_of(found), None, None
-    fixed = constant(system, found.state)
-    still = fixed or not moving(system, found.state)  # the pencil of the form as written is right too
-    pencil = _descriptor(system, found, slopes, out, labels) if still else None
-    try:
-        small = _reduced(found, rows, by_input, out, labels, loose, pencil)
-    except NoLinearisation as error:
-        why = error
-    seen = witness(pencil.e, pencil.a) if fixed and pencil is not None else None
-    if seen is not None and pencil is not None and (small is None or seen.contradicts(_values(small))):
-        if seen.certain:
-            small = _in_many_digits(found, pencil, loose, seen.states)
-            lasting = small is not None and not seen.contradicts(_values(small))
-        else:
-            other = _chosen_in_many_digits(found, rows, by_input, out, labels)
-            held = [part for part in (small, other) if part is not None and agrees(pencil.e, pencil.a, _values(part))]
-            doubtful = spread(pencil.e, pencil.a) > CONTRAST or not _singular(pencil)
-            small, lasting = held[0] if held else small, bool(held) or not doubtful
-        if not lasting:
-            raise why or _contradicted(seen)
-    if small is None:
-        assert why is not None
-        raise why
-    return small
-
-
-def _contradicted(seen: Witness) -> NoLinearisation:
-    """What is said where the modes found are not those of the equations."""
-    cause = "the modes found are not those of the equations"
-    if not seen.certain:
-        cause = "the entries of the equations, rounded, do not hold all modes"
-    return NoLinearisation(
-        f"{cause}: sizes of elements are too many decades apart; another --formulation may hold them, "
-        "or leave out the elements whose time constants are farthest from the rest"
-    )
-
-
-def _chosen_in_many_digits(
-    found: Found, rows: Rows, by_input: tuple[Array, ...], out: Outputs, labels: tuple[str, ...]
-) -> Reduced | None:
-    """The reduction by the rows that hold, its states chosen in many digits; None where there is none."""
-    try:
-        return widely_reduced(rows, found.system, found.state, by_input, out, labels, loose_of(found))
-    except NoLinearisation:
-        return None
-
-
-def _singular(form: Descriptor) -> bool:
-    """Whether the pencil leaves unknowns open, in double precision."""
-    try:
-        motions(form.e, form.a)
-    except NoLinearisation:
-        return True
-    return False
-
-
-def _values(small: Reduced) -> NDArray[np.complex128]:
-    return np.array([mode.eigenvalue for mode in modes(small.a, small.decomposed)], dtype=np.complex128)
-
-
-def _in_many_digits(found: Found, form: Descriptor, loose: NDArray[np.bool_], states: int) -> Reduced | None:
-    """The reduction of the pencil with its states chosen in many digits; None where it is too large for that."""
-    system, n = found.system, found.system.form.written
-    known = candidates_of(system, found.state, n)
-    shown = system.kinds[known] == "q"
-    groups = (known[shown & ~loose[known]], known[~shown & ~loose[known]], known[loose[known]])
-    matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
-    try:
-        small = widely_parted(matrices, (*groups, np.arange(n, len(form.states))), states)
-    except NoLinearisation:
-        return None
-    if small is None:
-        return None
-    names = tuple(form.states[int(k)] for k in small.places)
-    return replace(small, names=names, places=np.where(small.places < n, small.places, -1))
-
-
-def _reduced(
-    found: Found,
-    rows: Rows,
-    by_input: tuple[Array, ...],
-    out: Outputs,
-    labels: tuple[str, ...],
-    loose: NDArray[np.bool_],
-    pencil: Descriptor | None,
-) -> Reduced:
-    """The reduction by the rows that hold, or by the pencil where that holds too and knows more.  NoLinearisation."""
-    system, small = found.system, None
-    try:
-        small = reduced(rows, system, found.state, by_input, out, labels, loose)
-    except NoLinearisation:
-        if pencil is None:
-            raise
-    if pencil is not None and (small is None or _fewer(found, small)):
-        small = _of_pencil(found, pencil, loose)
-    assert small is not None
-    if small.unsure is not None and pencil is not None:  # the pencil may know it better
-        small = _surer(small, found, pencil, loose)
-    if small.unsure is not None:
-        precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), lost)
-    return small
 
 
 def _asked(found: Found, names: Sequence[str]) -> list[int]:
@@ -357,42 +217,6 @@ def _outputs(found: Found, slopes: Sequence[Sensitivity]) -> tuple[tuple[str, ..
 
 def _reads_ledger(expression: object) -> bool:
     return any(n.op == "var" and n.data[1] == "audit" for n in variables(expression))  # type: ignore[arg-type]
-
-
-def _fewer(found: Found, small: Reduced) -> bool:
-    """Whether the pencil, in the unit of time in which its ranks are plainest, has another number of states."""
-    y, yd = found.state.for_form(found.system)
-    jy, jyd = found.system.jacobian(found.state.t, y, yd)
-    if found.system.unknowns > COUNTED:
-        return False
-    try:
-        space = motions(found.system.dense(jyd), -found.system.dense(jy))[0]
-    except NoLinearisation:
-        return False
-    return int(space.shape[1]) != int((small.places >= 0).sum())
-
-
-def _of_pencil(found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Reduced:
-    """The reduction where constraints are hidden deeper than rows are differentiated: by the pencil itself."""
-    system = found.system
-    spaces = motions(form.e, form.a)
-    n = system.form.written
-    known = candidates_of(system, found.state, n)
-    extra = np.arange(n, len(form.states))
-    chosen = np.concatenate([chosen_states(system, spaces[0], spaces[2], known, loose), extra])[: spaces[0].shape[1]]
-    names = tuple(form.states[int(k)] for k in chosen)
-    matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
-    small = surely_parted(matrices, chosen, spaces, names)
-    return replace(small, places=np.where(small.places < n, small.places, -1))
-
-
-def _surer(small: Reduced, found: Found, form: Descriptor, loose: NDArray[np.bool_]) -> Reduced:
-    """The reduction of the pencil, where it is one in many digits with as many states."""
-    try:
-        other = _of_pencil(found, form, loose)
-    except NoLinearisation:
-        return small
-    return other if other.wide is not None and other.places.size == small.places.size else small
 
 
 def _felt_moves(system: System, small: Reduced, found: Found) -> bool:

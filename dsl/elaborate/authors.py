@@ -25,6 +25,7 @@ def told(elaborator: Elaborator, found: Iterable[Diagnostic]) -> Iterator[Diagno
 
 
 def _told(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
+    """The finding at the author's own text, where a component of the library has its place."""
     assert d.place is not None
     spaces = [s for s, _ in elaborator.bodies if s.path and _within(elaborator, s, d.place)]
     meant = [s for s in spaces if s.path == d.place.element]

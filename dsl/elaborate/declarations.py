@@ -65,6 +65,7 @@ class Declarations(Parameters):
         self.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.place(decl.span)))
 
     def _nodes(self, statement: syntax.Node) -> None:
+        """Nodes, and the members of a bundle of them."""
         bundle = self.scope.find(statement.domain.name)
         if isinstance(bundle, BundleSymbol):
             if statement.init is not None:
@@ -94,6 +95,7 @@ class Declarations(Parameters):
         return NodeSymbol(name, family, domain, place)
 
     def _coordinates(self, statement: syntax.Coord) -> None:
+        """Coordinates with their rates and conjugates; cocoord: momenta are the positions."""
         domain = self.domain(statement.domain)
         co = statement.kind == "cocoord"
         own, rate = (domain.momentum, domain.effort) if co else (domain.displacement, domain.flow)
@@ -137,6 +139,7 @@ class Declarations(Parameters):
         self.parts.initials.append(initial)
 
     def _state(self, statement: syntax.State) -> None:
+        """A dynamic variable; its unit is said, or that of its initial value."""
         decl = statement.decl
         value = None if statement.value is None else self.resolver.scalar(statement.value)
         unit = self.unit(statement.unit) if statement.unit else None
@@ -150,6 +153,7 @@ class Declarations(Parameters):
             self._own_initial(decl, "s", family, unit.dimension, init)
 
     def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:
+        """let, output, quasi: resolved when they are read first."""
         decl = statement.decl
         kind = {syntax.Let: "let", syntax.Output: "output", syntax.Quasi: "quasi"}[type(statement)]
         dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.Quasi) else None

@@ -41,6 +41,7 @@ class Elaborator(Instances):
             self.bodies.append((self.space, self._body))
 
     def _declared(self, statement: syntax.Statement) -> None:
+        """Statements that stand in components alone are refused in a model; the others declared."""
         match statement:
             case syntax.Input():
                 self.model_input(statement)

@@ -42,6 +42,7 @@ class Elements(Connections):
         self.pending: list[Pending] = []
 
     def _builtin(self, s: syntax.Instance) -> None:
+        """A one-port or two-port: its ends, its branches, its law for later."""
         kind = s.component.names[0]
         at, shape = self._label(s)
         side, value, span = self._law_argument(s, kind)
@@ -69,6 +70,7 @@ class Elements(Connections):
         self._later_ratio((one, two), at, (kind, side, value, span), (both[0], both[1]), s)
 
     def _law_argument(self, s: syntax.Instance, kind: str) -> tuple[str, syntax.Expr, syntax.Span]:
+        """Which variable the law of a builtin element gives, the expression, its place."""
         sides = ("e", "f", "p", "q") if kind in ONE_PORTS else ("e1", "e2", "f1", "f2")
         args = s.args or ()
         if len(args) != 1:
@@ -113,6 +115,7 @@ class Elements(Connections):
         ends: Ends,
         s: syntax.Instance | syntax.Law,
     ) -> None:
+        """The law is resolved when all names are known."""
         loops, bound = self.resolver.loops, self.resolver.sight()
         whole = (*symbol.family.prefix, *at)
 
@@ -140,6 +143,7 @@ class Elements(Connections):
         ends: Ends,
         place: Place,
     ) -> Branch:
+        """The branch as the compiler receives it."""
         kind, side, node = law
         name = symbol.family.name
         if ends.on is not None:
@@ -157,6 +161,7 @@ class Elements(Connections):
         ends: tuple[Ends, Ends],
         s: syntax.Instance,
     ) -> None:
+        """The ratio of a two-port is resolved when all names are known."""
         loops, bound = self.resolver.loops, self.resolver.sight()
         whole = (*branches[0].family.prefix, *at)
         kind, side, value, span = law

@@ -138,6 +138,7 @@ def watch(frame: Frame, node: Node, dimension: Dimension | None, place: Place) -
 
 
 def _actions(frame: Frame, actions: tuple[syntax.Action, ...]) -> tuple[Action, ...]:
+    """Assignments of an event, each to a state, a discrete or a flow, of its kind and dimension."""
     found: list[Action] = []
     for action in actions:
         if isinstance(action, syntax.Broken):  # its syntax was complained of
@@ -317,6 +318,7 @@ def _stick(
     place: Place,
     element: str = "",
 ) -> None:
+    """Dry friction: a set-valued effort with its bound and the sense of the motion."""
     (at, loops), (value, bound, sense) = where, what
     unit = si(NONE)
     frame.parts.constraints.append(Constraint("psi", name, at, value, loops, unit, place))
@@ -360,6 +362,7 @@ def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, N
 
 
 def _switch(frame: Frame, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:
+    """One element of a set-valued law with its watched values."""
     def of(node: Node) -> Node:
         return ex.substitute(node, change)
 

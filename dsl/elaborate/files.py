@@ -66,6 +66,7 @@ class FileScope:
         self._declare(file, self.scope)
 
     def _declare(self, file: syntax.File, scope: Scope) -> None:
+        """Units first, then every other name of a file."""
         for item in file.items:
             if isinstance(item, syntax.Broken):
                 scope.broken |= item.names
@@ -87,6 +88,7 @@ class FileScope:
         scope.symbols[symbol.name] = symbol
 
     def _unit(self, item: syntax.UnitAlias | syntax.UnitBase, scope: Scope, source: SourceText) -> None:
+        """A unit of the text: a new base, or an alias of others."""
         name = item.name.name
         if name in scope.units:
             self.report.error("E106", f"unit '{name}' is declared twice", Place(source, item.name.span))
@@ -106,6 +108,7 @@ class FileScope:
             scope.units[name] = Unit(value.dimension or NONE, Fraction(value.node.data), name)
 
     def _symbols(self, item: syntax.TopLevel, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        """The names that a top-level item declares."""
         match item:
             case syntax.Domain():
                 yield from self._domain(item, scope, source)
@@ -127,6 +130,7 @@ class FileScope:
                 yield from self._import(item, source)
 
     def _import(self, item: syntax.Import, source: SourceText) -> Iterator[Symbol]:
+        """Names of another file or of the library; what is not there is reported once."""
         module = self._module(item, source)
         if module is None:
             for word in item.names:  # reported; what hangs on them is not reported again
@@ -180,6 +184,7 @@ class FileScope:
         return scope
 
     def _domain(self, item: syntax.Domain, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        """A domain from its roles: units of effort, flow, momentum, displacement, and what is common at a node."""
         units: dict[str, Unit] = {}
         common, pseudo = "effort", None
         for part in item.body:
@@ -204,6 +209,7 @@ class FileScope:
         yield DomainSymbol(item.name.name, e, f, p, q, common, pseudo is not None, place, kinetic)
 
     def _check_domain(self, name: str, units: dict[str, Unit], pseudo: Unit | None, place: Place) -> None:
+        """E210 to E212: effort times flow is power (or what `pseudo` says), integrals have their units."""
         power = multiply(units["effort"].dimension, units["flow"].dimension)
         want = dim.POWER if pseudo is None else pseudo.dimension
         if power != want:
@@ -219,6 +225,7 @@ class FileScope:
                 self.report.error(code, message, place, help=f"its unit should be {dim.show(wanted)}")
 
     def _table(self, item: syntax.Table, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+        """A table with its data, checked when it is read."""
         heads = [(p.name, read_unit(p.unit, scope, source, self.report)) for p in item.params]
         result = read_unit(item.result, scope, source, self.report)
         units = [u for _, u in heads if u is not None]

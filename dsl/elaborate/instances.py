@@ -76,6 +76,7 @@ class Instances(Elements):
             do()
 
     def _announced(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
+        """What is to be done of an instance when it is read or its turn comes: a builtin, or a component."""
         name = s.component.names[0]
         symbol = self.scope.find(name)
         label = s.decl.name
@@ -106,6 +107,7 @@ class Instances(Elements):
     def _wait(
         self, symbol: InstanceSymbol, s: syntax.Instance, loops: tuple[syntax.For, ...], component: ComponentSymbol
     ) -> Callable[[], None]:
+        """The instance is elaborated once, by whoever needs it first."""
         here = self.current
         done: list[bool] = []
 
@@ -125,6 +127,7 @@ class Instances(Elements):
             do()
 
     def _component(self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol) -> None:
+        """One instance of a component: its path and level, then its body; E801 where it contains itself."""
         chain = (*self.current.chain, self.current.component)
         if component.name in chain:
             around = (*chain[chain.index(component.name) :], component.name)
@@ -152,6 +155,7 @@ class Instances(Elements):
     def _fill(
         self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: list[Nested]
     ) -> None:
+        """Arguments and connections, then the statements of the body, in the space of the instance."""
         head = Head(body)
         with self._unread(any(isinstance(statement, syntax.Broken) for statement, _ in body)):
             arguments = self._arguments(s, component, head, space)

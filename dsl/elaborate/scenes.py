@@ -131,6 +131,7 @@ class SceneReader:
         return syntax.Negative(number, value.span) if isinstance(value, syntax.Negative) else number
 
     def _set_parameter(self, symbol: ParameterSymbol, found: Located, s: syntax.Set) -> None:
+        """A parameter, or elements of one, with its new value."""
         parameter = self.model.parts.parameters[symbol.family.name]
         value = self.resolver.resolve(self._bare(s.value, symbol.dimension or NONE))
         items = value.items if isinstance(value, Vector) else (value,)
@@ -158,6 +159,7 @@ class SceneReader:
         self.model.parts.parameters[parameter.name] = replace(parameter, values=nodes, indices=(), place=place)
 
     def _check_setting(self, symbol: ParameterSymbol, value: Typed, s: syntax.Set) -> None:
+        """E207: a setting is of the kind and the dimension of its parameter."""
         if value.truth != symbol.truth:
             raise self.resolver.fail(
                 "E207", f"'{symbol.name}' is {'a condition' if symbol.truth else 'a number'}", s.value.span
@@ -214,6 +216,7 @@ class SceneReader:
         self._once("redundancy", s.name.name, s.span)
 
     def _solver(self, s: syntax.Solver) -> None:
+        """The method and its options."""
         self._choice(s.name, SOLVERS, "solver")
         self._once("solver", s.name.name, s.span)
         options = []
@@ -266,6 +269,7 @@ class SceneReader:
             self.guarded(self._item, item)
 
     def _item(self, item: syntax.TraceItem) -> None:
+        """One traced expression under its name; E905 where it does not exist or is an array."""
         with self.resolver.leniently(), self.resolver.unknown_as("E905", "trace '{}' does not exist"):
             value = self.resolver.resolve(item.expr)
         if isinstance(value, Vector):
@@ -290,6 +294,7 @@ class SceneReader:
         self.observations.append(Observation(name, scaled, unit, text, self.resolver.place(item.span)))
 
     def _traced_unit(self, item: syntax.TraceItem, value: Typed) -> Unit:
+        """The unit in which a quantity is recorded; E208 where it is of another dimension."""
         if item.unit is None:
             return si(value.dimension or NONE)
         unit = read_unit(item.unit, self.model.space.scope, self.resolver.source, self.report)
@@ -301,6 +306,7 @@ class SceneReader:
         return unit
 
     def _accuracy(self, s: syntax.Accuracy) -> None:
+        """What a run promises, and of which quantities."""
         value = self._constant(s.value, NONE, "the accuracy")
         self._once("accuracy", value, s.span)
         if value.op == "const" and not FINEST_ACCURACY <= value.data < 1.0:

@@ -53,6 +53,7 @@ def solve_units(
 
 
 def _equation(unit: syntax.Unit, given: Dimension, name: str, space: Space) -> Equation:
+    """What a unit with variables says of their exponents, and the dimension left for them."""
     exponents: dict[str, Fraction] = {}
     rest = given
     for factor in unit.factors:

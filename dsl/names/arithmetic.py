@@ -19,6 +19,7 @@ class Arithmetic(Context):
     """Sums, products, powers and conditions, with the dimensions of their operands."""
 
     def _sum(self, e: syntax.Sum) -> Value:
+        """Terms of one dimension, or vectors of one length; E203 names the two that differ."""
         values = [self.resolve(t) for _, t in e.terms]
         if any(isinstance(v, Vector) for v in values):
             return self._vector_sum(e, values)
@@ -50,6 +51,7 @@ class Arithmetic(Context):
         return Vector(tuple(total or ()))
 
     def _product(self, e: syntax.Product) -> Value:
+        """Factors and divisors; at most one is a vector."""
         nodes: list[tuple[float, Node]] = []
         dimension: Dimension | None = NONE
         vector: Vector | None = None
@@ -89,6 +91,7 @@ class Arithmetic(Context):
         return Typed(ex.neg(value.node), value.dimension)
 
     def _power(self, e: syntax.Power) -> Value:
+        """The exponent is a number without unit, and a rational constant where the base has a unit (E204)."""
         base, exponent = self.scalar(e.base), self.scalar(e.exponent)
         if exponent.dimension not in (None, NONE):
             raise self.fail("E204", f"the exponent is in {dim.show(exponent.dimension)}", e.exponent.span)
@@ -105,6 +108,7 @@ class Arithmetic(Context):
         return Typed(ex.power(base.node, exponent.node), dimension)
 
     def _compare(self, e: syntax.Compare) -> Value:
+        """Two numbers of one dimension compared; conditions and arrays are not (E203)."""
         left, right = self.resolve(e.left), self.resolve(e.right)
         if isinstance(left, Vector) or isinstance(right, Vector):
             raise self.fail("E203", "arrays are not compared", e.span)

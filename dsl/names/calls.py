@@ -60,6 +60,7 @@ class Calls(Context):
         return False
 
     def _unrolled(self, e: syntax.Reduction, first: Node, last: Node) -> Value:
+        """A reduction whose body takes elements of a list: written out, so that its bounds must be numbers (E806)."""
         if not (ex.is_const(first) and ex.is_const(last)):
             message = "the body takes elements of a list, so the bounds must be numbers"
             raise self.fail("E806", message, e.span, help="an array with a formula for its elements")
@@ -85,6 +86,7 @@ class Calls(Context):
         return total
 
     def _call(self, e: syntax.Call) -> Value:
+        """A call of a function of the text, a table or a function of the language."""
         for arg in e.args:
             if arg.name is not None:
                 raise self.fail("E404", f"functions take their arguments by position, not '{arg.name} ='", arg.span)
@@ -112,6 +114,7 @@ class Calls(Context):
         return self._builtin(e)
 
     def _builtin(self, e: syntax.Call) -> Value:
+        """A function of the language: its arguments counted, their dimensions checked."""
         name = e.name
         count, _ = dim.FUNCTIONS[name]
         values: list[Typed] = []
@@ -146,6 +149,7 @@ class Calls(Context):
         raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)
 
     def _vector_call(self, e: syntax.Call) -> Value:
+        """dot, cross, norm: of vectors of one length."""
         wanted = 1 if e.name == "norm" else 2
         values = [self.resolve(a.value) for a in e.args]
         if len(values) != wanted or not all(isinstance(v, Vector) for v in values):
@@ -177,6 +181,7 @@ class Calls(Context):
         return Typed(ex.table(symbol.name, *self._arguments(symbol.name, symbol.arguments, e)), symbol.result)
 
     def _function(self, symbol: FunctionSymbol, e: syntax.Call) -> Value:
+        """A function of the text: its body with the arguments in place; E105 where it calls itself."""
         definition, name = symbol.definition, symbol.name
         units = [read_unit(p.unit, symbol.file_scope, symbol.source, self.report) for p in definition.params]
         result = read_unit(definition.result, symbol.file_scope, symbol.source, self.report)

@@ -112,6 +112,7 @@ def _source(
 
 
 def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> Failed:
+    """E302: the two variables are no edge of the diagram; what to write instead."""
     pair = frozenset((side, other))
     if pair == frozenset("pq"):
         help_ = "write it as a dissipator e = M(s)*f with M = dp/dq, and s the state of dynamic s' = label.f"

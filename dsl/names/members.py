@@ -87,6 +87,7 @@ class Members(Names):
         return None
 
     def _inside(self, base: Located, e: syntax.Member) -> Located | None:
+        """What `base.name` stands for where base is a bundle or an instance; None where it has no such member."""
         symbol = base.symbol
         if isinstance(symbol, BundleNode):
             member = symbol.members.get(e.name)
@@ -141,6 +142,7 @@ class Members(Names):
     # -- elements ------------------------------------------------------------------------------------------
 
     def _item(self, e: syntax.Item) -> Value:
+        """`x[i]`: an element of a parameter, an unknown, a definition or a vector."""
         found = self.located(e)
         if found is not None:
             symbol = found.symbol
@@ -173,6 +175,7 @@ class Members(Names):
     # -- members -------------------------------------------------------------------------------------------
 
     def _member(self, e: syntax.Member) -> Value:
+        """`base.name`: a meter of the audit, something declared inside an instance, or a quantity of what base is."""
         if isinstance(e.base, syntax.Name) and e.base.name == "audit" and self.scope.find("audit") is None:
             return self._audit(e)
         whole = self.located(e)
@@ -220,6 +223,7 @@ class Members(Names):
         return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=help_)
 
     def _quantity_of(self, base: Located, e: syntax.Member) -> Value:
+        """The quantity `e.name` of a coordinate, constraint, node, branch or instance."""
         symbol = base.symbol
         shown = self._shown(e.base)
         match symbol:
@@ -267,6 +271,7 @@ class Members(Names):
         return base.indices
 
     def _coordinate(self, symbol: UnknownSymbol, base: Located, e: syntax.Member) -> Value:
+        """e, f, p or q of a coordinate, in the letters of its family."""
         at = (*symbol.family.prefix, *self.indices(symbol.name, symbol.shape, base.indices))
         family = symbol.family.name
         assert symbol.domain is not None
@@ -426,6 +431,7 @@ class Members(Names):
         return [b for b in self.branches if b.name == path or b.name.startswith(f"{path}.")]
 
     def _instance(self, symbol: InstanceSymbol, base: Located, e: syntax.Member) -> Value:
+        """A member of an instance: a quantity of its branch, or what its component declares."""
         space, change = self.entered(symbol, base, e.base.span)
         branch = space.scope.symbols.get("")
         if isinstance(branch, BranchSymbol) and e.name in BRANCH:
@@ -449,6 +455,7 @@ class Members(Names):
     # -- constraints ---------------------------------------------------------------------------------------
 
     def _constraint_member(self, symbol: ConstraintSymbol, base: Located, e: syntax.Member) -> Value:
+        """The residual of a constraint, or its multiplier."""
         at = (*symbol.family.prefix, *(self.index(i) for i in base.indices))
         at = tuple(ex.substitute(a, base.change) for a in at)
         constraint, expression = self.constraint(symbol, at, e.span)
@@ -486,6 +493,7 @@ class Members(Names):
         raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
 
     def _method(self, e: syntax.Method) -> Value:
+        """`label.on(x)`: the effort of a constraint on a coordinate."""
         base = self.located(e.base)
         symbol = None if base is None else base.symbol
         wrong = not isinstance(symbol, ConstraintSymbol) or symbol.kind == "gamma"

@@ -50,6 +50,7 @@ class Names(Context):
         return Typed(ex.const(e.value), None if e.value == 0.0 else NONE)
 
     def _quantity(self, e: syntax.Quantity) -> Value:
+        """A number with its unit, in SI."""
         unit = read_unit(e.unit, self.scope, self.source, self.report)
         if unit is None:
             raise Failed
@@ -89,6 +90,7 @@ class Names(Context):
         return self._predefined(e.name, e.span) if symbol is None else self.value(symbol, e.span)
 
     def _predefined(self, name: str, span: syntax.Span) -> Value:
+        """What a word of the language itself stands for: t, pi, inf."""
         match name:
             case "t":
                 return Typed(ex.time(), dim.TIME)
@@ -192,6 +194,7 @@ class Names(Context):
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
 
     def _template(self, symbol: Definition) -> Value:
+        """The expression of a definition, resolved once where it was written; E105 where it needs itself."""
         if symbol in self._active:
             chain = [s.name for s in self._active[self._active.index(symbol) :]] + [symbol.name]
             place = Place(symbol.space.source, symbol.span)

@@ -38,6 +38,7 @@ def read_unit(unit: syntax.Unit, scope: Scope, source: SourceText, report: Repor
 
 
 def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: Place, report: Report) -> None:
+    """Report a factor of a unit that nobody declared, with what is near."""
     if factor.name.startswith("$"):
         report.error(
             "E209",

@@ -178,6 +178,7 @@ class Contacts:
         return bool(self.barred[k])
 
     def _unilateral(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
+        """Whether a contact is wrong as it is: one that holds pulls, or one that is open closes."""
         zero = self.observer.zero
         if self.active[k]:
             least = zero(c.multiplier)  # and an impulse is one over the time in which things change
@@ -192,6 +193,7 @@ class Contacts:
         )
 
     def _friction(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
+        """Whether friction is wrong as it is: what sticks is beyond its bound, or what slides turns back."""
         zero, sense = self.observer.zero, float(self.p[c.sense])
         if values[c.bound] == 0.0:  # no friction: it does not hold, whatever holds the bodies (a latch, another law)
             return bool(self.active[k] or sense == 0.0)

@@ -9,7 +9,7 @@ from inputs alone.  With S = [E V, A W]^-1 the pencil falls apart (Berger, Ilchm
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,19 @@ class _Ranks:
         below = max(float(sigma[rank]) if rank < sigma.size else 0.0, 1e-16)
         self.gap = min(self.gap, float(np.log10(above / below)))
         return rank
+
+
+@dataclass(frozen=True, slots=True)
+class Descriptor:
+    """E dy' = A dy + B du; dv = C dy + Cd dy' + D du; states [unknowns]: names of y."""
+
+    e: Floats
+    a: Floats
+    b: Floats
+    c: Floats
+    cd: Floats
+    d: Floats
+    states: tuple[str, ...]
 
 
 def _image(matrix: Floats, ranks: _Ranks) -> Floats:

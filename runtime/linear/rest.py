@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.linear.tangent import quadratures
+from sysdyn.runtime.linear.states import quadratures
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System

@@ -17,7 +17,6 @@ Receives a System, a consistent state, the slopes by inputs and of outputs.  Han
 from __future__ import annotations
 
 from collections.abc import Callable
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -25,8 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.linear import precise
+from sysdyn.runtime.linear.states import Mask, candidates_of, chosen_states, pivots, rank_of
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, least_squares
@@ -41,8 +40,6 @@ NOISE = 1e-13
 """Of the largest variation, in equilibrated unknowns: what is smaller is round-off of the solution."""
 PASSES, MOVES = 2, 1e-13
 """Of the scaling of unknowns; the part of a unit vector that is no round-off."""
-OWN = 10.0
-"""Preference for the flow or momentum of a coordinate whose displacement is a state."""
 ORDERS = 4
 """Slopes by an input are taken by its integral, itself, its rate and its second rate."""
 
@@ -53,9 +50,6 @@ class NoLinearisation(Exception):  # noqa: N818
     def __init__(self, message: str, names: tuple[str, ...] = ()) -> None:
         self.names = names
         super().__init__(message)
-
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +103,27 @@ class Rows:
     holds: Mask
 
 
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What is reduced: rows at a state of a system; by_input: slopes of these rows by the integrals of inputs, inputs,
+    their rates, second rates [rows, inputs]; out: of the outputs; names: of the inputs; loose [unknowns]: what nothing
+    depends on.
+    """
+
+    rows: Rows
+    system: System
+    state: ConsistentState
+    by_input: tuple[Floats, ...]
+    out: Outputs
+    names: tuple[str, ...]
+    loose: Mask
+
+    def right(self, rows: NDArray[Any]) -> Floats:
+        """What these of the rows that hold move by the inputs [rows, integrals, inputs, rates, second rates]."""
+        found = -self.rows.starter.with_sums(np.hstack(self.by_input))[self.rows.holds]
+        return np.asarray(found[rows])
+
+
 def rows_at(system: System, state: ConsistentState) -> Rows:
     """Every row that holds at consistent states, linearised; system: the form as written."""
     starter = Starter(system, measuring=True)
@@ -145,94 +160,23 @@ def _null_space(matrix: Floats) -> Floats:
     return np.asarray(vt[count(sigma, CERTAIN) :].T)
 
 
-def candidates_of(system: System, state: ConsistentState, n: int) -> NDArray[np.int64]:
-    """Places of y that may be states: displacements, momenta, dynamic variables, flows with inertia and no momentum."""
-    _, jyd = system.jacobian(state.t, state.y, state.yd)
-    moving = system.differential(jyd)[:n]
-    moving[system.form.k_q] = True
-    kinds = system.kinds[:n]
-    families = system.description.families
-    carried = {f.owner for f in families if f.kind == "p"}
-    bare = np.array([families[int(k)].owner not in carried for k in system.family_of[:n]], dtype=bool)
-    return np.flatnonzero(moving & (np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & bare)))
-
-
-def _pivots(matrix: Floats, number: int) -> NDArray[np.int64]:
-    """The rows of a matrix [m, n] that are farthest from each other's spans, one after the other (ascending)."""
-    from scipy.linalg import qr
-
-    _, _, order = qr(matrix.T, mode="economic", pivoting=True)
-    return np.sort(order[:number].astype(np.int64))
-
-
-def _rank(part: Floats) -> int:
-    """Rank of rows of orthonormal columns: potentials that differ little from each other are two."""
-    return int((decomposed(part)[1] > CERTAIN).sum()) if part.size else 0
-
-
-def chosen_states(
-    system: System, tangent: Floats, units: Floats, candidates: NDArray[np.int64], loose: Mask
-) -> NDArray[np.int64]:
-    """States [k] of orthonormal directions [unknowns, k] in these units: as many displacements as are free, then what
-    moves beside them, of the same coordinates if it can be, what nothing depends on (loose) last; of what is alike
-    that which moves most.
-    """
-    n = system.form.written
-    size = np.linalg.norm(tangent[:n], axis=1) * units[:n]
-    most = group_maximum(system, size)
-    weight = np.where(most > 0.0, size / np.where(most > 0.0, most, 1.0), 0.0)[:, None]
-    shown = system.kinds[candidates] == "q"
-    kept: list[int] = []
-    for group in (shown & ~loose[candidates], ~shown & ~loose[candidates], loose[candidates]):
-        members = candidates[group]
-        left = tangent @ _null(tangent[kept])
-        coordinates = {_coordinate(system, k) for k in kept}
-        near = np.array([OWN if _coordinate(system, int(k)) in coordinates else 1.0 for k in members])
-        part = left[members] * near[:, None] * weight[members]
-        kept += members[_pivots(part, _rank(left[members]))].tolist() if part.size else []
-    return np.array(kept, dtype=np.int64)
-
-
-def _null(rows: Floats) -> Floats:
-    """Directions that some rows of orthonormal columns do not see."""
-    return np.asarray(decomposed(rows)[2][_rank(rows) :].T) if rows.size else np.eye(rows.shape[1])
-
-
-def _coordinate(system: System, place: int) -> tuple[str, int]:
-    """Coordinate of an unknown: its family's owner, its position there."""
-    k = int(system.family_of[place])
-    return system.description.families[k].owner, place - int(system.form.at[k])
-
-
-def reduced(
-    rows: Rows,
-    system: System,
-    state: ConsistentState,
-    by_input: tuple[Floats, ...],
-    out: Outputs,
-    names: tuple[str, ...],
-    loose: Mask,
-) -> Reduced:
-    """The reduction; by_input: slopes of the start's rows by the integrals of inputs, inputs, their rates, second rates
-    [rows, inputs]; names: of the inputs; loose [unknowns]: what nothing depends on.
-
-    Raises NoLinearisation.
-    """
+def reduced(given: Given) -> Reduced:
+    """The reduction.  Raises NoLinearisation."""
+    rows, system, loose = given.rows, given.system, given.loose
     starter, n = rows.starter, rows.starter.n
     g = rows.jacobian[rows.holds]
     tangent, moves = _tangent(g, factors(g)[1])
-    candidates = candidates_of(system, state, n)
+    candidates = candidates_of(system, given.state, n)
     part = tangent[candidates]
-    rank = _rank(part)
+    rank = rank_of(part)
     chosen = chosen_states(system, tangent, moves, candidates, loose)
     rates = _rates(starter, system, chosen)
     _refuse_undetermined(system, tangent, part, chosen, rates, rank)
-    inputs = len(names)
-    right = np.zeros((g.shape[0], chosen.size + ORDERS * inputs))
-    right[:, chosen.size :] = -starter.with_sums(np.hstack(by_input))[rows.holds]
+    right = np.zeros((g.shape[0], chosen.size + ORDERS * len(given.names)))
+    right[:, chosen.size :] = given.right(np.arange(g.shape[0]))
 
     def made(moved: NDArray[Any], noise: float = NOISE) -> Reduced:
-        return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose, noise)
+        return _without_rates_of_inputs(given, moved, rates, chosen, noise)
 
     small = made(_moved(g, right, chosen, moves))
     again = precise.shaken(g)
@@ -244,24 +188,17 @@ def reduced(
     return replace(small, unsure=made(_moved(again, right, chosen, moves), NOISE).a)
 
 
-def widely_reduced(
-    rows: Rows,
-    system: System,
-    state: ConsistentState,
-    by_input: tuple[Floats, ...],
-    out: Outputs,
-    names: tuple[str, ...],
-    loose: Mask,
-) -> Reduced | None:
+def widely_reduced(given: Given) -> Reduced | None:
     """The same with the states chosen in many digits too; None where it is too large or round-off decides their number.
 
     Raises NoLinearisation.
     """
+    rows, system, loose = given.rows, given.system, given.loose
     starter = rows.starter
     g = rows.jacobian[rows.holds]
     if g.shape[1] > WIDEST:
         return None
-    known = candidates_of(system, state, starter.n)
+    known = candidates_of(system, given.state, starter.n)
     shown = system.kinds[known] == "q"
     groups = (known[loose[known]], known[~shown & ~loose[known]], known[shown & ~loose[known]])
     units = factors(g)[1]
@@ -276,12 +213,12 @@ def widely_reduced(
     still = np.zeros((held.size, g.shape[1]))
     still[np.arange(held.size), held] = 1.0
     g, again = (np.vstack([part[used], still]) for part in (g, again))
-    right = np.zeros((g.shape[0], chosen.size + ORDERS * len(names)))
-    right[: used.size, chosen.size :] = -starter.with_sums(np.hstack(by_input))[rows.holds][used]
+    right = np.zeros((g.shape[0], chosen.size + ORDERS * len(given.names)))
+    right[: used.size, chosen.size :] = given.right(used)
     rates = _rates(starter, system, chosen)
 
     def made(moved: NDArray[Any], noise: float) -> Reduced:
-        return _without_rates_of_inputs(moved, rates, starter, system, chosen, names, out, loose, noise)
+        return _without_rates_of_inputs(given, moved, rates, chosen, noise)
 
     return _widened(chosen.size, made, (g, again, right, chosen, units))
 
@@ -359,7 +296,7 @@ def _moved(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -
     scaled, aim = row[:, None] * scaled, row[:, None] * right
     aim[:, :states] -= scaled[:, chosen] / moves[chosen]
     matrix = scaled[:, rest]
-    kept = _pivots(matrix, rest.size) if matrix.shape[0] >= rest.size else np.zeros(0, dtype=np.int64)
+    kept = pivots(matrix, rest.size) if matrix.shape[0] >= rest.size else np.zeros(0, dtype=np.int64)
     found = np.zeros((moves.size, right.shape[1]))
     found[rest] = _eliminated(matrix, aim, kept)
     found[rest] = np.where(np.abs(found[rest]) > NOISE * np.abs(found[rest]).max(axis=0, initial=0.0), found[rest], 0.0)
@@ -411,17 +348,10 @@ def _refuse_undetermined(
 
 
 def _without_rates_of_inputs(
-    moved: NDArray[Any],
-    rates: NDArray[np.int64],
-    starter: Starter,
-    system: System,
-    chosen: NDArray[np.int64],
-    inputs: tuple[str, ...],
-    out: Outputs,
-    loose: Mask,
-    noise: float,
+    given: Given, moved: NDArray[Any], rates: NDArray[np.int64], chosen: NDArray[np.int64], noise: float
 ) -> Reduced:
     """The matrices of variations `moved` [z, states and inputs and their rates]."""
+    starter, system, inputs, out = given.rows.starter, given.system, given.names, given.out
     states, n = chosen.size, starter.n
     yd = np.zeros((n, moved.shape[1]), dtype=moved.dtype)
     yd[starter.rates] = moved[n:]
@@ -430,7 +360,7 @@ def _without_rates_of_inputs(
     size = np.abs(out.by_y) @ np.abs(moved[:n]) + np.abs(out.by_rate) @ np.abs(yd)
     seen = np.where(np.abs(seen) > noise * size, seen, 0.0)
     slopes = moved[rates]
-    slopes[:, :states][:, loose[chosen]] = 0.0
+    slopes[:, :states][:, given.loose[chosen]] = 0.0
     cut = [0, states, *(states + k * len(inputs) for k in range(1, ORDERS + 1))]
     a, b_, b0, b1, b2 = (slopes[:, i:j] for i, j in pairwise(cut))
     c, d_, d0, d1, d2 = (seen[:, i:j] for i, j in pairwise(cut))
@@ -451,35 +381,3 @@ def _without_rates_of_inputs(
 def integral(name: str) -> str:
     """The name of the state that is the integral of an input."""
     return f"integral of {name}"
-
-
-def quadratures(system: System, tangible: AbstractSet[str]) -> Mask:
-    """Unknowns that nothing depends on [unknowns as written]: displacements of coordinates that are not tangible,
-    dynamic variables that stand in no row but their own.
-    """
-    settled = system.another("settled")
-    n = system.form.written
-    columns = settled.pattern.columns_of()[settled.structural()[0]]
-    read = np.zeros(settled.unknowns, dtype=bool)
-    read[columns] = True
-    families, kinds = system.description.families, system.kinds[:n]
-    owners = np.array([families[int(k)].owner in tangible for k in system.family_of[:n]], dtype=bool)
-    found: Mask = ((kinds == "q") & ~owners) | ((kinds == "s") & ~read[:n])
-    return found
-
-
-def moving(system: System, state: ConsistentState) -> bool:
-    """Whether any differential unknown moves."""
-    yd = state.yd.copy()
-    yd[system.form.k_q] = state.y[system.form.k_f]
-    places = candidates_of(system, state, system.form.written)
-    return bool(np.abs(yd[places]).max(initial=0.0) > 0.0)
-
-
-def constant(system: System, state: ConsistentState) -> bool:
-    """Whether the pencil is the same beside the state: linear equations, whose frozen pencil is right in motion too."""
-    random = np.random.default_rng(5)
-    here = system.jacobian(state.t, state.y, state.yd)
-    y, yd = (v + np.maximum(np.abs(v), 1.0) * random.uniform(0.1, 0.3, v.size) for v in (state.y, state.yd))
-    there = system.jacobian(state.t + 0.37, y, yd)
-    return all(np.allclose(one, two, rtol=1e-12, atol=0.0) for one, two in zip(here, there, strict=True))

@@ -204,6 +204,7 @@ def _kernel(value: Mapping[str, Any]) -> Kernel:
 
 
 def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
+    """A family of rows from the manifest, its size from the binding."""
     label = str(value.get("label") or value.get("name") or "")
     return RowFamily(
         block=str(value["block"]),
@@ -223,6 +224,7 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
 
 
 def _family(value: Mapping[str, Any], shape: Shape) -> Family:
+    """A family of unknowns from the manifest, its size from the binding."""
     if value["kind"] not in KINDS:
         raise ContractError(f"family {value['name']}: unknown kind {value['kind']!r}")
     nominal = value.get("nominal")
@@ -237,6 +239,7 @@ def _family(value: Mapping[str, Any], shape: Shape) -> Family:
 
 
 def _initial(value: Mapping[str, Any], names: Mapping[str, int]) -> Initial:
+    """Initial values of one statement from the binding."""
     family = value["family"]
     return Initial(
         family=names[family] if isinstance(family, str) else int(family),

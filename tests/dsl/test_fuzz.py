@@ -55,9 +55,9 @@ def damaged(random_, text):
 
 def check(text):
     source = SourceText("fuzz.sd", text)
-    begin = time.perf_counter()
+    begin = time.process_time()
     tree, found = parse(source)
-    assert time.perf_counter() - begin < 2.0
+    assert time.process_time() - begin < 2.0
     for item in found:
         assert item.code in codes()
         assert 0 <= item.place.span.start <= item.place.span.end <= len(text)

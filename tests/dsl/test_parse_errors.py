@@ -228,9 +228,9 @@ def test_every_word_of_a_body_is_known_to_the_messages():
 
 
 def quickly(text, limit=6.0):
-    start = time.perf_counter()
+    start = time.process_time()
     found = parse(SourceText("t", text))[1]
-    assert time.perf_counter() - start < limit
+    assert time.process_time() - start < limit
     return [item.code for item in found]
 
 

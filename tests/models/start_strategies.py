@@ -53,11 +53,17 @@ def _started(name, document, scene, formulation, report=None):
         return prepared, start(prepared, 0.0 if begin is None else prepared.binding.evaluate(begin), report)
 
 
+def prepared_start(text, formulation, scene=None, report=None):
+    """A text prepared without a compiler, and its start; None where there is none."""
+    report = Report() if report is None else report
+    document = load.document(decode("model.sd", io.BytesIO(text.encode())), report)
+    return _started("model.sd", document, scene, formulation, report)
+
+
 def started(text, formulation):
     """The start of a text, which must have one."""
     report = Report()
-    document = load.document(decode("model.sd", io.BytesIO(text.encode())), report)
-    _, begun = _started("model.sd", document, None, formulation, report)
+    _, begun = prepared_start(text, formulation, report=report)
     assert begun is not None, list(report)
     return begun
 

@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from model_runs import FOUR, attempt, trace_of
+from random_starts import judged
 from reduced import ROOT
 from start_strategies import strategies
 from sysdyn.cli.options import EVERY
@@ -65,3 +66,12 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     assert sought(ran.started.state) == "the start was found with all unknowns at once (all_unknowns)"
     assert Trace.open(tmp_path / "trace.h5").attributes["start_strategy"] == "all_unknowns"
     assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]} | {PERTURBED_STAGE}
+
+
+def test_random_circuits_partly_said_begin_alike_in_all_formulations():
+    """Of 300: 275 agree, 18 contradict themselves, 7 differ by 2e-5 to 1.5e-2 of the largest content."""
+    seeds = range(300 if os.environ.get("SYSDYN_LONG") else 12)
+    verdicts = [judged(seed) for seed in seeds]
+    differ = [verdict for verdict in verdicts if verdict not in {"agree", "refused"}]
+    assert len(differ) <= 0.025 * len(verdicts), differ
+    assert verdicts.count("agree") > 0.8 * len(verdicts)

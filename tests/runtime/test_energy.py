@@ -81,7 +81,7 @@ def test_order_twelve():
     for h in (1.0, 0.5):
         columns = energy(models.mass_spring(), 10.0, fixed_step=h, h_max=2.0)[1]
         errors.append(abs(columns["q_x"][-1] - oscillation(10.0)))
-    assert observed(errors)[0] == pytest.approx(12.0, abs=0.6)
+    assert observed(errors)[0] == pytest.approx(12.0, abs=0.2)
     errors = []
     for h in (0.8, 0.4):
         columns = energy(minimal(), 8.0, fixed_step=h, h_max=2.0)[1]
