@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes as c
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -266,9 +267,10 @@ class Condensed:
         lib.core.sd_condensed_bind(c.byref(self.condensed), c.byref(self.core))
 
     @property
-    def key(self) -> tuple[int, int, int]:
-        """What of it an order of elimination depends on, beside the whole form."""
-        return self.unknowns, self.rows, self.pattern.entries
+    def key(self) -> tuple[int | bytes, ...]:
+        """What of it an order of elimination and places in matrices depend on, beside the whole form."""
+        parts = self.kept, self.kept_rows, self.pattern.column, self.pattern.row
+        return self.unknowns, sha256(b"".join(part.tobytes() for part in parts)).digest()
 
     def rates(self) -> Ints:
         """Numbers of kept unknowns whose derivatives occur."""

@@ -92,7 +92,7 @@ class Settler:
         n, k = self._left.unknowns, int(self.rates.size)
         self._n, self._moves = n, n + k
         self.pattern: Pattern
-        self._key = () if condensed is None else condensed.key
+        self._key: tuple[object, ...] = () if condensed is None else condensed.key
         self.pattern, self._slots, self._sort = settled.once(
             ("saddle", *self._key), lambda: (*self._saddle(), self._sorts())
         )

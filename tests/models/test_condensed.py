@@ -5,6 +5,7 @@ import pytest
 from model_runs import FOUR, trace_of
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
+from sysdyn.api import load
 from sysdyn.cli.main import run
 from sysdyn.runtime.condense import condensed as condensing
 from sysdyn.runtime.integrate import integrate
@@ -182,3 +183,17 @@ def test_a_grid_meets_its_exponential(tmp_path, method):
     trace = trace_of(tmp_path, GRID, method=method)
     assert trace["far"].values[-1] == pytest.approx(exact[n * n - 1], abs=3e-7 * trace["far"].nominal)
     assert trace["near"].values[-1] == pytest.approx(exact[0], abs=3e-7)
+
+
+@pytest.mark.parametrize("small", [1e-9, 0.0])
+def test_a_resistor_of_a_row_may_vanish(tmp_path, small):
+    """Its law defines no current then: it stays, the others leave; runs of one loaded text follow each other."""
+    text = LADDER.replace("param n", "param r[1..n] = 1 ohm\n  param n").replace("(1 ohm + 1 ohm*i/n)/n", "r[i] / n")
+    text = text.replace("(1 F + 0.5 F*i/n)/n", "1 F / n").replace("R[n/2].f as current, ", "")
+    path = tmp_path / "ladder.sd"
+    path.write_text(text)
+    model = load(str(path), scene="go")
+    ends = [float(model.run(set={"r[7]": f"{r!r} ohm"})["end"].values[-1]) for r in (1.0, small, 1e-6, 1.0)]
+    assert ends[0] == ends[3]
+    assert ends[1] == pytest.approx(ends[2], abs=1e-6)
+    assert abs(ends[1] - ends[0]) > 1e-4
