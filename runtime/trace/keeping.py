@@ -57,13 +57,12 @@ class Held:
         """Takes rows [k, 8 + 2 observed]."""
         if rows.size:
             self._rows.append(rows)
-            self._met.take(rows)
 
     def flush(self) -> None:
         """There is nothing behind."""
 
     def seen(self) -> dict[str, float]:
-        """Largest magnitude of each stored quantity."""
+        """Largest magnitude of each stored quantity of a finished trace."""
         return self._met.largest()
 
     def finish(
@@ -72,6 +71,8 @@ class Held:
         """The trace as `Trace.open` would read it from a file."""
         if self.closed:
             return
+        for some in self._rows:  # of runs that are not kept nobody asks
+            self._met.take(some)
         layout = self._layout
         width = BEFORE + 2 * layout.observed
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
