@@ -25,8 +25,6 @@ SINGULAR_VALUES = 120
 """Unknowns up to which singular values are used."""
 SMALL = 32
 """Rows and unknowns up to which a problem that the core knows is solved there."""
-MET = 1e-10
-"""Scaled residual with which a small problem is left to the core's answer."""
 DENSE = 400
 """Unknowns up to which matrices are full (no SciPy)."""
 RANK = 1e-11
@@ -273,8 +271,7 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) 
     if problem.core is not None:
         small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
         found = _in_core(problem, problem.core, x, (most, folds), measure=not small)
-        # a large one that holds is not linearised; a small one that does not has other ways here
-        if found.residual <= (MET if small else _ROUND_OFF):
+        if small or found.residual <= _ROUND_OFF:  # a large one that holds is not linearised
             return found
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
         return _solve(problem, x, most, folds)

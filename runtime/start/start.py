@@ -362,10 +362,12 @@ PERTURBED_STAGE = "perturbed_stage"
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
     """The first strategy that holds from the staged state, and its name; the least residual and "" where none does."""
+    starter.plain = True
     x, plain = _stages(starter, t, guess.copy(), guess, free)
     x = _beside_gammas(starter, t, x, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
+        starter.plain = name == "newton"
         found, holds = strategy(starter, t, x, guess, free)
         if holds:
             return found, name if plain or name != "newton" else PERTURBED_STAGE

@@ -106,6 +106,7 @@ class Starter:
         self.remember = remember  # one search for a start: nothing but t and x changes
         self.known: dict[str, tuple[float, bytes, NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
+        self.plain = True  # small problems are searched in the core, which has one way of least change
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         self.given = _given(system)
@@ -414,7 +415,7 @@ def weighted(
         scale=scale,
         weight=weight,
         work=starter.work,
-        core=None if starter.summed else (starter.core, t),
+        core=(starter.core, t) if starter.plain and not starter.summed else None,
         check=starter.settled.failure.check,
     )
 
