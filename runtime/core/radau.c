@@ -8,7 +8,6 @@
 
 #define ITERATIONS 7       /* of Newton a step */
 #define PATIENT 30         /* the same where the step is fixed: nothing is gained by giving up early */
-#define TRIES 2            /* failures in a step behind which corrections are shortened: a smaller step is the cheaper remedy */
 #define DAMPED 15          /* with corrections shortened */
 #define WALK 45            /* with whole ones: back down an exponential of all digits, one 1/a each, and a few more */
 #define SAFETY 0.9
@@ -317,13 +316,6 @@ static double correct(sd_radau *radau)
     return n ? sqrt(sum / (3.0 * n)) : 0.0; /* nothing may move: samples alone */
 }
 
-/* stages of a step that changes nothing */
-static void from_last_point(sd_radau *radau)
-{
-    for (int s = 0; s < SD_STAGES; s++)
-        memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
-}
-
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 static int iterate(sd_radau *radau, int full, int *used, double *retry)
 {
@@ -334,10 +326,6 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
     int most = patient ? PATIENT : ITERATIONS, converged = 0;
     for (int m = 1; m <= most + (radau->system->scales > 0); m++) {
         int cause = residuals(radau);
-        if (cause == SD_NONFINITE && m == 1 && radau->system->scales > 0) { /* extrapolated too far */
-            from_last_point(radau);
-            cause = residuals(radau);
-        }
         if (cause)
             return cause;
         if (converged && rows_hold(radau, tolerance, 0))
@@ -438,7 +426,8 @@ static int iterate_damped(sd_radau *radau, int *used)
     double size;
     int cause = residuals(radau);
     if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
-        from_last_point(radau);
+        for (int s = 0; s < SD_STAGES; s++)
+            memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
         cause = SD_FINE;
     }
     for (int m = 1; m <= WALK && cause == SD_FINE; m++) {
@@ -585,15 +574,6 @@ static void project(sd_radau *radau)
             radau->slope[0][i] = radau->yd[i] = radau->point_d[i];
 }
 
-/* stages that the step begins with: extrapolated, but where laws are steep and that led nowhere the last point */
-static void guess(sd_radau *radau, int again)
-{
-    if (again && radau->system->scales > 0)
-        from_last_point(radau);
-    else
-        sd_radau_extrapolate(radau, radau->h);
-}
-
 int sd_radau_step(sd_radau *radau)
 {
     int singular = 0, iterations = 0, failures = 0, leap = 0;
@@ -611,7 +591,7 @@ int sd_radau_step(sd_radau *radau)
         int cause = SD_FINE;
         retry = 0.5;
         int fresh = !radau->old_jacobian;
-        guess(radau, failures > 0 && leap != 1);
+        sd_radau_extrapolate(radau, radau->h);
         if (!radau->ready || radau->h != radau->h_factored)
             cause = factorise(radau, failures > 0 || leap == 1);
         if (cause == SD_FINE) {
@@ -619,7 +599,7 @@ int sd_radau_step(sd_radau *radau)
             cause = iterate(radau, failures > 1 || leap == 1, &iterations, &retry);
         }
         int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
-        if (stuck && leap != 1 && radau->system->scales > 0 && failures >= TRIES) {
+        if (stuck && leap != 1 && radau->system->scales > 0) {
             sd_radau_extrapolate(radau, radau->h);
             cause = iterate_damped(radau, &iterations);
             fresh = 1;
@@ -668,7 +648,7 @@ int sd_radau_step(sd_radau *radau)
         }
     }
     radau->cause = SD_FINE;
-    radau->creeping = failures > (radau->system->scales > 0 ? TRIES : 0) && error < IDLE ? radau->creeping + 1 : 0;
+    radau->creeping = failures > 0 && error < IDLE ? radau->creeping + 1 : 0;
     accept(radau, error, iterations);
     if (radau->project)
         project(radau);

@@ -109,15 +109,16 @@ static double measure(sd_settle *settle, double t, const double *y, const double
     return worst;
 }
 
-/* slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms */
-static void slopes(sd_settle *settle, double t, const double *y, const double *yd)
+/* Slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms.  met: the point is one of
+ * the motion, with which magnitudes grow; an iterate may be anywhere. */
+static void slopes(sd_settle *settle, double t, const double *y, const double *yd, int met)
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
     sd_jacobian(system, t, y, yd, settle->jy, settle->jyd);
     memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
     settle->ready = NONE;
-    for (int32_t j = 0; j < n + rates; j++) { /* magnitudes grow with what is met */
+    for (int32_t j = 0; j < n + rates && met; j++) {
         double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
         if (size > settle->scale[j] && isfinite(size))
             settle->scale[j] = size;
@@ -143,7 +144,7 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
-    slopes(settle, t, y, yd);
+    slopes(settle, t, y, yd, 1);
     memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
     for (int32_t e = 0; e < system->entries; e++) {
         double scale = settle->row_scale[system->row[e]];
@@ -169,12 +170,12 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
 }
 
 /* the basis at (t, y, yd) */
-static int choose(sd_settle *settle, double t, const double *y, const double *yd)
+static int choose(sd_settle *settle, double t, const double *y, const double *yd, int met)
 {
     const sd_system *system = settle->system;
     int32_t entries = settle->basis_column[settle->rows];
     double *value = settle->basis_value;
-    slopes(settle, t, y, yd);
+    slopes(settle, t, y, yd, met);
     memset(value, 0, (size_t)entries * sizeof *value);
     for (int32_t e = 0; e < system->entries; e++) {
         double scale = settle->row_scale[system->row[e]];
@@ -220,7 +221,7 @@ static double move_basic(sd_settle *settle, double *y, double *yd, double *state
 static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
     double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
-    int fresh = settle->ready != BASIS, failed = fresh && choose(settle, t, y, yd);
+    int fresh = settle->ready != BASIS, failed = fresh && choose(settle, t, y, yd, 1);
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
@@ -236,13 +237,13 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
             break;
         }
         if (!failed && now > CONTRACTS * before && now > fmax(FINE, limit)) {
-            failed = choose(settle, t, y, yd);
+            failed = choose(settle, t, y, yd, 0);
             fresh = 1;
         }
         before = now;
     }
     *best = before;
-    if (!failed && before <= fmax(FINE, settle->enough)) {
+    if (!failed && before <= fmax(CLOSE, settle->enough)) { /* near a law's flat place round-off leaves much */
         settle->refused = 0;
         return 1;
     }

@@ -119,7 +119,9 @@ def _same_rows(left, t, n, _):
     assert np.abs(r[np.setdiff1d(defining, gone)]).max() < 1e-13 * scale
     jy, _ = whole.jacobian(t, y, yd)
     dense = np.zeros((left.rows, left.unknowns))
-    dense[left.pattern.row, left.pattern.columns_of()] = left.values(jy)
+    products = np.zeros(left.pattern.entries)
+    np.add.at(products, left._to, left._share * jy[left._from])
+    dense[left.pattern.row, left.pattern.columns_of()] = products
     moved = random.normal(size=left.unknowns)
     y2 = y.copy()
     y2[left.kept] += moved
