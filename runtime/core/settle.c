@@ -40,7 +40,6 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, in
     settle->rates = rates;
     settle->rows = system->rows;
     settle->hold = 1.0;
-    settle->slack = -1.0;
     settle->jy = settle->memory;
     settle->jyd = settle->jy + nnz;
     settle->row_scale = settle->jyd + nnz;
@@ -337,7 +336,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     memcpy(settle->x0, y, (size_t)n * sizeof *y);
     for (int32_t k = 0; k < settle->rates; k++)
         settle->x0[n + k] = yd[settle->rate[k]];
-    if (settle->basis && settle->slack >= 0.0 && settle->hold == 1.0 && settle->refused < REFUSALS) {
+    if (settle->basis && settle->hold == 1.0 && settle->refused < REFUSALS) {
         if (follow(settle, t, y, yd, &best)) {
             finish(settle, t, y, yd, 1);
             return 0;

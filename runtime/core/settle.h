@@ -42,8 +42,7 @@ typedef struct sd_settle {
     double *lift, *basis_value;      /* [unknowns + rates] 1 / weight; [entries of the pattern] */
     double hold;                     /* weight of the state; 1 but in a second attempt */
     double enough;                   /* scaled residual with which a draft is content; 0: round-off */
-    double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ; below
-                                        0 none is sought */
+    double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ */
     int32_t ready;                   /* whose factors stand: 0 none, else of the matrix or the basis */
     int32_t refused;                 /* attempts by the basis that led nowhere */
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the

@@ -114,4 +114,3 @@ def joined(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Int
     found[np.searchsorted(every, instants)] = kinds
     found[np.searchsorted(every, compared)] |= COMPARED
     return every, found
-

@@ -101,7 +101,7 @@ class Integration:
         # what leaves a flow open between contacts is shared by the least change; steep laws magnify what a basis leaves
         if request.events is None and not system.form.scales:
             sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
-            self.settler.core.contents.slack = SLACK * request.tolerance if sums else 0.0
+            self.settler.by_basis(SLACK * request.tolerance if sums else 0.0)
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         self._stepper()
         self._driver()

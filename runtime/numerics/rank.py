@@ -11,14 +11,12 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.equilibrate import SMALL
 
 TOLERANCE = 1e-9
 """Singular values below this part of the largest count as zero."""
 CERTAIN = 1e-12
 """The same where a model is refused for it: what is above may be a true, if bad, conditioning."""
-
-SMALL = 32
-"""Rows and columns up to which the core does it (core/dense.h): calls cost more than arithmetic."""
 
 
 class NotFiniteError(ArithmeticError):

@@ -157,7 +157,6 @@ class Settler:
             raise MemoryError
         core = self.core.contents
         core.weight = lib.pointer(self._weight)
-        self._widen()
         core.rate = lib.pointer(self.rates)
         names = ("slot_y", "slot_y_t", "slot_yd", "slot_yd_t", "slot_x", "slot_r")
         for name, slot in zip(names, self._slots, strict=True):
@@ -180,12 +179,14 @@ class Settler:
         full[with_rate] = slots[1]
         return found, [slots[0], full], tall_order(found)
 
-    def _widen(self) -> None:
+    def by_basis(self, slack: float) -> None:
+        """Points settle within a basis where the state moves by no more than slack, in magnitudes (core/settle.h)."""
         self._wide = self.system.once(("basis", *self._key), self._basis)
         pattern, slots, order = self._wide
         arrays = (pattern.column, pattern.row, order, *slots)
         if lib.core.sd_settle_widen(self.core, *(lib.pointer(item) for item in arrays)):
             raise MemoryError
+        self.core.contents.slack = slack
 
     @property
     def address(self) -> int:
