@@ -7,7 +7,7 @@ dropped; anything else is an equation on the initial state, a row of block `init
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations, Pin, Unknowns
@@ -16,6 +16,7 @@ from sysdyn.compiler.forms.momenta import resolve
 from sysdyn.compiler.model.energies import EnergyModel, Target
 from sysdyn.compiler.model.terms import counter, local_variables, split, without_nested
 from sysdyn.dsl.model.expression import Node, add, call, const, sub, substitute, time_derivative, var, variables
+from sysdyn.values import dataclass
 
 TURNED = ("kinetic", "potential", "dissipated", "supplied")
 """Members of the audit whose magnitudes make up what went round."""

@@ -12,7 +12,7 @@ Returned: an EnergyModel and notes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from sysdyn.compiler.model.mirror import PRIMAL, Mirror
 from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
@@ -21,6 +21,7 @@ from sysdyn.dsl.model.expression import Node, derivative, substitute, topologica
 from sysdyn.dsl.model.network import Loop, Network, Shape
 from sysdyn.dsl.model.units import multiply, si_text
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,12 +7,12 @@ A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from sysdyn.dsl.model.expression import Node, is_const, topological
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

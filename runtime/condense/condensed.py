@@ -7,7 +7,6 @@ whose sums read stretches of families become one loop each, whatever their numbe
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
@@ -19,6 +18,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
+from sysdyn.values import dataclass
 
 LEAST = 50
 """Unknowns from which it is worth the trouble."""

@@ -13,13 +13,13 @@ early and grows.  Two runs that took the same steps say nothing: a third takes s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.values import dataclass
 
 RUNS = 7
 COARSEST = 1e-2

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.values import dataclass
 
 LONGEST = 0.05
 """Longest step as part of the span: short events of sources are met, and the dense output stays honest."""

@@ -7,7 +7,7 @@ numbers of the runs.  Handed back: `Finished`.  A run without a result (`state` 
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from sysdyn.runtime.simulate import alternatives, counted, formed
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, Structure
+from sysdyn.values import dataclass
 
 MOST = 48
 """Instants of comparison that are taken of a run's steps, at most twice that (core/many.c)."""

@@ -7,13 +7,14 @@ hands on a `Description`: unknown families, row families, blocks with their kern
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.failures import ContractError, RowLabel
 from sysdyn.runtime.model.switches import Switches
+from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

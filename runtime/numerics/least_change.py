@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
+from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 SINGULAR_VALUES = 120

@@ -10,7 +10,7 @@ the one that found it stays with the state.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
@@ -30,6 +30,7 @@ from sysdyn.runtime.numerics.least_change import (
 )
 from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of, row_scale
+from sysdyn.values import dataclass
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6

@@ -12,7 +12,6 @@ from __future__ import annotations
 import ctypes as c
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.equations import Equations
+from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
