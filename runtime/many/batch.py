@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import accuracy
-from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, RATIO, STRETCH
+from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, STRETCH
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
@@ -148,8 +148,8 @@ class Batch:
         self._targets = self._wanted()
         finest = float(np.min(self._targets, initial=1.0))
         tolerance = law.tolerance(finest if finest < 1.0 else 1e-4)
-        draft = min(max(tolerance, law.finest) / RATIO, LOOSEST)
-        fine = max(min(tolerance, RATIO * draft), law.finest)
+        draft = min(max(tolerance, law.finest) / law.ratio, LOOSEST)
+        fine = max(min(tolerance, law.ratio * draft), law.finest)
         longest = FREELY if free and way.method == "dopri" and keep == END else LONGEST
         try:
             self.passes = tuple(self._pass(k, (draft, fine)[k], longest) for k in (0, 1))
