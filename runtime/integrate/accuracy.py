@@ -41,6 +41,8 @@ SHORT, SHORT_CREDIT = 60, 0.75
 FIRST_DROP = 1e-2
 AIM, LEFT = 2.0, 0.3
 """How far below what was asked the next run aims, and the most that is left of its tolerance."""
+SLOWEST = 0.75
+"""The least power with which errors are taken to fall when the next tolerance is chosen."""
 STRETCH = 1.5
 """Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
 differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
@@ -267,7 +269,7 @@ class _Estimate:
 
         What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
         """
-        power = self.law.power if self._power is None else max(self._power, 0.5)
+        power = self.law.power if self._power is None else max(self._power, SLOWEST)
         drop = (1.0 / max(AIM * self.over, 1e-300)) ** (1.0 / power)
         least = FIRST_DROP if self._power is None else 1e-3
         return max(float(np.clip(drop, least, LEFT)) * tolerance, self.law.finest)
