@@ -70,6 +70,7 @@ class Equations:
     stored: bool = False  # a traced quantity (of block observe)
     fixed: bool = False  # of block initial
     written: bool = True  # of block initial: whether the text says it
+    content: bool = False  # of block initial: what a store holds
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,7 +101,8 @@ def add_initials(
     for equation in equations:
         target = equation.target
         said = Equations("initial", "initial", equation.owner, "initial", target.unit, target.place, fixed=target.fixed)
-        assembly.family(replace(said, label=target.store or said.label, written=not target.store))
+        content = bool(target.store)
+        assembly.family(replace(said, label=target.store or said.label, written=target.said, content=content))
         at = tuple(counter(k) for k in range(len(target.nest)))
         residual = resolve(model, carriers, sub(target.target, target.value))
         for term in without_nested(split(residual, target.nest, target.place), "an initial condition"):

@@ -74,7 +74,7 @@ class Offset:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; store: whose content, where unsaid."""
+    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; store, unit, said: as in `Initial`."""
 
     target: Node
     value: Node
@@ -83,6 +83,7 @@ class Target:
     place: Place
     store: str = ""
     unit: str = "1"
+    said: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +222,7 @@ def _dynamics(network: Network) -> Iterator[Row]:
 def _initials(network: Network) -> Iterator[Target]:
     for i in network.initials:
         nest, (target, value) = canonical(i.loops, flows(i.target), flows(i.value))
-        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit)
+        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit, i.said)
 
 
 def _quantities(network: Network) -> Iterator[Quantity]:

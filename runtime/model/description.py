@@ -78,7 +78,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class RowFamily:
-    """Rows of one label.  name, stored, rate: of the rows of block observe; fixed, written: of block initial."""
+    """Rows of one label.  name, stored, rate: of rows of block observe; fixed, written, content: of block initial."""
 
     block: str
     label: str
@@ -93,6 +93,7 @@ class RowFamily:
     rate: bool
     fixed: bool
     written: bool
+    content: bool
 
     @property
     def size(self) -> int:
@@ -221,6 +222,7 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
         rate=bool(value.get("rate", False)),
         fixed=bool(value.get("fixed", True)),
         written=bool(value.get("written", True)),
+        content=bool(value.get("content", False)),
     )
 
 
