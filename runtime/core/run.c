@@ -72,20 +72,26 @@ static void sample(sd_run *run, double t)
 }
 
 /* int_0^to of the polynomial of degree `nodes` that is 1 at node k and 0 at the others and at the step's start (k -1: at
- * the start), by Gauss's rule of degree 3 */
+ * the start), by Gauss's rule of degree 3 or 7 */
 static double share(const sd_stepper *stepper, int32_t k, double to)
 {
-    static const double gauss = 0.28867513459481288225; /* 1/(2 sqrt(3)) */
+    static const double gauss[2][4] = {{-0.28867513459481288225, 0.28867513459481288225},
+                                       {-0.43056815579702628761, -0.16999052179242812840, 0.16999052179242812840,
+                                        0.43056815579702628761}};
+    static const double weight[2][4] = {{0.5, 0.5},
+                                        {0.17392742256872692869, 0.32607257743127307131, 0.32607257743127307131,
+                                         0.17392742256872692869}};
+    int high = stepper->nodes > 3;
     double sum = 0.0, own = k < 0 ? 0.0 : stepper->node[k];
-    for (int side = -1; side <= 1; side += 2) {
-        double s = to * (0.5 + side * gauss), value = 1.0;
+    for (int p = 0; p < (high ? 4 : 2); p++) {
+        double s = to * (0.5 + gauss[high][p]), value = 1.0;
         for (int32_t j = -1; j < stepper->nodes; j++) {
             double other = j < 0 ? 0.0 : stepper->node[j];
             value *= j == k ? 1.0 : (s - other) / (own - other);
         }
-        sum += value;
+        sum += weight[high][p] * value;
     }
-    return 0.5 * to * sum;
+    return to * sum;
 }
 
 /* the method's own quadrature over the part `part` of the last step */

@@ -154,9 +154,14 @@ class Integration:
         system = self.system.another(name)
         return Settler(system, kinematics, self.magnitude[:n], self._time, state, self._light[:n], left)
 
+    def _stages(self) -> tuple[int, int]:
+        """Of radau: in the first step, at most."""
+        return self.request.stages
+
     def _stepper(self) -> None:
         request = self.request
-        self.method = Method(request.method, self.stepped, self.linear, self._order, self.underlying)
+        first, most = self._stages()
+        self.method = Method(request.method, self.stepped, self.linear, self._order, self.underlying, most)
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._met = np.zeros(self.system.unknowns)
@@ -168,7 +173,9 @@ class Integration:
         self._tell(method)
         if request.method == "bdf":
             method.max_order = request.max_order
-        elif request.method != "radau":
+        elif request.method == "radau":
+            method.stages = first
+        else:
             method.patience = request.stiff_steps
         if request.method == "energy":
             self._audit = self.system.observer("audit")
