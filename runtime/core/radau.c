@@ -20,6 +20,14 @@
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
 #define LEAP 8.0           /* the next one is tried that much longer, with fresh slopes at its end */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
+#define WITHIN -0.183
+#define FINEST 5e-12       /* of the estimate: less is round-off */
+#define FEWER 3            /* failures of Newton's in a step from which on each takes stages away */
+#define AWHILE 2           /* steps accepted before the number of stages changes again */
+#define CHANGED 1.2        /* what another one must be worth beside the present one */
+#define LONGER 2.0         /* the first step of more stages beside the last one at most */
+#define FASTEST 0.3        /* contraction with which a longer step is counted on */
+#define BESIDE 2.0         /* iterations' worth of a step besides: slopes and factors */
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
 #define KEEP_HIGH 1.2
@@ -86,11 +94,13 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     size_t number = sizeof vectors / sizeof *vectors, sets = sizeof of_stages / sizeof *of_stages;
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
     radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
+    radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
     radau->gz = calloc(pairs * m + nnz, sizeof(double complex));
-    if (!radau->memory || !radau->gz) {
+    if (!radau->memory || !radau->gz || !radau->gap) {
         sd_radau_free(radau);
         return NULL;
     }
+    sd_radau_gaps(radau->gap);
     double *next = radau->memory;
     for (size_t i = 0; i < number; i++, next += m)
         *vectors[i] = next;
@@ -122,6 +132,7 @@ void sd_radau_free(sd_radau *radau)
         return;
     free(radau->memory);
     free(radau->gz);
+    free(radau->gap);
     free(radau);
 }
 
@@ -184,6 +195,19 @@ static void show_nodes(sd_radau *radau)
     radau->stepper.node_weight = used->b;
 }
 
+/* Values within a step of more stages may be as far off as its estimate says (where constraints make multipliers), and
+ * shall fall like those of three, with rtol^0.85: the estimate counts within * rtol^(2/3 - 0.85) times. */
+static const double within[SD_METHODS] = {0.0, 0.2, 0.02};
+
+/* Of Newton's corrections, in units of the unknowns' */
+static const double round_off[SD_METHODS] = {10.0, 40.0, 160.0};
+
+/* what the estimate of a method counts beside that of three stages */
+static double strictness(const sd_radau *radau, const sd_radau_method *method)
+{
+    return radau->strict[method - sd_radau_methods];
+}
+
 /* 1 / order of the estimate's error in the step */
 static double power_of(const sd_radau *radau)
 {
@@ -199,6 +223,8 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     for (int32_t i = 0; i < radau->n; i++)
         radau->tested += radau->test[i] >= 0;
     radau->tolerance = fmax(0.1 * pow(radau->rtol, 2.0 / 3.0), 1e-13);
+    for (int k = 0; k < SD_METHODS; k++)
+        radau->strict[k] = fmax(1.0, fmin(within[k] * pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
     memmove(radau->phi, y, size);
     memmove(radau->yd, yd, size);
     memcpy(radau->slope[0], radau->yd, size);
@@ -404,10 +430,17 @@ static int iterations_of(const sd_radau *radau)
     return ITERATIONS + MORE * (radau->method->stages - 3);
 }
 
+/* Of Newton's corrections in its weights; stages of more have larger round-off */
+static double newton_tolerance(const sd_radau *radau)
+{
+    double least = round_off[radau->method - sd_radau_methods] * DBL_EPSILON / radau->tolerance;
+    return fmax(least, fmin(0.03, sqrt(radau->tolerance)));
+}
+
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 static int iterate(sd_radau *radau, int full, int *used, double *retry)
 {
-    double tolerance = fmax(10.0 * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
+    double tolerance = newton_tolerance(radau);
     double before = 0.0, ratio_before = 0.0, trust = 1.0;
     int patient = full || radau->fixed_h > 0.0;
     *retry = 0.5;
@@ -510,7 +543,7 @@ static int full_correction(sd_radau *radau, double *size)
  * scale of its terms. */
 static int iterate_damped(sd_radau *radau, int *used)
 {
-    double tolerance = fmax(10.0 * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
+    double tolerance = newton_tolerance(radau);
     double size;
     int cause = residuals(radau);
     if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
@@ -544,7 +577,7 @@ static int iterate_damped(sd_radau *radau, int *used)
 static int estimate_error(sd_radau *radau, double *error)
 {
     int32_t n = radau->n;
-    double *v = radau->rate;
+    double *v = radau->rate, strict = strictness(radau, radau->method);
     memcpy(radau->y, radau->phi, (size_t)n * sizeof(double));
     for (int again = 0;; again++) {
         combine(radau->method->stages, n, radau->method->estimate, radau->z, v);
@@ -557,11 +590,12 @@ static int estimate_error(sd_radau *radau, double *error)
             radau->ee[i] = -radau->ee[i];
         sd_linear_solve(radau->linear, radau->ee);
         *error = tested_norm(radau, radau->ee);
-        if (!(*error >= 1.0) || again || !(radau->taken == 0 || radau->rejected))
+        if (!(*error * strict >= 1.0) || again || !(radau->taken == 0 || radau->rejected))
             break;
         for (int32_t i = 0; i < n; i++)
             radau->y[i] = radau->phi[i] + (radau->test[i] >= 0 ? radau->ee[i] : 0.0);
     }
+    *error *= strict;
     *error = isfinite(*error) ? fmax(*error, 1e-10) : INFINITY;
     return SD_FINE;
 }
@@ -590,8 +624,65 @@ static void note_pulls(sd_radau *radau)
     }
 }
 
+/* The length of step beside the last one, for each unit of work, that a method would take where its estimate of the
+ * last step had been `error`; iterations: Newton's in the last step.  Its contraction grows with the step. */
+static double worth(const sd_radau *radau, const sd_radau_method *method, double error, int iterations, int troubled,
+                    double *length_taken)
+{
+    double length = SAFETY * pow(fmax(error, 1e-10), -1.0 / (method->stages + 1));
+    double theta = radau->theta, needed = iterations;
+    length = fmax(SHRINK, fmin(GROWTH, length));
+    if (troubled)
+        length = fmin(length, 1.0);
+    if (theta > 0.0 && theta < 1.0) {
+        length = fmin(length, fmax(FASTEST / theta, 1.0));
+        if (length > 1.0)
+            needed *= log(theta) / log(fmin(length * theta, FASTEST));
+    }
+    *length_taken = length;
+    return length / (method->stages * (needed + BESIDE));
+}
+
+/* The method of the next step, whose size so far is `next`: the one that gets on best for its work, as the decay of
+ * Taylor's coefficients in the last step (z) tells the errors of its neighbours; the size of its step. */
+static double choose(sd_radau *radau, double next, double error, int iterations, int troubled)
+{
+    const sd_radau_method *method = radau->method;
+    double size[2], length, h = radau->h;
+    if (radau->most_stages == 3 || radau->since < AWHILE)
+        return next;
+    for (int k = 0; k < 2; k++) {
+        combine(method->stages, radau->n, method->taylor[k], radau->z, radau->rate);
+        size[k] = tested_norm(radau, radau->rate);
+    }
+    if (!(size[0] > 0.0) || !isfinite(size[1]))
+        return next;
+    double best = worth(radau, method, error, iterations, troubled, &length) * CHANGED;
+    if (method->stages > 3) {
+        const sd_radau_method *lower = method - 1;
+        double low = worth(radau, lower, lower->constant * size[0] * strictness(radau, lower), iterations, troubled,
+                           &length);
+        if (low > best) {
+            best = low;
+            radau->method = lower;
+            next = length * h;
+        }
+    }
+    if (method->stages < radau->most_stages && !troubled) {
+        double decay = fmin(size[1] / size[0], 1.0), ratio = (method + 1)->constant / method->constant * decay * decay;
+        ratio *= strictness(radau, method + 1) / strictness(radau, method);
+        if (worth(radau, method + 1, error * ratio, iterations, 0, &length) > best) {
+            radau->method = method + 1;
+            next = fmin(length, LONGER) * h;
+        }
+    }
+    if (radau->method != method)
+        radau->since = radau->ready = 0;
+    return next;
+}
+
 /* the new point, and the next step's size */
-static void accept(sd_radau *radau, double error, int iterations)
+static void accept(sd_radau *radau, double error, int iterations, int troubled)
 {
     size_t size = (size_t)radau->n * sizeof(double);
     const sd_radau_method *method = radau->method;
@@ -608,6 +699,9 @@ static void accept(sd_radau *radau, double error, int iterations)
     double next = h / ratio;
     if (radau->rejected)
         next = fmin(next, h);
+    radau->since++;
+    if (!(radau->fixed_h > 0.0))
+        next = choose(radau, next, error, iterations, troubled);
     double *oldest = radau->before, *slope = radau->slope[2];
     radau->before = radau->last;
     radau->last = oldest;
@@ -621,7 +715,7 @@ static void accept(sd_radau *radau, double error, int iterations)
     radau->h_before = radau->h_used;
     radau->h_used = h;
     note_pulls(radau);
-    for (int s = 0; s < radau->method->stages; s++) {
+    for (int s = 0; s < method->stages; s++) {
         combine(method->stages, radau->n, method->inverse[s], radau->z, radau->stage_d[s]);
         for (int32_t i = 0; i < radau->n; i++) {
             radau->stage[s][i] = radau->phi[i] + radau->z[s][i];
@@ -631,13 +725,12 @@ static void accept(sd_radau *radau, double error, int iterations)
     memcpy(radau->phi, radau->stage[method->stages - 1], size);
     memcpy(radau->yd, radau->stage_d[method->stages - 1], size);
     memcpy(radau->slope[0], radau->yd, size);
-    for (int s = 0; s < radau->method->stages; s++) {
+    for (int s = 0; s < method->stages; s++) {
         double *swap = radau->kept[s];
         radau->kept[s] = radau->z[s];
         radau->z[s] = swap;
     }
     radau->used = method;
-    radau->since++;
     show_nodes(radau);
     double t = radau->t + h;
     radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;
@@ -737,13 +830,17 @@ int sd_radau_step(sd_radau *radau)
             radau->h *= cause == SD_NEWTON ? retry : 0.25;
             if (++failures > 2)
                 radau->h *= 0.5;
+            if (failures >= FEWER && radau->method->stages > 3) {
+                radau->method--;
+                radau->since = 0;
+            }
             radau->old_jacobian = 0;
             radau->rejected = 1;
         }
     }
     radau->cause = SD_FINE;
     radau->creeping = failures > 0 && error < IDLE ? radau->creeping + 1 : 0;
-    accept(radau, error, iterations);
+    accept(radau, error, iterations, failures > 0);
     if (radau->project)
         project(radau);
     return SD_FINE;

@@ -40,6 +40,8 @@ typedef struct sd_radau_method {
     double complex columns[SD_PAIRS][SD_STAGES], rows[SD_PAIRS][SD_STAGES];
     double estimate[SD_STAGES];
     double lift[SD_STAGES + 1]; /* of x, x^2, ...: zero at 0 and 1, slope 1 at 0 and none at any node */
+    double taylor[2][SD_STAGES]; /* by z: Taylor coefficients s-1 and s of the stages' polynomial in the middle */
+    double constant;             /* the estimate over Taylor coefficient s+1 */
 } sd_radau_method;
 
 extern const sd_radau_method sd_radau_methods[SD_METHODS];
@@ -58,6 +60,7 @@ typedef struct sd_radau {
                                                * SD_UNPULLED: and is interpolated whatever pulls */
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
+    double strict[SD_METHODS]; /* what the estimate of each method counts beside the first one's */
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
     int32_t ready, old_jacobian, rejected;
     const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */
@@ -73,6 +76,7 @@ typedef struct sd_radau {
     double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it */
     double *point, *point_d;  /* [written and more] */
     double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
+    double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
     double complex *w[SD_PAIRS], *gz;
     /* what happened */
@@ -95,6 +99,8 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle);
 /* 1: between the nodes of the step at hand, whose stages are z, a steep law is beyond all magnitudes: the step passes
  * over something that happens.  Works in y, rate, d[0] and terms. */
 int sd_radau_astray(sd_radau *radau);
+/* 1 / (node i - node j) of 0, c_1, ..., c_s */
+void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1]);
 /* z [stages] of a step of size h from the last step's polynomial */
 void sd_radau_extrapolate(sd_radau *radau, double h);
 

@@ -5,20 +5,44 @@
 
 #define PULLED 4.0 /* steps resolve what is slower: measured on HIRES, whose rows within steps were 30 times worse */
 
-/* Lagrange weights of the nodes 0, c_1, ..., c_s = 1 at x, and their derivatives by x */
-static void lagrange(const sd_radau_method *method, double x, double *value, double *slope)
+void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
 {
-    double node[SD_STAGES + 1] = {0.0};
-    for (int i = 0; i < method->stages; i++)
-        node[i + 1] = method->c[i];
+    for (int k = 0; k < SD_METHODS; k++) {
+        const sd_radau_method *method = &sd_radau_methods[k];
+        for (int i = 0; i <= method->stages; i++)
+            for (int j = 0; j <= method->stages; j++)
+                gap[k][i][j] = i == j ? 0.0 : 1.0 / ((i ? method->c[i - 1] : 0.0) - (j ? method->c[j - 1] : 0.0));
+    }
+}
+
+/* Lagrange weights of the nodes 0, c_1, ..., c_s = 1 at x */
+static void lagrange_value(const sd_radau *radau, const sd_radau_method *method, double x, double *value)
+{
+    const double(*gap)[SD_STAGES + 1] = radau->gap[method - sd_radau_methods];
+    double far[SD_STAGES + 1] = {x};
+    for (int j = 0; j < method->stages; j++)
+        far[j + 1] = x - method->c[j];
+    for (int i = 0; i <= method->stages; i++) {
+        value[i] = 1.0;
+        for (int j = 0; j <= method->stages; j++)
+            value[i] *= j == i ? 1.0 : far[j] * gap[i][j];
+    }
+}
+
+/* the same, and their derivatives by x */
+static void lagrange(const sd_radau *radau, const sd_radau_method *method, double x, double *value, double *slope)
+{
+    const double(*gap)[SD_STAGES + 1] = radau->gap[method - sd_radau_methods];
+    double far[SD_STAGES + 1] = {x};
+    for (int j = 0; j < method->stages; j++)
+        far[j + 1] = x - method->c[j];
     for (int i = 0; i <= method->stages; i++) {
         double v = 1.0, d = 0.0;
         for (int j = 0; j <= method->stages; j++) {
             if (j == i)
                 continue;
-            double q = 1.0 / (node[i] - node[j]);
-            d = (d * (x - node[j]) + v) * q;
-            v *= (x - node[j]) * q;
+            d = (d * far[j] + v) * gap[i][j];
+            v *= far[j] * gap[i][j];
         }
         value[i] = v;
         slope[i] = d;
@@ -49,16 +73,17 @@ static void hermite(int count, const double *x, double t, double *value, double 
 
 /* weights of z [stages], of h y' at the start in by_slope, of the polynomial of the stages and that slope at x, and their
  * derivatives by x */
-static void lifted(const sd_radau_method *method, double x, double *value, double *slope, double *by_slope)
+static void lifted(const sd_radau *radau, double x, double *value, double *slope, double *by_slope)
 {
+    const sd_radau_method *method = radau->used;
     double zero[SD_STAGES + 1], begin[SD_STAGES + 1], l = 0.0, ld = 0.0;
     for (int k = method->stages; k >= 0; k--) {
         ld = ld * x + (k + 1) * method->lift[k];
         l = l * x + method->lift[k];
     }
     l *= x;
-    lagrange(method, x, value, slope);
-    lagrange(method, 0.0, zero, begin);
+    lagrange(radau, method, x, value, slope);
+    lagrange(radau, method, 0.0, zero, begin);
     for (int i = 0; i <= method->stages; i++) {
         value[i] -= l * begin[i];
         slope[i] -= ld * begin[i];
@@ -98,7 +123,7 @@ static void between_stages(const sd_radau *radau, double t, double *y, double *y
 {
     int last = radau->used->stages - 1;
     double h = radau->h_used, v[SD_STAGES + 1], d[SD_STAGES + 1], by[2];
-    lifted(radau->used, (t - (radau->t - h)) / h, v, d, by);
+    lifted(radau, (t - (radau->t - h)) / h, v, d, by);
     for (int32_t i = 0; i < radau->n; i++)
         if (led(radau, i)) {
             double end = radau->phi[i] - radau->last[i], slope = radau->slope[1][i];
@@ -117,7 +142,7 @@ static void of_stages(const sd_radau *radau, double t, double *y, double *yd)
 {
     const sd_radau_method *method = radau->used;
     double h = radau->h_used, v[SD_STAGES + 1], d[SD_STAGES + 1];
-    lagrange(method, (t - (radau->t - h)) / h, v, d);
+    lagrange(radau, method, (t - (radau->t - h)) / h, v, d);
     for (int32_t i = 0; i < radau->n; i++)
         if (!led(radau, i)) {
             double sum = radau->last[i], rate = 0.0;
@@ -170,7 +195,7 @@ int sd_radau_astray(sd_radau *radau)
     for (int k = 0; k + 1 < method->stages; k++) {
         double between = 0.5 * (method->c[k] + method->c[k + 1]); /* in the middle of the wider gaps */
         double v[SD_STAGES + 1], d[SD_STAGES + 1], at = radau->t + between * radau->h;
-        lagrange(method, between, v, d);
+        lagrange(radau, method, between, v, d);
         for (int32_t i = 0; i < radau->n; i++) {
             double sum = radau->phi[i], rate = 0.0;
             for (int s = 0; s < method->stages; s++) {
@@ -193,12 +218,12 @@ void sd_radau_extrapolate(sd_radau *radau, double h)
     const sd_radau_method *used = radau->used;
     int last = used->stages - 1;
     for (int s = 0; s < radau->method->stages; s++) {
-        double *z = radau->z[s], v[SD_STAGES + 1], d[SD_STAGES + 1];
+        double *z = radau->z[s], v[SD_STAGES + 1];
         if (radau->taken == 0) {
             memset(z, 0, (size_t)radau->n * sizeof *z);
             continue;
         }
-        lagrange(used, 1.0 + radau->method->c[s] * h / radau->h_used, v, d);
+        lagrange_value(radau, used, 1.0 + radau->method->c[s] * h / radau->h_used, v);
         for (int32_t i = 0; i < radau->n; i++) {
             double sum = 0.0;
             for (int j = 0; j < last; j++)

@@ -53,6 +53,8 @@ where constraints are constant sums: their unknowns are interpolated differently
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 UNPULLED = 2
 """Kind of a derivative (core/radau.h): interpolated whatever pulls at its unknown."""
+STAGED = 100_000
+"""Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -156,7 +158,10 @@ class Integration:
 
     def _stages(self) -> tuple[int, int]:
         """Of radau: in the first step, at most."""
-        return self.request.stages
+        if self.request.stages is not None:
+            return self.request.stages
+        many = self.stepped.unknowns <= STAGED and not self.system.form.scales
+        return 3, lib.STAGES if many else 3
 
     def _stepper(self) -> None:
         request = self.request

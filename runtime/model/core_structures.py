@@ -249,6 +249,8 @@ class RadauMethod(c.Structure):
         *[(name, _D * 2 * STAGES * PAIRS) for name in ["columns", "rows"]],
         ("estimate", _D * STAGES),
         ("lift", _D * (STAGES + 1)),
+        ("taylor", _D * STAGES * 2),
+        ("constant", _D),
     ]
 
 
@@ -262,7 +264,9 @@ class Radau(c.Structure):
         *[(name, _I) for name in ["n", "tested", "stages", "most_stages"]],
         *[(name, _D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
         *[(name, _P) for name in ["atol", "magnitude", "met", "test", "power", "smooth"]],
-        *[(name, _D) for name in ["tolerance", "t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
+        ("tolerance", _D),
+        ("strict", _D * 3),
+        *[(name, _D) for name in ["t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
         *[(name, _D) for name in ["error_accepted", "theta", "state_size"]],
         *[(name, _I) for name in ["ready", "old_jacobian", "rejected"]],
         *[(name, _P) for name in ["method", "used"]],
@@ -271,8 +275,8 @@ class Radau(c.Structure):
         ("slope", _P * POINTS),
         ("refined", _I * POINTS),
         *[(name, _P * STAGES) for name in ["z", "kept", "stage", "stage_d", "d", "base", "full"]],
-        *[(name, _P) for name in ["point", "point_d", "pull", "y", "rate", "ee", "weight", "newton_weight", "scale"]],
-        *[(name, _P) for name in ["terms", "jy", "jyd", "g", "memory"]],
+        *[(name, _P) for name in ["point", "point_d", "pull", "gap", "y", "rate", "ee", "weight", "newton_weight"]],
+        *[(name, _P) for name in ["scale", "terms", "jy", "jyd", "g", "memory"]],
         ("w", _P * PAIRS),
         ("gz", _P),
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],

@@ -25,7 +25,9 @@ WIDTH = 116
 class Coefficients:
     """One method in mpmath's numbers.  c, b, estimate [s]; a, inverse [s][s]; gamma and its column and row [s]; values,
     columns, rows: of the complex pairs [(s-1)/2] with positive imaginary part; lift [s+1]: coefficients of the powers
-    1..s+1 of the polynomial that is zero at 0 and 1, has no slope at any node and the slope 1 at 0.
+    1..s+1 of the polynomial that is zero at 0 and 1, has no slope at any node and the slope 1 at 0; taylor: the
+    derivatives s-1 and s of the stages' polynomial in the middle over their factorials, by z [2][s]; constant: what the
+    estimate is of the Taylor coefficient s+1.
     """
 
     c: list[Any]
@@ -40,6 +42,8 @@ class Coefficients:
     rows: list[list[Any]]
     estimate: list[Any]
     lift: list[Any]
+    taylor: list[list[Any]]
+    constant: Any
 
 
 def nodes(stages: int) -> list[Any]:
@@ -110,6 +114,14 @@ def _lift(c: list[Any]) -> list[Any]:
     return [value / (k + 1) for k, value in enumerate(power)]
 
 
+def _taylor(c: list[Any]) -> list[list[Any]]:
+    """Of the polynomial through (0, 0) and (c_j, z_j), at 1/2: the coefficients of (x - 1/2)^(s-1) and of x^s, by z."""
+    s = len(c)
+    leading = [1 / (c[j] * mp.fprod(c[j] - c[k] for k in range(s) if k != j)) for j in range(s)]
+    others = [mp.fsum(c) - node for node in c]
+    return [[w * (mp.mpf(s) / 2 - rest) for w, rest in zip(leading, others, strict=True)], leading]
+
+
 def coefficients(stages: int) -> Coefficients:
     """The method of so many stages (odd), to about DIGITS digits."""
     with mp.workdps(DIGITS):
@@ -126,6 +138,7 @@ def coefficients(stages: int) -> Coefficients:
         real = min(range(stages), key=lambda k: abs(mp.im(values[k])))
         pairs = sorted((k for k in range(stages) if mp.im(values[k]) > 1e-9), key=lambda k: mp.im(values[k]))
         gamma = mp.re(values[real])
+        estimate = _estimate(c, b, inverse, gamma)
         return Coefficients(
             c,
             b,
@@ -137,8 +150,10 @@ def coefficients(stages: int) -> Coefficients:
             [values[k] for k in pairs],
             [[right[i, k] for i in range(stages)] for k in pairs],
             [[left[k, i] for i in range(stages)] for k in pairs],
-            _estimate(c, b, inverse, gamma),
+            estimate,
             _lift(c),
+            _taylor(c),
+            abs(mp.fsum(e * node ** (stages + 1) for e, node in zip(estimate, c, strict=True))) / gamma,
         )
 
 
@@ -181,7 +196,10 @@ def _method(stages: int) -> str:
         blocks = [_filled([_complex(x) for x in item], inner) for item in items]
         lines.append(pad + f"{{ /* {name} */\n" + ",\n".join(blocks) + "},")
     lines.append(_filled([_number(x) for x in found.estimate], pad) + ", /* of the error */")
-    lines.append(_filled([_number(x) for x in found.lift], pad) + "}, /* lift */")
+    lines.append(_filled([_number(x) for x in found.lift], pad) + ", /* lift */")
+    blocks = [_filled([_number(x) for x in item], inner) for item in found.taylor]
+    lines.append(pad + "{ /* taylor */\n" + ",\n".join(blocks) + "},")
+    lines.append(f"{pad}{_number(found.constant)}}},")
     return "\n".join(lines)
 
 
