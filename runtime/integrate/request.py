@@ -34,6 +34,7 @@ class Request:
     where stability holds it to more steps than these; settled_to: scaled residual that will do for rows
     by which runs are compared and nothing else, of a draft for all, 0: round-off;
     condense: what constant sums define leaves the system (condense/);
+    stages: of radau, in the first step and at most, None: chosen;
     apart: part of a step; instants within it that are nearer to the row before are passed over.
     """
 
@@ -60,6 +61,7 @@ class Request:
     draft: bool = False
     apart: float = 0.0
     condense: bool = True
+    stages: tuple[int, int] | None = None
 
     @property
     def tolerance(self) -> float:

@@ -242,8 +242,7 @@ class Batch:
             zero += [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
         if made.underlying is not None:
             states.append((c.addressof(made.underlying.core.contents), c.sizeof(lib.Underlying)))
-        if made.method._complex:
-            zero.append(lib.core.sd_linear_z_pivoted(made.method._complex))
+        zero += [lib.core.sd_linear_z_pivoted(item) for item in made.method.complex]
         # observers read the audit's families behind the unknowns
         rooms = [np.zeros(max(system.form.extended, system.unknowns) + 8) for _ in range(3)]
         made.run_.contents.start_rate = lib.pointer(rooms[2])
