@@ -70,6 +70,8 @@ class Binding:
 
     def evaluate(self, node: Node) -> float:
         """The value of an expression of parameters."""
+        if node.op == "const":
+            return float(node.data)
         return float(evaluate([node], self.parameters.lookup)[0])
 
 
