@@ -194,8 +194,9 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
 
 def run_from(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
     """From a start to the trace; None where the report says why not.  One without events may serve several runs."""
-    events = plan(prepared, started.system, rest=rest(options))
-    options = replace(options, stops=stops(prepared, options, report), events=events)
+    events, times = plan(prepared, started.system, rest=rest(options)), stops(prepared, options, report)
+    if events or times.size:
+        options = replace(options, stops=times, events=events)
     return _ran(target, prepared, started, options, report)
 
 

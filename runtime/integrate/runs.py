@@ -155,6 +155,7 @@ class Runs:
     def take(self, way: Way) -> None:
         """Goes on with another method and form."""
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
+        self._beside: tuple[Floats, Floats, Floats] | None = None
         self.patience: int | None = None
         self._origin: Origin | None = None
 
@@ -309,12 +310,16 @@ class Runs:
 
     def beside(self, largest: Floats, magnitude: Floats) -> Floats:
         """The largest of the unit of each stored quantity [columns], unknowns among them."""
+        last = self._beside
+        if last is not None and last[0] is largest and last[1] is magnitude:
+            return last[2]
         of_unknowns, of_columns, number = self.system.once("units", self._units)
         found = np.zeros(number)
         found[0] = PURE
         np.fmax.at(found, of_unknowns, magnitude[: of_unknowns.size])
         np.fmax.at(found, of_columns, largest[self.places])
-        return np.asarray(found[of_columns])
+        self._beside = largest, magnitude, np.asarray(found[of_columns])
+        return self._beside[2]
 
     def _units(self) -> tuple[Ints, Ints, int]:
         """Number of the unit of each unknown as written and of each stored quantity, and how many units there are; 0:

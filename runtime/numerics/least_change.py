@@ -130,6 +130,14 @@ class Problem:
     check: Callable[[], None] | None = None
 
 
+    def within(self, free: Mask) -> Problem:
+        """The same in other free unknowns."""
+        same = self.rows, self.columns, self.number, self.use
+        return Problem(
+            self.residual, self.jacobian, *same, free, self.guess, self.scale, self.weight, self.work, self.core, self.check
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Solution:
     """x, its largest scaled row and all scaled rows [number]."""

@@ -125,7 +125,7 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
             if not use.any() or not may.any():
                 continue
             problem = problem_of(starter, t, x, guess, rows=use, free=may)
-            gentle = replace(problem, free=may & starter.following(t, x))
+            gentle = problem.within(may & starter.following(t, x))
             trials = enumerate(_trials(gentle, problem, x))
             k, found = next(((k, s) for k, s in trials if s.residual < EXACT), (0, None))
             if found is not None:
@@ -296,7 +296,7 @@ def _nearer(
     for stays in (YIELDS, BACK):
         near = np.where(np.abs(aim - guess) > stays * size, aim, guess)
         for held in (state, state & (near == guess)):
-            found = solve(replace(problem, free=free & ~held), np.where(held, near, x))
+            found = solve(problem.within(free & ~held), np.where(held, near, x))
             clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
             if clean is not None and change(clean) <= EVEN * change(x):
                 return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
