@@ -277,6 +277,8 @@ def _nearer(
     x = best.x
     follows = starter.following(t, x) | starter.idle
     follows[starter.carried()] = True
+    if not (x != guess)[free & ~follows].any():
+        return None, 0.0
     curved = np.zeros(x.size, dtype=bool)
     bent = _bent(starter, t, x) & starter.groups("phi")
     curved[starter.columns[bent[starter.rows]]] = True
