@@ -132,10 +132,8 @@ class Problem:
 
     def within(self, free: Mask) -> Problem:
         """The same in other free unknowns."""
-        same = self.rows, self.columns, self.number, self.use
-        return Problem(
-            self.residual, self.jacobian, *same, free, self.guess, self.scale, self.weight, self.work, self.core, self.check
-        )
+        entries, sizes = (self.rows, self.columns, self.number, self.use), (self.guess, self.scale, self.weight)
+        return Problem(self.residual, self.jacobian, *entries, free, *sizes, self.work, self.core, self.check)
 
 
 @dataclass(frozen=True, slots=True)
