@@ -74,7 +74,7 @@ def steady(description: Description, blocks: tuple[str, ...] = ("phi", "phi_rate
 
 
 def _candidates(system: System) -> tuple[Mask, Longs]:
-    """Entries [entries] through which a row might define an unknown, whatever the numbers; places of what goes unread."""
+    """Entries [entries] through which a row might define an unknown, whatever the numbers; places of what is unread."""
     columns, rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
     moving = system.structural()[1]
     unread = unread_families(system.description, (call.block for call in system.form.calls))
