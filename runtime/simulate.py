@@ -236,12 +236,15 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     """The runs of one simulation, whose trace is claimed."""
     options, start = runs.options, runs.start
     known = determined(written, start)
-    runs.columns = tuple(
-        replace(column, derivative=False) if column.derivative and not known[column.place] else column
-        for column in runs.columns
-    )
+    if not known.all():
+        runs.columns = tuple(
+            replace(column, derivative=False) if column.derivative and not known[column.place] else column
+            for column in runs.columns
+        )
 
-    def outcome(final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None) -> Outcome:
+    def outcome(
+        final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None, **more: Any
+    ) -> Outcome:
         estimate = achieved.error_estimate if achieved is not None else None
         return Outcome(
             runs.keeping.path,
@@ -259,6 +262,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
             failure,
             reason=runs.way.reason,
             held=runs.held,
+            **more,
         )
 
     achieved: Achieved | None = None
@@ -278,10 +282,11 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     _close(runs, achieved, judgement)
     finished, _, writer = runs.done
     nominal = runs.nominal(finished.largest, finished.magnitude)
-    ended = outcome(True, options.t_end, achieved, None)
-    lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, ended.error_estimate))
+    estimate = achieved.error_estimate if achieved is not None else None
+    lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off
-    return replace(ended, judgement=judgement, below_round_off=below, cancelled=lost, events=finished.events)
+    told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
+    return outcome(True, options.t_end, achieved, None, **told)
 
 
 def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

@@ -142,7 +142,7 @@ class Loaded:
         alone: nobody looks at more of it than at its trace once the next one begins.
         None where the report says why not.
         """
-        request = replace(self.request, **changes)
+        request = replace(self.request, **changes) if changes else self.request
         check_tolerances(request)
         prepared, compiled = self.bound(settings)
         network = prepared.network
@@ -157,10 +157,9 @@ class Loaded:
 
     def _run(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
         with ex.fresh(compiled.nodes):
-            options = options_of(request, self.target, prepared, report, time.monotonic(), None)
+            options = options_of(request, self.target, prepared, report, time.monotonic(), None, held=True)
             if options is None:
                 return None
-            options = replace(options, output=request.output)
             ran = integrate(self.target, prepared, options, report, checked=bool(compiled.checked))
             compiled.checked.extend([True] if ran is not None else [])
             return ran

@@ -195,8 +195,9 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
 
 def run_from(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
     """From a start to the trace; None where the report says why not.  One without events may serve several runs."""
-    events = plan(prepared, started.system, rest=rest(options))
-    options = replace(options, stops=stops(prepared, options, report), events=events)
+    events, times = plan(prepared, started.system, rest=rest(options)), stops(prepared, options, report)
+    if events or times.size:
+        options = replace(options, stops=times, events=events)
     return _ran(target, prepared, started, options, report)
 
 
@@ -219,9 +220,18 @@ def _redundancy(request: Request, network: Network) -> str:
 
 
 def options_of(
-    request: Request, target: Target, prepared: Prepared, report: Report, began: float, progress: Progress | None
+    request: Request,
+    target: Target,
+    prepared: Prepared,
+    report: Report,
+    began: float,
+    progress: Progress | None,
+    *,
+    held: bool = False,
 ) -> Options | None:
-    """The runtime's options; None where the report says why not.  began: `time.monotonic()` of the command."""
+    """The runtime's options; None where the report says why not.  began: `time.monotonic()` of the command; held: in
+    memory where the request names no file.
+    """
     scene = prepared.network.scene or Scene("", prepared.network.place)
     value = prepared.binding.evaluate
 
@@ -257,7 +267,7 @@ def options_of(
     steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), STEPS)
     claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
     return Options(
-        output=request.output or _default_output(request.file, scene.name),
+        output=request.output or (None if held else _default_output(request.file, scene.name)),
         t_start=t0,
         t_end=t1,
         every=every,
@@ -357,6 +367,13 @@ def _default_output(file: str, scene: str) -> str:
 
 
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
+    """What the trace says of itself, asked once a text."""
+    if "attributes" not in prepared.layouts:
+        prepared.layouts["attributes"] = _said(target, prepared)
+    return prepared.layouts["attributes"]
+
+
+def _said(target: Target, prepared: Prepared) -> dict[str, str]:
     left_out = {"pruned": listed(prepared.left_out)} if prepared.left_out else {}
     return {
         "Conventions": "CF-1.11",
@@ -387,20 +404,21 @@ def version() -> str:
 def _parameters(prepared: Prepared) -> Iterator[Parameter]:
     """Parameters in SI units, arrays element by element (`m[2]`); arrays of more than LISTED elements are left out."""
     evaluate, values = prepared.binding.evaluate, prepared.binding.values
-    for p in prepared.network.parameters:
-        if p.name in prepared.network.discretes:
+    units = prepared.layouts.setdefault("units of parameters", {})
+    if not units:
+        own = (p for p in prepared.network.parameters if p.name not in prepared.network.discretes)
+        units |= {p.name: (p.shape, si_text(p.unit.dimension)) for p in own}
+    for name, (shape, unit) in units.items():
+        if not shape:
+            yield Parameter(name, float(values[name]), unit)
             continue
-        unit = si_text(p.unit.dimension)
-        if not p.shape:
-            yield Parameter(p.name, float(values[p.name]), unit)
-            continue
-        array = np.asarray(values[p.name])
-        first = [round(evaluate(low)) for low, _ in p.shape]
+        array = np.asarray(values[name])
+        first = [round(evaluate(low)) for low, _ in shape]
         if array.size > LISTED:
             continue
         for at, value in np.ndenumerate(array):
             index = ",".join(str(a + b) for a, b in zip(at, first, strict=True))
-            yield Parameter(f"{p.name}[{index}]", float(value), unit)
+            yield Parameter(f"{name}[{index}]", float(value), unit)
 
 
 def _ran(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:

@@ -16,7 +16,7 @@ from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.columns import Varied, following, reads_of_structure
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.compiler.model.interpret import in_order
+from sysdyn.compiler.model.interpret import last_of
 from sysdyn.compiler.program.program import Program
 from sysdyn.dsl.model.expression import Node, topological, topological_unbound
 from sysdyn.dsl.model.network import Network, Slope
@@ -85,22 +85,27 @@ def _nodes(root: Node) -> Nodes:
 
 def again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Binding | None:
     """The binding with these values, whose names are those that the way was made for."""
+    with np.errstate(all="ignore"):
+        return _again(binding, path, overrides)
+
+
+def _again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Binding | None:
     parameters = Varied(binding.parameters, overrides)
     values, lookup = parameters.values, parameters.lookup
     for name, formula in path.follow:
-        values[name] = float(in_order(formula, lookup))
+        values[name] = float(last_of(formula, lookup))
     if not all(math.isfinite(values[name]) for name in (*overrides, *(name for name, _ in path.follow))):
         return None
     for slope, nodes in path.slopes:
-        value = in_order(nodes, lookup)
+        value = last_of(nodes, lookup)
         if (value != 0.0) if slope.flat else (value == 0.0 or (slope.sign and not slope.sign * value > 0.0)):
             return None
     starts = list(binding.initial)
     for k, nodes in path.pins:
-        value = float(in_order(nodes, lookup))
+        value = float(last_of(nodes, lookup))
         if not math.isfinite(value):
             return None
-        starts[k] = replace(starts[k], values=np.full(starts[k].values.shape, value))
+        starts[k] = starts[k].at(np.full(starts[k].values.shape, value))
     p = binding.p.copy()
     for name, place in path.places:
         p[place] = values[name]

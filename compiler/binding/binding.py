@@ -55,6 +55,12 @@ class Start:
         names = ("family", "positions", "values", "fixed", "label", "file", "line")
         return {name: getattr(self, name) for name in names}
 
+    def at(self, values: NDArray[np.float64]) -> Start:
+        """The same statement with other values."""
+        return Start(
+            self.family, self.positions, values, self.fixed, self.label, self.file, self.line, self.place
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Binding:
@@ -71,6 +77,8 @@ class Binding:
 
     def evaluate(self, node: Node) -> float:
         """The value of an expression of parameters."""
+        if node.op == "const":
+            return float(node.data)
         return float(evaluate([node], self.parameters.lookup)[0])
 
 

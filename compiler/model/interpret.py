@@ -38,10 +38,9 @@ def evaluate(roots: Sequence[Node], lookup: Lookup) -> list[Value]:
         return _evaluate(roots, lookup)
 
 
-def in_order(nodes: Sequence[Node], lookup: Lookup) -> Value:
-    """The value of the last of nodes that stand after those they need."""
-    with np.errstate(all="ignore"):
-        return _values(nodes, lookup)[nodes[-1]]
+def last_of(nodes: Sequence[Node], lookup: Lookup) -> Value:
+    """The value of the last of nodes that stand after those they need; the caller silences what is no number."""
+    return _values(nodes, lookup)[nodes[-1]]
 
 
 def _evaluate(roots: Sequence[Node], lookup: Lookup) -> list[Value]:

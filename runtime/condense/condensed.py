@@ -7,11 +7,13 @@ whose sums read stretches of families become one loop each, whatever their numbe
 from __future__ import annotations
 
 import ctypes as c
+from functools import cached_property
 from hashlib import sha256
 from typing import Any
 
 import numpy as np
-from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask, eliminate, steady
+from sysdyn.runtime.condense.composition import Composition, composed, ranges
+from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask, definable, eliminate, steady
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
@@ -45,28 +47,16 @@ class Sums:
     kept: Longs
     unread: Longs
 
-    def of_kept(self, unknowns: int) -> tuple[Longs, Longs, Floats]:
-        """T by rows: start [eliminated + 1], place in z, factor."""
-        from scipy.sparse import csr_array
-
-        number = np.full(unknowns, -1)
+    def composed(self, unknowns: int) -> Composition:
+        """T by rows, of z."""
+        number, later = np.full(unknowns, -1), np.full(unknowns, -1)
         number[self.kept] = np.arange(self.kept.size)
-        later = np.full(unknowns, -1)
         later[self.place] = np.arange(self.place.size)
-        row = np.repeat(np.arange(self.place.size), np.diff(self.start))
+        return composed(self.start, number[self.source], later[self.source])
 
-        def part(numbers: Longs, size: int) -> csr_array:
-            here = numbers[self.source] >= 0
-            entries = self.factor[here], (row[here], numbers[self.source[here]])
-            return csr_array(entries, shape=(self.place.size, size))
-
-        direct, through = part(number, self.kept.size), part(later, self.place.size)
-        total, power = direct, direct
-        while power.nnz:
-            power = through @ power
-            total = total + power
-        total.sort_indices()
-        return total.indptr.astype(np.int64), total.indices.astype(np.int64), total.data
+    def same(self, other: Sums) -> bool:
+        """Whether the numbers are those of another one of the same structure, bit for bit."""
+        return bool((self.factor == other.factor).all() and (self.constant == other.constant).all())
 
 
 def sums(system: System, found: Elimination, t: float, jy: Floats) -> Sums:
@@ -94,6 +84,7 @@ class Condensed:
     """
 
     def __init__(self, system: System, found: Sums, kept_rows: Longs) -> None:
+        """found: the structure, and the first numbers."""
         self.whole, self.sums, self.kept, self.kept_rows = system, found, found.kept, kept_rows
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
@@ -150,18 +141,20 @@ class Condensed:
         place[found.place] = np.arange(found.place.size)
         direct = np.flatnonzero((row_at[rows] >= 0) & (at[columns] >= 0))
         through = np.flatnonzero((row_at[rows] >= 0) & (place[columns] >= 0))
-        start, source, factor = found.of_kept(system.unknowns)
+        self._composition = found.composed(system.unknowns)
+        start, source = self._composition.start, self._composition.source
         number = place[columns[through]]
         count = start[number + 1] - start[number]
-        term = np.repeat(start[number] - (np.cumsum(count) - count), count) + np.arange(count.sum())
+        term = ranges(start[number], count)
         entry = np.concatenate([direct, np.repeat(through, count)])
         column = np.concatenate([at[columns[direct]], source[term]])
-        share = np.concatenate([np.ones(direct.size), factor[term]])
         order = np.argsort(entry, kind="stable")
-        entry, column, share = entry[order], column[order], share[order]
+        entry, column = entry[order], column[order]
+        term = np.concatenate([np.full(direct.size, -1), term])[order]
+        self._shared = np.flatnonzero(term >= 0), term[term >= 0]
         self.pattern: Pattern
         self.pattern, slots = compress(self.rows, self.unknowns, [Places(row_at[rows[entry]], column)])
-        self._from, self._to, self._share = entry.astype(np.int32), slots[0], np.ascontiguousarray(share)
+        self._from, self._to, self._share = entry.astype(np.int32), slots[0], np.ones(entry.size)
 
     def _spans(self, full: Longs) -> tuple[c.Array[Any], int]:
         first, begin, number = _spans(full)
@@ -187,26 +180,37 @@ class Condensed:
         begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
         ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
         made = (lib.Straight * max(begin.size, 1))()
-        factors, sources = np.empty(found.factor.size), found.source.astype(np.int32)
-        constants = np.ascontiguousarray(found.constant)
-        at, base, first = self._hold(factors), self._hold(constants), self._hold(sources)
+        order = np.arange(found.factor.size)
+        for low, high in zip(begin.tolist(), ends.tolist(), strict=True):
+            terms, entry = int(count[low]), int(found.start[low])
+            block = order[entry : entry + terms * (high - low)]
+            block[:] = block.reshape(high - low, terms).T.ravel()
+        self._begin, self._order, self._some = begin, order, np.zeros(begin.size, dtype=bool)
+        self._factors, self._constants = np.zeros(order.size), np.zeros(number)
+        at, first = self._hold(self._factors), self._hold(found.source.astype(np.int32))
         assert at is not None
-        assert base is not None
         assert first is not None
         for k, (low, high) in enumerate(zip(begin.tolist(), ends.tolist(), strict=True)):
-            terms, entry = int(count[low]), int(found.start[low])
-            block = found.factor[entry : entry + terms * (high - low)].reshape(high - low, terms)
-            factors[entry : entry + block.size] = block.T.ravel()
+            entry = int(found.start[low])
             made[k] = lib.Straight(
-                int(found.place[low]),
-                high - low,
-                terms,
-                first + 4 * entry,
-                at + 8 * entry,
-                base + 8 * low if constants[low:high].any() else None,
+                int(found.place[low]), high - low, int(count[low]), first + 4 * entry, at + 8 * entry, None
             )
         self._keep.append(made)
         return made, int(begin.size)
+
+    def renew(self, found: Sums) -> None:
+        """Takes the numbers of other sums of the same structure."""
+        self.sums = found
+        at, term = self._shared
+        self._share[at] = self._composition.values(found.factor)[term]
+        self._factors[:] = found.factor[self._order]
+        self._constants[:] = found.constant
+        base = lib.pointer(self._constants)
+        assert base is not None
+        some = np.logical_or.reduceat(found.constant != 0.0, self._begin) if self._begin.size else self._some
+        for k in np.flatnonzero(some != self._some):
+            self._straight[0][int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
+        self._some = some
 
     def _observed_rates(self) -> bool:
         """Whether what is observed reads rates of eliminated unknowns."""
@@ -232,7 +236,9 @@ class Condensed:
     def _make(self) -> None:
         whole = self.whole
         self._trim = self._trimmed()
-        unknown, row, straight = self._spans(self.kept), self._spans(self.kept_rows), self._straights()
+        unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
+        straight = self._straight = self._straights()
+        self.renew(self.sums)
         room = max(whole.form.extended, whole.unknowns) + 8
         self.condensed = lib.Condensed(
             full=c.addressof(self._trim),
@@ -266,12 +272,13 @@ class Condensed:
         )
         lib.core.sd_condensed_bind(c.byref(self.condensed), c.byref(self.core))
 
-    @property
+    @cached_property
     def key(self) -> tuple[int | bytes, ...]:
         """What of it an order of elimination and places in matrices depend on, beside the whole form."""
         parts = self.kept, self.kept_rows, self.pattern.column, self.pattern.row
         return self.unknowns, sha256(b"".join(part.tobytes() for part in parts)).digest()
 
+    @cached_property
     def rates(self) -> Ints:
         """Numbers of kept unknowns whose derivatives occur."""
         columns, rows = self.whole.pattern.columns_of(), self.whole.pattern.row
@@ -309,30 +316,57 @@ class Forms:
         return whole.once(("order", *stepped.key), made)
 
 
+class _Condenser:
+    """What runs of one system are condensed to: structures of the run before where the same unknowns may leave."""
+
+    def __init__(self, system: System) -> None:
+        self.whole, self.settled = system.another("2v"), system.another("settled")
+        self._allowed = np.zeros(0, dtype=bool)
+        self._found: Elimination | None = None
+        self._forms: Forms | None = None
+
+    def forms(self, t: float, y: Floats, yd: Floats) -> Forms | None:
+        """With the numbers of now."""
+        whole = self.whole
+        jy, _ = whole.jacobian(t, y, yd)
+        allowed = definable(whole, jy)
+        if self._found is None or not np.array_equal(allowed, self._allowed):
+            self._allowed, self._found, self._forms = allowed, eliminate(whole, allowed), None
+        found = self._found
+        few = found.place.size + found.unread.size < (1.0 - GAIN) * whole.unknowns
+        if few or not np.isfinite(jy[found.entry]).all():
+            return None
+        numbers = sums(whole, found, t, jy)
+        if not np.isfinite(numbers.constant).all():
+            return None
+        if self._forms is None:
+            self._forms = self._made(found, numbers)
+        elif not numbers.same(self._forms.stepped.sums):
+            self._forms.stepped.renew(numbers)
+            self._forms.settled.renew(numbers)
+        return self._forms
+
+    def _made(self, found: Elimination, numbers: Sums) -> Forms | None:
+        whole = self.whole
+        rows = np.ones(whole.rows, dtype=bool)
+        rows[found.row] = False
+        rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
+        kept = _settled_rows(whole, self.settled, ~rows, numbers)
+        if kept is None:
+            return None
+        places = np.flatnonzero(rows), np.flatnonzero(kept)
+        return Forms(Condensed(whole, numbers, places[0]), Condensed(self.settled, numbers, places[1]))
+
+
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
     """A model as written (form 3) without what constant sums define; None where little would be gained, or where the
-    rest does not follow from what is kept alone.
+    rest does not follow from what is kept alone.  The next call for the system may take the structures of this one.
     """
     if system.unknowns < LEAST or system.form.name != "3" or system.left_out or system._may_hold[0].size:
         return None
-    if not steady(system.description):
+    if not system.once("steady", lambda: steady(system.description)):
         return None
-    whole = system.another("2v")
-    jy, _ = whole.jacobian(t, y, yd)
-    found = eliminate(whole, jy)
-    if found.place.size + found.unread.size < (1.0 - GAIN) * whole.unknowns or not np.isfinite(jy[found.entry]).all():
-        return None
-    numbers = sums(whole, found, t, jy)
-    if not np.isfinite(numbers.constant).all():
-        return None
-    rows = np.ones(whole.rows, dtype=bool)
-    rows[found.row] = False
-    rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
-    settled = system.another("settled")
-    kept = _settled_rows(whole, settled, ~rows, numbers)
-    if kept is None:
-        return None
-    return Forms(Condensed(whole, numbers, np.flatnonzero(rows)), Condensed(settled, numbers, np.flatnonzero(kept)))
+    return system.own("condensed", lambda: _Condenser(system)).forms(t, y, yd)
 
 
 def departures(system: System) -> list[tuple[str, str]]:

@@ -73,8 +73,8 @@ def steady(description: Description, blocks: tuple[str, ...] = ("phi", "phi_rate
     return all(kernel.curved is not None and not kernel.curved for kernel in kernels)
 
 
-def eliminate(system: System, jy: Floats) -> Elimination:
-    """What can leave a form; jy [entries] at any point."""
+def _candidates(system: System) -> tuple[Mask, Longs]:
+    """Entries [entries] through which a row might define an unknown, whatever the numbers; places of what is unread."""
     columns, rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
     moving = system.structural()[1]
     unread = unread_families(system.description, (call.block for call in system.form.calls))
@@ -83,14 +83,25 @@ def eliminate(system: System, jy: Floats) -> Elimination:
     usable[rows[moving]] = False
     kept = gone.copy()
     kept[columns[moving]] = kept[system.form.k_q] = True
+    return usable[rows] & ~kept[columns], np.flatnonzero(gone)
+
+
+def definable(system: System, jy: Floats) -> Mask:
+    """Entries [entries] through which a row can define an unknown, by their values jy at any point."""
+    columns, rows = system.pattern.columns_of(), system.pattern.row
     size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
     weight = size * by_row[rows] * by_column[columns]
     largest = np.zeros(system.rows)
     np.maximum.at(largest, rows, weight)
-    healthy = (weight > 0.0) & (weight >= HEALTHY * largest[rows])
-    search = _Search(system, usable[rows] & healthy & ~kept[columns])
-    return search.found(np.flatnonzero(gone))
+    may = system.once("may leave", lambda: _candidates(system))[0]
+    return np.asarray(may & (weight > 0.0) & (weight >= HEALTHY * largest[rows]))
+
+
+def eliminate(system: System, allowed: Mask) -> Elimination:
+    """What can leave a form; allowed [entries]: `definable`."""
+    gone = system.once("may leave", lambda: _candidates(system))[1]
+    return _Search(system, allowed).found(gone)
 
 
 def _rank(system: System, family: int) -> int:

@@ -312,3 +312,60 @@ int sd_pencil_index(int32_t n, const int32_t *column, const int32_t *row, const 
     free(memory);
     return found;
 }
+
+#define MARGIN 1e3 /* sums in another order than numpy's differ in the last bits alone */
+#define SCALED 4   /* of scaling, as in structure/redundancy.py */
+
+/* lines of a [m, n] over the roots of their largest entries, rows and columns in turn */
+static void to_one(int32_t m, int32_t n, double *a)
+{
+    for (int sweep = 0; sweep < 2 * SCALED; sweep++) {
+        int by_row = sweep % 2 == 0;
+        int32_t lines = by_row ? m : n, across = by_row ? n : m;
+        for (int32_t k = 0; k < lines; k++) {
+            double *line = by_row ? a + (size_t)k * (size_t)n : a + k, size = 0.0;
+            size_t step = by_row ? 1 : (size_t)n;
+            for (int32_t i = 0; i < across; i++)
+                size = fmax(size, fabs(line[(size_t)i * step]));
+            for (int32_t i = 0; size > 0.0 && i < across; i++)
+                line[(size_t)i * step] /= sqrt(size);
+        }
+    }
+}
+
+int sd_independent(int32_t m, int32_t n, int32_t entries, const int32_t *row_of, const int32_t *column_of,
+                   const double *value, double noise, double least)
+{
+    double *a = calloc((size_t)m * (size_t)n + (size_t)m + 1, sizeof *a);
+    if (!a)
+        return -1;
+    double *largest = a + (size_t)m * (size_t)n;
+    int independent = 1;
+    for (int32_t e = 0; e < entries; e++)
+        largest[row_of[e]] = fmax(largest[row_of[e]], fabs(value[e]));
+    for (int32_t e = 0; e < entries; e++)
+        if (fabs(value[e]) > noise * largest[row_of[e]])
+            a[(size_t)row_of[e] * (size_t)n + (size_t)column_of[e]] += value[e];
+    to_one(m, n, a);
+    for (int32_t k = 0; k < m && independent; k++) {
+        double *row = a + (size_t)k * (size_t)n, size = 0.0, rest = 0.0;
+        for (int32_t i = 0; i < n; i++)
+            size += row[i] * row[i];
+        for (int pass = 0; pass < 2; pass++) /* twice is enough (Kahan) */
+            for (int32_t j = 0; j < k; j++) {
+                const double *kept = a + (size_t)j * (size_t)n;
+                double part = 0.0;
+                for (int32_t i = 0; i < n; i++)
+                    part += row[i] * kept[i];
+                for (int32_t i = 0; i < n; i++)
+                    row[i] -= part * kept[i];
+            }
+        for (int32_t i = 0; i < n; i++)
+            rest += row[i] * row[i];
+        independent = sqrt(rest) > MARGIN * least * sqrt(size) && isfinite(rest);
+        for (int32_t i = 0; i < n; i++)
+            row[i] /= sqrt(rest);
+    }
+    free(a);
+    return independent;
+}

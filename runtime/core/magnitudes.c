@@ -180,16 +180,18 @@ double sd_excitation(sd_system *system, double t0, double span, const double *y,
     return quick;
 }
 
-int sd_row_sizes(sd_system *system, double t, const double *y, const double *yd, int32_t entries, const int32_t *entry,
-                 const int32_t *of, int32_t sizes, double *size)
+int sd_row_sizes(sd_system *system, double t, int32_t points, int32_t extended, const double *y, const double *yd,
+                 int32_t entries, const int32_t *entry, const int32_t *of, int32_t sizes, double *size)
 {
     double *jy = malloc((2 * (size_t)system->entries + 1) * sizeof *jy);
     if (!jy)
         return -1;
-    sd_jacobian(system, t, y, yd, jy, jy + system->entries);
-    memset(size, 0, (size_t)sizes * sizeof *size);
-    for (int32_t e = 0; e < entries; e++)
-        size[of[e]] = larger(size[of[e]], fabs(jy[entry[e]]));
+    memset(size, 0, (size_t)points * (size_t)sizes * sizeof *size);
+    for (int32_t k = 0; k < points; k++, size += sizes) {
+        sd_jacobian(system, t, y + (size_t)k * (size_t)extended, yd, jy, jy + system->entries);
+        for (int32_t e = 0; e < entries; e++)
+            size[of[e]] = larger(size[of[e]], fabs(jy[entry[e]]));
+    }
     free(jy);
     return 0;
 }

@@ -30,10 +30,10 @@ int sd_propagate(const sd_balance *balance, const double *size, const double *ex
 int sd_scale(const sd_balance *balance, const double *nominal, int32_t first, const int32_t *rated, const int32_t *member,
              int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale);
 
-/* size [sizes] := largest |entry| of dF/dy at (t, y, yd) among those of each number: entry [entries] places in the pattern,
- * of [entries] their numbers; -1: no memory */
-int sd_row_sizes(sd_system *system, double t, const double *y, const double *yd, int32_t entries, const int32_t *entry,
-                 const int32_t *of, int32_t sizes, double *size);
+/* size [points][sizes] := largest |entry| of dF/dy at (t, y [points][extended], yd) among those of each number: entry
+ * [entries] places in the pattern, of [entries] their numbers; -1: no memory */
+int sd_row_sizes(sd_system *system, double t, int32_t points, int32_t extended, const double *y, const double *yd,
+                 int32_t entries, const int32_t *entry, const int32_t *of, int32_t sizes, double *size);
 
 /* moves [rows] := how far each row of the system moves with t alone at t0 + span part[k], the largest of all parts; returns
  * the shortest time (s) in which one moves that far at the pace of part[0], INFINITY where none does by more than `noise`

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as c
+import math
 
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
@@ -99,21 +100,21 @@ class Ledgers:
     def balances(self) -> tuple[Balance, ...]:
         """What came of each ledger."""
         records = c.cast(self.core.record, c.POINTER(lib.Record))
-        found = [records[k] for k in range(self.core.records)]
-        return tuple(self._balance(k, [r for r in found if r.ledger == k]) for k in range(len(self._heads)))
+        risen: list[list[tuple[float, float]]] = [[] for _ in self._heads]
+        for k in range(self.core.records):
+            record = records[k]
+            risen[record.ledger].append((record.t, record.value))
+        return tuple(self._balance(k, found) for k, found in enumerate(risen))
 
-    def _balance(self, k: int, records: list[lib.Record]) -> Balance:
+    def _balance(self, k: int, records: list[tuple[float, float]]) -> Balance:
         label, unit, first = self._heads[k]
         kind, _, title = label.partition(": ")
-        own = self._of[:-1] == k
         passed = float(self._arrays["gross"][k])
-        turnover = passed + float(self._arrays["most"][:-1][own].sum())
+        turnover = passed + float(self._arrays["most"][:-1][self._of[:-1] == k].sum())
         value = float(self._arrays["highest"][k])
-        highest = max((r.value for r in records), default=0.0) if np.isfinite(value) else np.inf
-        element = first
-        if self._element[k] >= 0:
-            element = self._label(int(self._element[k]))
-        risen = tuple((float(r.t), float(r.value) if np.isfinite(r.value) else np.inf) for r in records)
+        highest = max((v for _, v in records), default=0.0) if math.isfinite(value) else math.inf
+        element = self._label(int(self._element[k])) if self._element[k] >= 0 else first
+        risen = tuple((t, v if math.isfinite(v) else math.inf) for t, v in records)
         return Balance(kind, title, unit, passed, turnover, highest, element, risen)
 
     def __del__(self) -> None:

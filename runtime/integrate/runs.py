@@ -50,6 +50,9 @@ BEYOND = 100.0
 PURE = 1e-8
 """Angles and other pure numbers: what is round-off beside this is nothing, whatever the largest that occurs."""
 
+KEPT = 10_000
+"""Instants of rows up to which they are kept for the next run."""
+
 METERS = {
     "audit.kinetic": 2, "audit.potential": 3, "audit.dissipated": 4, "audit.supplied": 5, "audit.energy": 6,
     "audit.constraints": 7,
@@ -86,6 +89,22 @@ class Samples:
     constraints: Floats
 
 
+@dataclass(frozen=True, slots=True)
+class _Joined:
+    """Instants of comparison [s]; instants and kinds of rows with these among them; of a draft these alone."""
+
+    compared: Floats
+    every: tuple[Floats, Ints]
+    draft: tuple[Floats, Ints]
+
+    @classmethod
+    def of(cls, times: Floats, kinds: Ints, compared: Floats) -> _Joined:
+        """Of instants and kinds of rows."""
+        every = joined(times, kinds, compared)
+        use = (every[1] & COMPARED) > 0
+        return cls(compared, every, (every[0][use], every[1][use]))
+
+
 class Runs:
     """The runs of one simulation: each writes a trace; the last finished one is kept."""
 
@@ -99,7 +118,7 @@ class Runs:
         # events write there: every run begins with these
         self.begin = self.system.description.p.copy(), self.system.description.switches.active.copy()
         self.names = self.system.once("observed names", lambda: _observed_names(self.system.description))
-        self.instants, self.kinds = instants(options)
+        self.instants, self.kinds, self.common, self._joined = self._instants()
         self.keeping = keeping(options.output)
         self.statistics, self.last_statistics = Statistics(), Statistics()
         self.cpu = self.wall = 0.0
@@ -114,15 +133,29 @@ class Runs:
         self.jumps: Floats | None = None
         self.controlled = False
         self.forecast: float | None = None
-        self.common = known(self.instants, options)
-        """Instants [s] at which runs are compared; while it is open, those from which a draft takes its own."""
         self.open = options.every is not None
-        self._joined: tuple[Floats, tuple[Floats, Ints]] | None = None
         self.compared_at: Floats | None = None
+
+    def _instants(self) -> tuple[Floats, Ints, Floats | None, _Joined | None]:
+        """Instants [s] of rows and their kinds; those at which runs are compared where they are known (while it is
+        open, those from which a draft takes its own), and both together.  The run before had the same, or others.
+        """
+        options, layouts = self.options, self.system.description.layouts
+        asked = options.t_start, options.t_end, options.every, options.at, options.sampled_at
+        before = layouts.get("instants")
+        if before is None or before[0] != asked:
+            times, kinds = instants(options)
+            compared = known(times, options)
+            both = None if compared is None else _Joined.of(times, kinds, compared)
+            before = asked, (times, kinds, compared, both)
+            if times.size <= KEPT:
+                layouts["instants"] = before
+        return before[1]
 
     def take(self, way: Way) -> None:
         """Goes on with another method and form."""
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
+        self._beside: tuple[Floats, Floats, Floats] | None = None
         self.patience: int | None = None
         self._origin: Origin | None = None
 
@@ -167,11 +200,9 @@ class Runs:
 
     def with_common(self, compared: Floats, *, draft: bool) -> tuple[Floats, Ints]:
         """Instants and kinds with those of comparison; of a draft these alone."""
-        if self._joined is None or self._joined[0] is not compared:
-            self._joined = compared, joined(self.instants, self.kinds, compared)
-        instants, kinds = self._joined[1]
-        use = (kinds & COMPARED) > 0
-        return (instants[use], kinds[use]) if draft else (instants, kinds)
+        if self._joined is None or self._joined.compared is not compared:
+            self._joined = _Joined.of(self.instants, self.kinds, compared)
+        return self._joined.draft if draft else self._joined.every
 
     @property
     def most_steps(self) -> int | None:
@@ -279,12 +310,16 @@ class Runs:
 
     def beside(self, largest: Floats, magnitude: Floats) -> Floats:
         """The largest of the unit of each stored quantity [columns], unknowns among them."""
+        last = self._beside
+        if last is not None and last[0] is largest and last[1] is magnitude:
+            return last[2]
         of_unknowns, of_columns, number = self.system.once("units", self._units)
         found = np.zeros(number)
         found[0] = PURE
         np.fmax.at(found, of_unknowns, magnitude[: of_unknowns.size])
         np.fmax.at(found, of_columns, largest[self.places])
-        return np.asarray(found[of_columns])
+        self._beside = largest, magnitude, np.asarray(found[of_columns])
+        return self._beside[2]
 
     def _units(self) -> tuple[Ints, Ints, int]:
         """Number of the unit of each unknown as written and of each stored quantity, and how many units there are; 0:

@@ -42,6 +42,7 @@ from sysdyn.runtime.model.core_structures import (
     RunSamples,
     Search,
     Settle,
+    Sizing,
     Span,
     Stepper,
     Straight,
@@ -85,6 +86,7 @@ __all__ = [
     "RunSamples",
     "Search",
     "Settle",
+    "Sizing",
     "Span",
     "Stepper",
     "Straight",
@@ -100,14 +102,12 @@ __all__ = [
 _D, _I, _L, _P = c.c_double, c.c_int32, c.c_int64, c.c_void_p
 
 
+_address = _core.address
+
+
 def pointer(array: NDArray[Any] | None) -> int | None:
     """Address of an array's first element; the caller keeps the array alive."""
-    if array is None:
-        return None
-    try:  # a quarter of the time of the general way, some hundred times a run
-        return c.addressof(c.c_char.from_buffer(array))  # type: ignore[arg-type]
-    except (TypeError, ValueError):  # read-only, strided or empty
-        return array.ctypes.data
+    return None if array is None else _address(array)
 
 
 def reader(address: int, number: int) -> NDArray[np.float64]:
@@ -180,7 +180,12 @@ def _load() -> Any:
         "sd_peel": (_I, [_I, _I, _I, _P, _P, _P, _D, _P]),
         "sd_propagate": (c.c_int, [_P, _P, _P, _P, _I, _P]),
         "sd_excitation": (_D, [_P, _D, _D, _P, _P, _P, _I, _D, _P]),
-        "sd_row_sizes": (c.c_int, [_P, _D, _P, _P, _I, _P, _P, _I, _P]),
+        "sd_row_sizes": (c.c_int, [_P, _D, _I, _I, _P, _P, _I, _P, _P, _I, _P]),
+        "sd_relaxed": (c.c_int, [_P, _P, _I, *[_P] * 4, _D, _P]),
+        "sd_magnitudes": (c.c_int, [_P, _P, _D, _D, *[_P] * 8]),
+        "sd_compliance": (c.c_int, [_P] * 4),
+        "sd_confirmed": (c.c_int, [_P, _P, _D, _P, _P, _P]),
+        "sd_independent": (c.c_int, [_I, _I, _I, _P, _P, _P, _D, _D]),
         "sd_scale": (c.c_int, [_P, _P, _I, _P, _P, _I, _P, _P, _P, _I, _P]),
         "sd_sparse_factors": (None, [_I, _I, _I, *[_P] * 5]),
         "sd_factors": (None, [_I, _I, _P, _P, _P, _P]),

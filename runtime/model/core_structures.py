@@ -651,6 +651,21 @@ class Balance(c.Structure):
     ]
 
 
+
+class Sizing(c.Structure):
+    """sd_sizing."""
+
+    _fields_ = [
+        *[(name, _P) for name in ["balance", "nominal", "kind", "partner"]],
+        ("own", _P * 4),
+        ("owns", _I * 4),
+        ("efforts", _I),
+        *[(name, _P) for name in ["effort", "moved"]],
+        ("parts", _I),
+        ("rungs", _I),
+        *[(name, _P) for name in ["part", "rung"]],
+    ]
+
 class RowsOfStart(c.Structure):
     """sd_rows_of_start."""
 

@@ -263,6 +263,9 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
 
     Raises ContractError where they do not fit each other.
     """
+    before: Description | None = binding.get("layouts", {}).get("last") if binding.get("alone") else None
+    if before is not None:
+        return _again(before, binding)
     structure = manifest.get("structure", manifest)
     families, rows = structure["families"], structure["rows"]
     shapes = _shapes(binding["shapes"], [str(item["name"]) for item in families])
@@ -280,10 +283,6 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         )
     own_families, own_rows, blocks = layouts["described"]
     initial = tuple(_initial(item, names) for item in binding.get("initial", ()))
-    before: Description | None = layouts.get("last") if binding.get("alone") else None
-    if before is not None:
-        before.p[:] = binding["p"]
-        return replace(before, initial=initial)
     found = Description(
         families=own_families,
         rows=own_rows,
@@ -299,6 +298,18 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
     if binding.get("alone"):
         layouts["last"] = found
     return found
+
+
+def _again(before: Description, binding: Mapping[str, Any]) -> Description:
+    """A description of the same structure with the numbers of a binding."""
+    before.p[:] = binding["p"]
+    own, given = before.initial, binding.get("initial", ())
+    if any(old.positions is not new["positions"] for old, new in zip(own, given, strict=True)):
+        names = {family.name: k for k, family in enumerate(before.families)}
+        return replace(before, initial=tuple(_initial(item, names) for item in given))
+    values = (np.atleast_1d(np.asarray(item["values"], dtype=np.float64)) for item in given)
+    found = (Initial(i.family, i.positions, v, i.fixed, i.label) for i, v in zip(own, values, strict=True))
+    return replace(before, initial=tuple(found))
 
 
 def _switched(item: Mapping[str, Any], families: Sequence[Mapping[str, Any]], shapes: list[Shape]) -> tuple[int, int]:

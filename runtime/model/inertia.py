@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
@@ -11,7 +13,7 @@ from sysdyn.runtime.model.system import System
 def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
     """|entry| of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
     found, columns = np.zeros(system.unknowns), system.pattern.columns_of()
-    mine = system.once(("own", group, kind), lambda: _places(system, group, kind))
+    mine = _own_places(system, group, kind)
     np.maximum.at(found, columns[mine], np.abs(values[mine]))
     return found
 
@@ -47,30 +49,22 @@ def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
     return found
 
 
-def compliance(system: System, jy: Floats, jyd: Floats) -> Floats:
-    """What each unknown is divided by to compare it with its like [unknowns].
-
-    Momenta of unlike inertias are as unlike as their flows are alike, displacements of unlike stiffnesses as their
-    efforts are: of momenta the inertia, of displacements one over the stiffness.  1 for all of a kind and unit of which
-    one has none, and for what else there is.
+def own_places(system: System) -> tuple[NDArray[np.int64], ...]:
+    """Places in the pattern of what coordinates hold of themselves: flows in rows of dynamics, displacements there;
+    flows in rows of momentum, momenta there.
     """
-    inertia, stiffness = own_inertia(system, jy, jyd), _own(system, jy, "dynamics", "q")
-    found, families = np.ones(system.unknowns), system.description.families
-    at = [slice(first, first + family.size) for family, first in zip(families, system.form.at, strict=False)]
+    groups = ("dynamics", "f"), ("dynamics", "q"), ("momentum", "f"), ("momentum", "p")
+    return tuple(_own_places(system, *group) for group in groups)
+
+
+def _own_places(system: System, group: str, kind: str) -> NDArray[np.int64]:
+    return system.once(("own", group, kind), lambda: _places(system, group, kind))
+
+
+def with_flows(system: System) -> Iterator[tuple[slice, NDArray[np.int64]]]:
+    """Momenta of each family, and the flows of their coordinates."""
+    families, at = system.description.families, system.form.at
     flow = {family.owner: k for k, family in enumerate(families) if family.kind == "f"}
-    plain: set[tuple[str, str]] = set()
     for k, family in enumerate(families[: len(at)]):
-        if family.kind == "q":
-            with np.errstate(divide="ignore"):
-                size = 1.0 / stiffness[at[k]]
-        elif family.kind == "p" and family.owner in flow:
-            size = inertia[at[flow[family.owner]]]
-        else:
-            continue
-        found[at[k]] = size
-        if not ((size > 0.0) & np.isfinite(size)).all():
-            plain.add((family.kind, family.unit))
-    for k, family in enumerate(families[: len(at)]):
-        if (family.kind, family.unit) in plain:
-            found[at[k]] = 1.0
-    return found
+        if family.kind == "p" and family.owner in flow:
+            yield slice(at[k], at[k] + family.size), at[flow[family.owner]] + np.arange(family.size)

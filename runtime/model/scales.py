@@ -11,92 +11,90 @@ During a run magnitudes grow with max |y|; a second run starts with the maxima o
 from __future__ import annotations
 
 import ctypes as c
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
-from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.inertia import compliance
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.inertia import own_places, with_flows
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
+from sysdyn.values import dataclass
 
 ROUND_OFF = 1e-12
 """Of the largest quantity of the same unit: smaller ones are what is left of a zero."""
-NOTHING = 1e-14
-"""Of the largest of the same kind and unit: less is what arithmetic leaves of a zero."""
-FRESH = 1e-9
-"""Of what a rate makes of a quantity in the time scale known so far: a start below this part of it is round-off."""
 UNKNOWN = 1.0
 """Magnitude of what is zero with all that could size it."""
 GROUP = 1e-3
-SPAN = 1e-2
-NOISE = 1e-6
-"""Values below this part of what balances their rows are round-off, or zero by chance."""
-QUIET = 1e-9
-"""Efforts below this part of (largest energy) / q are round-off."""
 _SAMPLES = 16
 _PARTS = np.array([1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)])
 """Of the span: where rows are asked how far they moved, the first to tell how fast."""
+RUNGS = 1e-3 ** np.arange(4)
+"""Of the time scale: steps of implicit Euler that tell how far unknowns get."""
+Far = tuple[Floats, Floats, Floats, Ints | None]
 _HOLDS = ("phi", "psi")
 """Beginnings of the names of groups of constraints."""
 _SWEEPS = 8
 
 
-def _grouped(system: System, y: Floats, moves: Floats, compliance: Floats) -> Floats:
-    """What is not zero at the start counts as it is, be it ever so small: it may grow.  Zeros count as what they move
-    in the time scale of the start, and as GROUP of their like at least.
-    """
-    known = np.maximum(np.abs(y), moves)
-    largest = compliance * group_maximum(system, known / compliance)
-    return np.where(np.abs(y) > NOTHING * largest, known, np.maximum(known, GROUP * largest))
+@dataclass(frozen=True, slots=True)
+class Sizing:
+    """The core's tables for the magnitudes of one form (core/sizing.h), and the arrays that they point to."""
+
+    core: lib.Sizing
+    kept: tuple[object, ...]
 
 
-def excitation(system: System, t0: float, t_end: float, y: Floats, yd: Floats) -> tuple[Floats, float]:
-    """How far each row moves with t alone over the span [rows]; shortest time in which one does so [s]."""
-    moves, a, b = np.zeros(max(system.rows, 1)), system._buffer(y), system._buffer(yd)
-    point = t0, t_end - t0, lib.pointer(a), lib.pointer(b)
-    parts = lib.pointer(_PARTS), _PARTS.size
-    quick = lib.core.sd_excitation(c.byref(system.core), *point, *parts, NOISE, lib.pointer(moves))
-    system.failure.check()
-    return moves[: system.rows], float(quick)
+def sizing(system: System) -> Sizing:
+    """Found once a text."""
+    return system.once("sizing", lambda: _sizing(system))
 
 
-def time_scale(system: System, span: float, y: Floats, yd: Floats, excited: float) -> float:
-    """Shortest of: a hundredth of the span, y / y', sqrt(q / f'), the time scale of what moves with t (s)."""
-    found = min(SPAN * span, excited)
-    state = system.are("q", "f", "p", "s")
-    form, size, rate = system.form, group_maximum(system, np.abs(y)), np.abs(yd)
-    # values that are nothing beside what their rate makes of them are round-off
-    real = state & (size > FRESH * rate * found) & (rate > 0.0)
-    found = min(found, float((size[real] / rate[real]).min(initial=np.inf)))
-    both = (size[form.k_q] > 0.0) & (rate[form.k_f] > 0.0)
-    return min(found, float(np.sqrt(size[form.k_q][both] / rate[form.k_f][both]).min(initial=np.inf)))
+def _sizing(system: System) -> Sizing:
+    rows, nominal = balance(system), system.nominal
+    kind, own = _kinds(system), [places.astype(np.int32) for places in own_places(system)]
+    effort, moved = (item.astype(np.int32) for item in _displaced(system))
+    partner = np.full(system.unknowns, -1, dtype=np.int32)
+    for momenta, flows in with_flows(system):
+        partner[momenta] = flows
+    arrays = nominal, kind, partner, *own, effort, moved
+    core = lib.Sizing(
+        balance=rows.address,
+        nominal=lib.pointer(nominal),
+        kind=lib.pointer(kind),
+        partner=lib.pointer(partner),
+        owns=tuple(item.size for item in own),
+        efforts=effort.size,
+        effort=lib.pointer(effort),
+        moved=lib.pointer(moved),
+        parts=_PARTS.size,
+        part=lib.pointer(_PARTS),
+        rungs=RUNGS.size,
+        rung=lib.pointer(RUNGS),
+    )
+    core.own[:] = [lib.pointer(item) for item in own]
+    return Sizing(core, (rows, arrays))
 
 
-def _flows(system: System, found: Floats, span: float) -> Floats:
-    """Flows at rest, and not accelerated but by round-off: a small part of what would move their q in the span."""
-    form = system.form
-    least = 0.1 * found[form.k_q] / (span or 1.0)
-    result = found.copy()
-    quiet = found[form.k_f] < NOISE * least
-    result[form.k_f[quiet]] = GROUP * least[quiet]
-    return result
+def _kinds(system: System) -> Ints:
+    """What each unknown is, as core/sizing.h says it [unknowns]."""
+    masks = (
+        system.are("q", "f", "p", "s"),
+        system.are("f"),
+        _with_momentum(system),
+        *(system.are(kind) for kind in ("q", "p", "s")),
+    )
+    found = np.zeros(system.unknowns, dtype=np.int32)
+    for k, mask in enumerate(masks):
+        found |= mask.astype(np.int32) << k
+    return found
 
 
 def balance(system: System) -> Balance:
     """The rows of a system's Jacobian."""
     pattern = system.pattern
     return system.once("balance", lambda: Balance(system.rows, pattern.row, pattern.columns_of(), alike(system)))
-
-
-def _efforts(system: System, found: Floats, row: Floats) -> Floats:
-    """Least effort that counts in each row of dynamics [rows]: a tiny part of the largest energy over its q."""
-    i, columns = system.once("efforts", lambda: _displaced(system))
-    least, q = np.zeros(system.rows), found[columns]
-    least[i] = QUIET * (row[i] * q).max(initial=0.0) / np.where(q > 0.0, q, np.inf)
-    return least
 
 
 def _displaced(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -202,49 +200,23 @@ def _own_momentum(system: System) -> NDArray[np.bool_]:
 
 
 def magnitudes(
-    system: System, t0: float, t_end: float, y: Floats, yd: Floats, far: Callable[[float], Floats] | None = None
+    system: System, t0: float, t_end: float, y: Floats, yd: Floats, far: Far | None = None
 ) -> tuple[Floats, float]:
     """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s].
 
-    far: how far each unknown gets within a time; None: as its rate says.
+    far: the motion linearised at the start, which says how far each unknown gets (sd_relaxed in core/sizing.h): dF/dy,
+    dF/dyd [entries], rates [unknowns], the order of the columns; None: as its rate says.
     """
     span = max(t_end - t0, 0.0) or 1.0
-    y, yd = (np.where(np.isfinite(item), item, 0.0) for item in (y, yd))
-    state = system.are("q", "f", "p", "s")
-    excited, quick = excitation(system, t0, t0 + span, y, yd)
-    tau = time_scale(system, span, y, yd, quick)
-    jy, jyd = system.jacobian(t0, y, yd)
-    # flows without inertia follow from the rest
-    carries = state & (~system.are("f") | system.differential(jyd) | _with_momentum(system))
-    moves = np.where(carries, tau * np.abs(yd) if far is None else far(tau), 0.0)
-    known = np.maximum(np.abs(y), moves)
-    form = system.form
-    flows = np.maximum(known, GROUP * group_maximum(system, known))[form.k_f]
-    moves[form.k_q[np.abs(y[form.k_f]) < QUIET * flows]] = 0.0  # rates that are round-off
-    known = _grouped(system, y, moves, compliance(system, jy, jyd))
-    found = np.where(system.nominal > 0.0, system.nominal, known)
-    found = _flows(system, found, span)
-    size = np.abs(jy) + np.abs(jyd) / tau
-    size = np.where(np.isfinite(size), size, 0.0)
-    rows, columns, own = system.pattern.row, system.pattern.columns_of(), balance(system)
-    # what round-off leaves of a zero is nothing beside what the sources will make of it
-    driven = own.propagate(np.zeros(found.size), size, excited, capped=True)
-    found = np.where(carries & (found < ROUND_OFF * driven), driven, found)
-    # momenta and dynamic variables are balanced against flows, what follows from the state against all of it: so
-    # round-off of a start does not pass for a magnitude
-    kept = np.where(system.are("q", "f") & carries, found, 0.0)
-    balanced = own.propagate(kept, size, excited, largest=True, capped=True)
-    found = np.where(~system.are("p", "s") | (found > NOISE * balanced), found, balanced)
-    kept = np.where(carries, found, 0.0)
-    row = excited.copy()
-    np.maximum.at(row, rows, size * kept[columns])
-    excited = np.maximum(excited, _efforts(system, found, row))
-    balanced = own.propagate(kept, size, excited, capped=True)
-    found = np.where(found > NOISE * balanced, found, balanced)
-    found = np.where(found == 0.0, group_maximum(system, found), found)
-    found[form.k_q] = np.where(found[form.k_q] == 0.0, tau * found[form.k_f], found[form.k_q])
-    tiny = np.finfo(np.float64).tiny * 1e30
-    return np.where(found > tiny, found, UNKNOWN), tau
+    a, b = (system._buffer(np.where(np.isfinite(item), item, 0.0)) for item in (y, yd))
+    found, tau = np.zeros(system.unknowns), np.zeros(1)
+    motion = map(lib.pointer, (None, None, None, None) if far is None else far)
+    answers = lib.pointer(found), lib.pointer(tau)
+    core = c.byref(sizing(system).core), c.byref(system.core)
+    if lib.core.sd_magnitudes(*core, t0, span, lib.pointer(a), lib.pointer(b), *motion, *answers):
+        raise MemoryError
+    system.failure.check()
+    return found, float(tau[0])
 
 
 def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Floats:
@@ -252,6 +224,8 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.
     """
-    found = _flows(system, np.maximum(met, GROUP * group_maximum(system, met)), span)
-    free = system.are("q", "f", "p", "s") & (system.nominal == 0.0)
-    return np.where(free, np.clip(found, NOISE * magnitude, magnitude), magnitude)
+    found = np.zeros(system.unknowns)
+    arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)
+    if lib.core.sd_confirmed(c.byref(sizing(system).core), c.byref(system.core), span, *arrays):
+        raise MemoryError
+    return found

@@ -131,6 +131,12 @@ class Problem:
     check: Callable[[], None] | None = None
 
 
+    def within(self, free: Mask) -> Problem:
+        """The same in other free unknowns."""
+        entries, sizes = (self.rows, self.columns, self.number, self.use), (self.guess, self.scale, self.weight)
+        return Problem(self.residual, self.jacobian, *entries, free, *sizes, self.work, self.core, self.check)
+
+
 @dataclass(frozen=True, slots=True)
 class Solution:
     """x, its largest scaled row and all scaled rows [number]."""

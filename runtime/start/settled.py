@@ -86,7 +86,7 @@ class Settler:
         self._left = settled if condensed is None else condensed
         self.rates = rates_of(settled)
         if condensed is not None:
-            self.rates = condensed.rates()
+            self.rates = condensed.rates
             magnitude, state = magnitude[condensed.kept], state[condensed.kept]
             light = None if light is None else light[condensed.kept]
         n, k = self._left.unknowns, int(self.rates.size)

@@ -128,7 +128,7 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
             if not use.any() or not may.any():
                 continue
             problem = problem_of(starter, t, x, guess, rows=use, free=may)
-            gentle = replace(problem, free=may & starter.following(t, x))
+            gentle = problem.within(may & starter.following(t, x))
             trials = enumerate(_trials(gentle, problem, x))
             k, found = next(((k, s) for k, s in trials if s.residual < EXACT), (0, None))
             if found is not None:
@@ -280,6 +280,8 @@ def _nearer(
     x = best.x
     follows = starter.following(t, x) | starter.idle
     follows[starter.carried()] = True
+    if not (x != guess)[free & ~follows].any():
+        return None, 0.0
     curved = np.zeros(x.size, dtype=bool)
     bent = _bent(starter, t, x) & starter.groups("phi")
     curved[starter.columns[bent[starter.rows]]] = True
@@ -305,7 +307,7 @@ def _nearer(
     for stays in (BACK * np.maximum(size, largest), NOISE * size):
         near = np.where(np.abs(aim - guess) > stays, aim, guess)
         for held in (state, state & (near == guess)):
-            found = solve(replace(problem, free=free & ~held), np.where(held, near, x))
+            found = solve(problem.within(free & ~held), np.where(held, near, x))
             clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
             now = (np.inf, np.inf) if clean is None else change(clean)
             less = now[0] < (1.0 - NOISE) * said or (now[0] <= (1.0 + BACK) * said and now[1] <= EVEN * unsaid)

@@ -20,8 +20,9 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import group_maximum
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import KEPT, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.equations import Equations
@@ -45,6 +46,23 @@ class _Given:
 
 
 def _given(system: System) -> _Given:
+    """The initial values of a text; where no two are of one unknown the run before left all but the numbers."""
+    initial, layouts, key = system.description.initial, system.description.layouts, ("given", system.form.name)
+    if key not in layouts or any(i.positions is not p for i, (p, _) in zip(initial, layouts[key][0], strict=False)):
+        found = _stated(system)
+        places = [(item.positions, system.form.at[item.family] + item.positions) for item in initial]
+        number = sum(own.size for _, own in places)
+        if number == np.count_nonzero(found.written) and number <= KEPT:
+            layouts[key] = places, found
+        return found
+    places, same = layouts[key]
+    guess = np.zeros(same.guess.size)
+    for item, (_, own) in zip(initial, places, strict=True):
+        guess[own] = item.values
+    return _Given(guess, same.fixed, same.written, same.label)
+
+
+def _stated(system: System) -> _Given:
     n = system.form.written
     guess, fixed, written = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     label: dict[int, RowLabel] = {}
@@ -62,7 +80,7 @@ def _given(system: System) -> _Given:
         fixed[places] |= item.fixed
         written[places] = True
         label.update(dict.fromkeys(places.tolist(), item.label))
-    return _Given(guess, fixed, written, label)
+    return _Given(guess, read_only(fixed), read_only(written), label)
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +262,14 @@ class Starter:
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
+        if self._sums is not None:
+            return self._between(kinds)
+        kept, key = self.equations.held_between, tuple(kinds)
+        if key not in kept:
+            kept[key] = read_only(self._between(kinds))
+        return kept[key]
+
+    def _between(self, kinds: Sequence[str]) -> Mask:
         outside = ~self.moves(kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
         mask[self.rows[self._structural & outside[self.columns]]] = False
@@ -342,6 +368,19 @@ class Starter:
         found[self.first :] = False
         return found
 
+    @remembered
+    def weights(self, t: float, x: Floats) -> Floats:
+        """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
+        values.
+        """
+        return self.weights_by(t, x, self.scale(t, x))
+
+    def weights_by(self, t: float, x: Floats, scale: Floats) -> Floats:
+        """The same where magnitudes are others."""
+        weight = np.where(self.following(t, x), WEIGHT["following"], self.weight)
+        weight[: self.n] *= scale[: self.n] / group_maximum(self.system, scale[: self.n])
+        return weight
+
     def carried(self) -> Ints:
         """Of flows with momenta: the momentum where the flow is written, else the flow."""
         return np.where(self.given.written[self._flow], self._momentum, self._flow)
@@ -398,11 +437,8 @@ class Starter:
 
 def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
     """The equations `rows` in the unknowns `free`, the others as in x."""
-    follows = starter.following(t, x)
-    weight = np.where(follows, WEIGHT["following"], starter.weight)
-    # unknowns of one kind and unit are moved by one measure, whatever their values
     scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
-    weight[: starter.n] *= scale[: starter.n] / group_maximum(starter.system, scale[: starter.n])
+    weight = starter.weights_by(t, x, scale) if starter.generous else starter.weights(t, x)
     return weighted(starter, t, guess, rows=rows, free=free, scale=scale, weight=weight)
 
 

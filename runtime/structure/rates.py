@@ -74,6 +74,15 @@ def _inert(system: System) -> NDArray[np.bool_]:
     return read_only(np.asarray(inert[system.family_of]))
 
 
+def _read(system: System) -> NDArray[np.bool_]:
+    """Unknowns whose rates block observe_rate reads, as far as it is told [unknowns]."""
+    kernels = system.description.blocks.get("observe_rate", ())
+    if any(kernel.rates is None for kernel in kernels):
+        return read_only(np.ones(system.unknowns, dtype=bool))
+    families = frozenset[int]().union(*(kernel.rates for kernel in kernels if kernel.rates is not None))
+    return read_only(np.isin(system.family_of, sorted(families)))
+
+
 def _nudges(number: int) -> list[tuple[Floats, Floats]]:
     """Parts by which values are moved, and times by which rates are, at the start and beside it."""
     random = np.random.default_rng(0)
@@ -85,6 +94,8 @@ def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     y, yd = start.for_form(system)
     _, jyd = system.jacobian(start.t, y, yd)
     free = ~(unique(system, jyd) | system.once("inert", lambda: _inert(system)))
+    if not (free & system.once("rates observed", lambda: _read(system))).any():
+        return np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
     nudges = system.once_if_small("nudges", lambda: _nudges(y.size))
     found: NDArray[np.bool_] | None = None
     for size, (part, times) in zip((0.0, MOVED), nudges, strict=True):

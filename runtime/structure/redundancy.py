@@ -77,6 +77,28 @@ def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu
     return Reactions(which, place, value, multipliers, rows, scale)
 
 
+def independent(system: System, jy: Floats) -> bool:
+    """Whether the constraints that hold now are few, and independent beyond doubt."""
+    idle = system.idle_multipliers()
+    key = "reacting places", idle.tobytes()
+    multipliers, mine, row, column = system.once(key, lambda: _reacting_places(system, idle))
+    if not multipliers or multipliers > DENSE or system.rows > 4 * DENSE:
+        return not multipliers
+    value = jy[mine]
+    arrays = lib.pointer(row), lib.pointer(column), lib.pointer(value)
+    found = lib.core.sd_independent(multipliers, system.rows, value.size, *arrays, NOISE, TOLERANCE)
+    if found < 0:
+        raise MemoryError
+    return bool(found)
+
+
+def _reacting_places(system: System, idle: Ints) -> tuple[int, Longs, Ints, Ints]:
+    """How many multipliers react; the places of J's entries in the pattern, the multiplier and the row of each."""
+    multipliers, mine = _of(system, ("kappa", "mu"), idle)
+    which = np.searchsorted(multipliers, system.pattern.columns_of()[mine])
+    return multipliers.size, mine, which.astype(np.int32), system.pattern.row[mine].astype(np.int32)
+
+
 def _of(system: System, kinds: tuple[str, ...], idle: Ints) -> tuple[Longs, Longs]:
     """Multipliers of those kinds but for the idle ones, and the places in the pattern of their reactions."""
     multipliers = np.setdiff1d(np.flatnonzero(system.are(*kinds)), idle)
@@ -175,29 +197,28 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     if not number:
         return np.zeros(0, dtype=np.int32)
 
-    def sizes(point: Floats) -> Floats:
-        """The largest entry of each row of J, as written."""
-        found = np.zeros(number)
-        a, b = system._buffer(point), system._buffer(yd)
+    def sizes(points: Floats) -> Floats:
+        """The largest entry of each row of J, as written, at points [k, unknowns]: [k, number]."""
+        found = np.zeros((len(points), number))
+        a, b = np.zeros((len(points), system.form.extended)), system._buffer(yd)
+        a[:, : points.shape[1]] = points
         places = take.size, lib.pointer(take), lib.pointer(which), number, lib.pointer(found)
-        if lib.core.sd_row_sizes(c.byref(system.core), state.t, lib.pointer(a), lib.pointer(b), *places):
+        at = state.t, *a.shape, lib.pointer(a), lib.pointer(b)
+        if lib.core.sd_row_sizes(c.byref(system.core), *at, *places):
             raise MemoryError
         system.failure.check()
         return found
 
-    here = sizes(y)
     anywhere = y + np.maximum(np.abs(y), 1.0) * _directions(system, 1)[0, : y.size]
-    with np.errstate(all="ignore"):
-        straight = (here > 0.0) & (here == sizes(anywhere))
+    here, elsewhere = sizes(np.stack([y, anywhere]))
+    straight = (here > 0.0) & (here == elsewhere)
     if straight.all():  # rows of J that are the same everywhere vanish nowhere
         return np.zeros(0, dtype=np.int32)
     starter = system.starter or Starter(system, remember=True)
     x = np.concatenate([state.y, state.yd[starter.rates]])
     size = np.where(starter.moves(("q",))[: x.size], starter.scale(state.t, x), 0.0)
-    there = np.full(number, np.inf)
-    for direction in _directions(system, POINTS):
-        shaken = x + BESIDE * size * direction[: x.size]
-        there = np.minimum(there, sizes(starter.expand(shaken)[0]))
+    shaken = (x + BESIDE * size * _directions(system, POINTS)[:, : x.size])[:, : starter.n]
+    there = sizes(shaken).min(axis=0, initial=np.inf)
     return np.flatnonzero(here <= TOLERANCE * there).astype(np.int32)
 
 

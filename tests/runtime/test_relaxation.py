@@ -1,11 +1,13 @@
 """How far unknowns get by the linearised motion; what displacements and momenta are compared by."""
 
+import ctypes
+
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate.relaxation import displacement
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model import scales
 from sysdyn.runtime.model.carrier import load
-from sysdyn.runtime.model.inertia import compliance
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
 
@@ -37,7 +39,10 @@ def at_start(made):
 def test_what_relaxes_gets_as_far_as_its_damper_lets_it(form):
     quick = 1e-6
     system, yd, jy, jyd = at_start(damped(form, quick))
-    far = displacement(system, jy, jyd, yd)(1e-2)
+    far = np.zeros(system.unknowns)
+    rungs = scales.RUNGS.size, lib.pointer(scales.RUNGS)
+    arrays = map(lib.pointer, (np.ascontiguousarray(jy), np.ascontiguousarray(jyd), yd))
+    assert lib.core.sd_relaxed(ctypes.byref(system.core), None, *rungs, *arrays, 1e-2, lib.pointer(far)) == 0
     kind = "f" if form == "lagrangian" else "p"
     slow, fast = far[system.kinds == kind]
     # implicit Euler: v = h F/(m + h b + h^2 k)
@@ -50,7 +55,9 @@ def test_what_relaxes_gets_as_far_as_its_damper_lets_it(form):
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
 def test_like_is_compared_by_effort_and_flow(form):
     system, _, jy, jyd = at_start(damped(form, 1e-3))
-    found = compliance(system, jy, jyd)
+    found = np.zeros(system.unknowns)
+    core = scales.sizing(system).core
+    assert lib.core.sd_compliance(ctypes.byref(core), *map(lib.pointer, (jy, jyd, found))) == 0
     np.testing.assert_allclose(found[system.kinds == "q"], [0.5, 1e-3], rtol=1e-12)
     if form == "hamiltonian":
         np.testing.assert_allclose(found[system.kinds == "p"], [1.0, 1e-3], rtol=1e-12)

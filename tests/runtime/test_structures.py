@@ -21,14 +21,15 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("RunSamples", "sd_samples"), ("Modes", "sd_modes"), ("Mode", "sd_mode"), ("Held", "sd_held")]
     pairs += [("Transition", "sd_transition"), ("Contact", "sd_contact"), ("Kink", "sd_kink")]
     pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
-    pairs += [("Balance", "sd_balance"), ("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
+    pairs += [("Balance", "sd_balance"), ("Sizing", "sd_sizing")]
+    pairs += [("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
     pairs += [("Condensed", "sd_condensed"), ("Expanded", "sd_expanded"), ("Span", "sd_span")]
     pairs += [("Straight", "sd_straight"), ("Left", "sd_left")]
     pairs += [("RadauMethod", "sd_radau_method")]
     pairs += [("Watch", "sd_watch"), ("Collocation", "sd_collocation")]
     headers = [
         f'#include "{name}.h"'
-        for name in ("run", "bdf", "radau", "dopri", "energy", "many", "search", "expanded")
+        for name in ("run", "bdf", "radau", "dopri", "energy", "many", "search", "sizing", "expanded")
     ]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:

@@ -1,0 +1,97 @@
+"""Sums of sums: unknowns that are sums of kept ones and of each other, as sums of kept ones alone.
+
+What stands where follows from the structure; the numbers are those of the terms, multiplied along each
+way and added up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
+
+Longs = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Composition:
+    """T by rows: start [eliminated + 1], source [entries] places among the kept ones, ascending in each row.
+
+    direct: (entry, term) of what reads a kept unknown itself; levels: (entry, term, entry read) of what reads one
+    through an unknown whose row is complete by then.
+    """
+
+    start: Longs
+    source: Longs
+    direct: tuple[Longs, Longs]
+    levels: tuple[tuple[Longs, Longs, Longs], ...]
+
+    def values(self, factor: Floats) -> Floats:
+        """The entries of T [entries] by the factors of the terms."""
+        found = np.zeros(self.source.size)
+        entry, term = self.direct
+        np.add.at(found, entry, factor[term])
+        for entry, term, through in self.levels:
+            np.add.at(found, entry, factor[term] * found[through])
+        return found
+
+
+def ranges(first: Longs, count: Longs) -> Longs:
+    """first[k], first[k] + 1, ... of each k, one behind the other."""
+    return np.repeat(first - (np.cumsum(count) - count), count) + np.arange(count.sum())
+
+
+def composed(start: Longs, kept: Longs, through: Longs) -> Composition:
+    """Start [eliminated + 1]: the terms of each row; kept, through [terms]: the kept unknown that a term reads, or the
+    eliminated one, whose row stands before; -1.
+    """
+    number = start.size - 1
+    owner = np.repeat(np.arange(number), np.diff(start))
+    depth = _depth(number, owner, through)
+    rows, columns, terms, read = ([np.zeros(0, dtype=np.int64)] for _ in range(4))
+    first, count = np.zeros(number, dtype=np.int64), np.zeros(number, dtype=np.int64)
+    level: list[Longs] = [np.zeros(0, dtype=np.int64)]
+    at = 0
+    for k in range(int(depth.max(initial=-1)) + 1):
+        mine = depth[owner] == k
+        direct, indirect = np.flatnonzero(mine & (kept >= 0)), np.flatnonzero(mine & (through >= 0))
+        many = count[through[indirect]]
+        entry = ranges(first[through[indirect]], many)
+        term = np.concatenate([direct, np.repeat(indirect, many)])
+        places = np.concatenate(columns)
+        row, column = owner[term], np.concatenate([kept[direct], places[entry]])
+        # one entry of T for each kept unknown that a row reads
+        order = np.lexsort((column, row))
+        new = np.ones(term.size, dtype=bool)
+        new[1:] = (np.diff(row[order]) != 0) | (np.diff(column[order]) != 0)
+        slot = np.empty(term.size, dtype=np.int64)
+        slot[order] = at + np.cumsum(new) - 1
+        rows.append(row[order][new])
+        columns.append(column[order][new])
+        own, first_at, size = np.unique(rows[-1], return_index=True, return_counts=True)
+        first[own], count[own] = at + first_at, size
+        terms.append(term)
+        read.append(np.concatenate([np.full(direct.size, -1), entry]))
+        level.append(slot)
+        at += rows[-1].size
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    order = np.lexsort((column, row))
+    final = np.empty(order.size, dtype=np.int64)
+    final[order] = np.arange(order.size)
+    begin = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=number))]).astype(np.int64)
+    parts = [(final[slot], term, by) for slot, term, by in zip(level, terms, read, strict=True)]
+    direct_entry = np.concatenate([entry[by < 0] for entry, _, by in parts])
+    direct_term = np.concatenate([term[by < 0] for _, term, by in parts])
+    levels = tuple((entry[by >= 0], term[by >= 0], final[by[by >= 0]]) for entry, term, by in parts if (by >= 0).any())
+    return Composition(begin, column[order], (direct_entry, direct_term), levels)
+
+
+def _depth(number: int, owner: Longs, through: Longs) -> Longs:
+    """How many rows stand between each row and kept unknowns alone [eliminated]."""
+    depth, use = np.zeros(number, dtype=np.int64), through >= 0
+    while True:
+        before = depth.copy()
+        np.maximum.at(depth, owner[use], 1 + depth[through[use]])
+        if (depth == before).all():
+            return depth
