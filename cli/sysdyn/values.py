@@ -60,7 +60,7 @@ def _text(self: Any) -> str:
 
 SHARED = {
     "__setattr__": _refuse_set, "__delattr__": _refuse_delete, "__getstate__": _state, "__setstate__": _restore,
-    "__repr__": _text,
+    "__repr__": _text, "__replace__": dataclasses.replace,
 }  # fmt: skip
 
 

@@ -110,7 +110,9 @@ def _rank(system: System, family: int) -> int:
 
 
 class _Search:
-    """Unknowns and the rows that define them, as far as they are found; reads[a]: families that define family a.
+    """Unknowns and the rows that define them, as far as they are found; reads[a]: families that define family a; read:
+    families that define any.  No family is defined through itself: the next one is read by none so far, or reads none
+    that is defined.
 
     allowed [entries]: the row may define the unknown.
     """
@@ -122,6 +124,7 @@ class _Search:
         self.entry = np.argsort(self.rows, kind="stable")
         self.defined, self.free = np.zeros(system.unknowns, dtype=bool), np.ones(system.rows, dtype=bool)
         self.reads: dict[int, set[int]] = {}
+        self.read: set[int] = set()
         self.parts: list[tuple[int, Longs]] = []
         spans = [(first, first + system.description.rows[family].size) for _, family, first in system.form.groups]
         pairs = [(family, span) for span in spans for family in self._families(*span)]
@@ -134,14 +137,14 @@ class _Search:
         return set(self.of[self.entry[self.start[first] : self.start[last]]].tolist()) - {-1}
 
     def _candidates(self, family: int, span: tuple[int, int]) -> Longs:
-        """Entries through which these rows can define unknowns of a family: alone in their row, and read by nothing
-        that they read; of several rows that could define an unknown the first.
+        """Entries through which these rows can define unknowns of a family: alone in their row, and free of circles; of
+        several rows that could define an unknown the first.
         """
         entries = self.entry[self.start[span[0]] : self.start[span[1]]]
         own, of = self.rows[entries] - span[0], self.of[entries]
         here = of == family
         once = np.bincount(own[here], minlength=span[1] - span[0]) == 1
-        blocked = [k for k in self._families(*span) if k != family and family in self._through(k)]
+        blocked = [k for k in self._families(*span) if k != family and k in self.reads and family in self.read]
         once[own[np.isin(of, blocked)]] = False
         found = entries[here & once[own]]
         found = found[self.allowed[found] & ~self.defined[self.columns[found]] & self.free[self.rows[found]]]
@@ -155,27 +158,30 @@ class _Search:
         self.free[self.rows[chosen]] = False
         entries = self.entry[self.start[span[0]] : self.start[span[1]]]
         taken = entries[np.isin(self.rows[entries], self.rows[chosen])]
-        self.reads.setdefault(family, set()).update(set(self.of[taken].tolist()) - {family})
+        others = set(self.of[taken].tolist()) - {family}
+        self.reads.setdefault(family, set()).update(others)
+        self.read |= others
         self.parts.append((family, chosen))
 
-    def _through(self, family: int) -> set[int]:
-        """Families that a family is defined through."""
-        seen: set[int] = set()
-        todo = [family]
-        while todo:
-            new = self.reads.get(todo.pop(), set()) - seen
-            seen |= new
-            todo += new
-        return seen
-
-    def _depth(self, family: int) -> int:
-        return max((1 + self._depth(k) for k in self.reads.get(family, ())), default=0)
+    def _depths(self) -> dict[int, int]:
+        """How many definitions a family is defined through, one after the other."""
+        found: dict[int, int] = {}
+        for first in self.reads:
+            path = [first]
+            while path:
+                new = [k for k in self.reads.get(path[-1], ()) if k not in found]
+                if not new:
+                    family = path.pop()
+                    found[family] = max((1 + found[k] for k in self.reads.get(family, ())), default=0)
+                path += new
+        return found
 
     def found(self, unread: Longs) -> Elimination:
         """The unknowns, families that others read first, each in the order of its places."""
         none = np.zeros(0, dtype=np.int64)
         pivot = np.concatenate([none, *(part for _, part in self.parts)])
-        depth = np.concatenate([none, *(np.full(part.size, self._depth(family)) for family, part in self.parts)])
+        depths = self._depths()
+        depth = np.concatenate([none, *(np.full(part.size, depths[family]) for family, part in self.parts)])
         pivot = pivot[np.lexsort((self.columns[pivot], depth))]
         row = self.rows[pivot]
         count = self.start[row + 1] - self.start[row]

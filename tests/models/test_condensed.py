@@ -134,7 +134,8 @@ def _same_rows(left, t, n, _):
 
 def test_a_charge_that_is_traced_is_integrated(tmp_path):
     """The charge through a resistor: the integral of its current."""
-    trace = trace_of(tmp_path, LADDER.replace("audit.energy", "R[n/2].q as charge"), method="radau")
+    text = LADDER.replace("audit.energy, audit.constraints", "R[n/2].q as charge every 2 ms")
+    trace = trace_of(tmp_path, text, method="radau")
     t, at = np.unique(np.asarray(trace.time), return_index=True)
     current, charge = (trace[name].values[at] for name in ("current", "charge"))
     assert charge[-1] - charge[0] == pytest.approx(CubicSpline(t, current).integrate(t[0], t[-1]), rel=1e-4)
