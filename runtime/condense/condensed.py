@@ -22,7 +22,7 @@ from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
 
-LEAST = 50
+LEAST = 20
 """Unknowns from which it is worth the trouble."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
