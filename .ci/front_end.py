@@ -12,6 +12,7 @@ tree = Path(sys.argv[1]).resolve()
 with tempfile.TemporaryDirectory() as folder:
     (Path(folder) / "sysdyn").mkdir()
     (Path(folder) / "sysdyn" / "dsl").symlink_to(tree / "dsl")
+    (Path(folder) / "sysdyn" / "values.py").symlink_to(tree / "cli" / "sysdyn" / "values.py")
     sys.path.insert(0, folder)
     sys.dont_write_bytecode = True
     from sysdyn.dsl import load

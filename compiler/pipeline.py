@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,7 @@ from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+from sysdyn.values import dataclass
 
 FORMULATIONS: dict[str, Callable[[EnergyModel], DescriptorForm]] = {
     "lagrangian": lagrangian,

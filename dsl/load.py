@@ -6,7 +6,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from sysdyn.dsl.elaborate import events
@@ -29,6 +29,7 @@ from sysdyn.dsl.rules import checks, graph_checks, laws
 from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 _FRAMES = 20_000  # nesting is bounded by the parser (200 levels); chains of definitions by the file's size
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.values import dataclass
 
 LEAST = 1e-12
 """Smallest part of what went through a ledger that its balance may be."""

@@ -6,7 +6,7 @@ Receives manifest, binding, carrier and options; hands back an `Outcome`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 NOT_STIFF = "not stiff"
 """Why method auto stays with the explicit method."""

@@ -1,6 +1,7 @@
 """What all tests share."""
 
 import os
+import sys
 
 import pytest
 
@@ -13,3 +14,25 @@ def _one_cache(tmp_path_factory):
         patch.setenv("SYSDYN_CACHE", str((base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"))
         patch.delenv("NO_COLOR", raising=False)
         yield
+
+
+@pytest.fixture
+def effort():
+    """Calls a function and counts the lines of Python that it runs: what a clock would say on a machine of its own."""
+
+    def counted(function):
+        lines = 0
+
+        def seen(_frame, event, _argument):
+            nonlocal lines
+            lines += event == "line"
+            return seen
+
+        before = sys.gettrace()
+        sys.settrace(seen)
+        try:
+            return function(), lines
+        finally:
+            sys.settrace(before)
+
+    return counted

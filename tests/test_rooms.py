@@ -103,3 +103,10 @@ def _first(called: dict[tuple[str, str], int], file: str, name: str) -> int:
     found = [n for (f, q), n in called.items() if f == file and (q == name or q.startswith(f"{name}."))]
     assert found, f"{file}: {name} is never called"
     return min(found)
+
+
+def test_no_test_reads_a_clock_that_measures_speed():
+    clock = re.compile(r"\b(?:process_time|perf_counter|getrusage|" + r"thread_time)\b")
+    assert not [
+        p.name for p in (ROOT / "tests").rglob("test_*.py") if p.name != "test_rooms.py" and clock.search(p.read_text())
+    ]

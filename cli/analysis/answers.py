@@ -6,7 +6,7 @@ Received: a Linear and the kinds asked (bode, nyquist, step).  Returned: curves 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from sysdyn.runtime.linear import responses
 from sysdyn.runtime.linear.modes import Transfer
 from sysdyn.runtime.linear.responses import Frequencies, Margins
 from sysdyn.runtime.linear.tangent import NoLinearisation
+from sysdyn.values import dataclass
 
 Array = NDArray[np.float64]
 ROWS = 13

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from sysdyn.cli.failures import UsageError
@@ -24,6 +24,7 @@ from sysdyn.runtime.arrival import arrival
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.values import dataclass
 
 STORES = 200
 """Stores up to which the energy of a mode is shared out."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from sysdyn.runtime.linear.tangent import Given, Outputs, Reduced, Wide, integra
 from sysdyn.runtime.linear.witnessed import witnessed
 from sysdyn.runtime.model.forms import FORMS, Form
 from sysdyn.runtime.model.system import System
+from sysdyn.values import dataclass
 
 Array = NDArray[np.float64]
 Input = tuple[str, tuple[int, ...]]

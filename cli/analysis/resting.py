@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from sysdyn.runtime.linear.rest import Rest
 from sysdyn.runtime.linear.stability import Verdict, energy_at, verdict
 from sysdyn.runtime.linear.tangent import NoLinearisation
 from sysdyn.runtime.trace.trace_store import columns_of
+from sysdyn.values import dataclass
 
 SHOWN = ("q", "f", "s", "e")
 """Kinds of unknowns that a table shows, flows where they are not zero."""

@@ -7,7 +7,6 @@ import math
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 from sysdyn.cli.page.columns import aligned
@@ -17,6 +16,7 @@ from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import About, Compared, Event, Source, Tolerance, Verdict
 from sysdyn.runtime.trace.opening import regular
+from sysdyn.values import dataclass
 
 SHOWN = 20
 """Quantities within their limit that the table lists."""

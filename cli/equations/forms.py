@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from sysdyn.cli.analysis.asked import begun
 from sysdyn.cli.analysis.linear import inputs_of, linearised
@@ -32,6 +31,7 @@ from sysdyn.dsl.model.expression import Node, const, param, scale, var
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.tangent import NoLinearisation
 from sysdyn.runtime.model.system import System
+from sysdyn.values import dataclass
 
 MOST = 400
 """Row families that are printed."""

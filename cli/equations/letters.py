@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.mirror import letter, spelled
 from sysdyn.dsl.model.expression import Node
+from sysdyn.values import dataclass
 
 GREEK = (
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu", "xi",

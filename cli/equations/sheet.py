@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.cli.equations.forms import Content
 from sysdyn.cli.equations.letters import Letters
@@ -23,6 +22,7 @@ from sysdyn.compiler.model.terms import Nest
 from sysdyn.compiler.pipeline import CompiledModel
 from sysdyn.dsl.model.expression import Node, index
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

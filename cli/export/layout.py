@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from sysdyn.cli.export.starts import start_tables
 from sysdyn.cli.export.tables import NOTHING, Call, Group, Output, State, Tables, assembled
@@ -21,6 +19,7 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.structure.structure import Structure
 from sysdyn.runtime.trace.trace_store import columns_of
+from sysdyn.values import dataclass
 
 STATE = ("q", "f", "p", "s")
 LARGEST = 4_000_000

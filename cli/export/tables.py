@@ -6,13 +6,12 @@ runtime's own `System`, so that what is called outside is assembled as it is ins
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.underlying import Selection
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
+from sysdyn.values import dataclass
 
 NOTHING: Ints = np.zeros(0, dtype=np.int32)
 

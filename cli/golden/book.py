@@ -11,12 +11,13 @@ import json
 import os
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 import click
 from sysdyn.cli.failures import UsageError
+from sysdyn.values import dataclass
 
 BOOK = "golden.toml"
 VERSION = 1

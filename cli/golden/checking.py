@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
 from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance, Verdict
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.values import dataclass
 
 DIFFERENT, SOLVER, INPUT_OUTPUT = 1, 3, 5
 SHARE = 0.01

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.checking import INPUT_OUTPUT, Case, check
 from sysdyn.cli.run.crew import Lost, each
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ formulation that can express the scene then runs as `check` will, by both method
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Curve, Flags, bernstein, cells_at
 from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
 from sysdyn.runtime.comparison.verdict import SHARE, Tolerance, Verdict
+from sysdyn.values import dataclass
 
 REFERENCE = (2e-2, 1e-3, 1e-5)
 """Accuracy of the reference run, of rtol; the next where one is not enough."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.arrays import Arrays, arrays_of
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 INSTANTS = 2000
 """Rows of each run besides its steps: what has no stored rate is a line between them."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -13,6 +12,7 @@ from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 PRELUDE = "prelude"
 """The module that is loaded before every file: nothing of it is imported."""

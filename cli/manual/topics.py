@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import sysdyn.dsl.load
 from sysdyn.cli.page.columns import aligned
+from sysdyn.values import dataclass
 
 FOLDER = Path(sysdyn.dsl.load.__file__).parent / "language"
 FIRST = [

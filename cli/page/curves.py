@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import Any
 
 import numpy as np
 from sysdyn.runtime.comparison.curve import Curve, Floats, bernstein, cells_at
 from sysdyn.runtime.comparison.verdict import Source
+from sysdyn.values import dataclass
 
 COLUMNS = 460
 WIDTH, HEIGHT = 560, 260

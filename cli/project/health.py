@@ -10,8 +10,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
+
+from sysdyn.values import dataclass
 
 NEEDED = ("click", "h5py", "lark", "matplotlib", "numpy", "scipy", "sympy")
 ROOM = 100 << 20

@@ -8,7 +8,7 @@ the variation of a cubic is known in closed form by its extremes.  One run gives
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.runtime.integrate.options import Progress
 from sysdyn.runtime.trace.trace import Quantity, Trace
+from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
 

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.cli.reduce.activity import Activity
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.dsl.text.diagnostics import SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 Cut = tuple[int, int, str]
 """Code points first..last-1 of a text, and what stands there instead."""

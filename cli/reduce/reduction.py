@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from sysdyn.dsl.format.format import format_text
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report, SourceText
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 FINER = 0.1
 """Of the accuracy: that of the runs that are compared."""

@@ -8,7 +8,6 @@ component are one stub, and those too thin to be seen are added up.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from sysdyn.cli.page.picture import drawing
 from sysdyn.cli.reduce.activity import Activities, Activity
 from sysdyn.cli.report.balance import WORDS
 from sysdyn.dsl.text.render import printable
+from sysdyn.values import dataclass
 
 COLOURS = {"held": "#1f5fa8", "out": "#d1495b", "in": "#2f8f6b", "through": "#9aa0a6"}
 THIN = 0.01

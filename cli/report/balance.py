@@ -8,7 +8,7 @@ are integrated by the solver in a run of their own.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.cli.page.document import escape, table
@@ -33,6 +33,7 @@ from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Net
 from sysdyn.dsl.model.units import si
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 MOST = 400
 """Elements and statements whose power is observed."""

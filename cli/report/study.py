@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sysdyn.cli.equations.mathml import Typesetter
 from sysdyn.cli.report.balance import Share
@@ -15,6 +14,7 @@ from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

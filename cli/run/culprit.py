@@ -7,7 +7,6 @@ first operation whose arguments are numbers and whose value is none is named wit
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 from sysdyn.cli.run.last_state import LastState
@@ -18,6 +17,7 @@ from sysdyn.dsl.model.expression import Node, to_text, topological
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.system import System
+from sysdyn.values import dataclass
 
 AHEAD = (0.0, 1e-9, 1e-6, 1e-3, 1e-2, 1e-1)
 """Times ahead at which rows are evaluated, of the time passed so far (and multiples of the step)."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from sysdyn.runtime.integrate.options import Watch
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import Outcome
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

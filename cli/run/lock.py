@@ -12,7 +12,6 @@ import hashlib
 import json
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 SUFFIX = ".lock"
 FORMAT = 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib.abc
 import importlib.util
 import time
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import ModuleType
 from typing import Any
 
@@ -21,6 +21,7 @@ from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import ModelError, Place, Report
 from sysdyn.runtime.model import carrier
 from sysdyn.runtime.model.carrier import Carrier
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

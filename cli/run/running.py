@@ -7,7 +7,7 @@ import hashlib
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 
@@ -38,6 +38,7 @@ from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.simulate import Outcome, simulate
 from sysdyn.runtime.trace.opening import replaceable
 from sysdyn.runtime.trace.trace import Parameter
+from sysdyn.values import dataclass
 
 ACCURACY = 1e-4
 FINEST_RTOL = 1e-14

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from sysdyn.runtime.structure.implicit import undetermined
 from sysdyn.runtime.structure.inertia import negative_inertia
 from sysdyn.runtime.structure.order import order_and_manifold
 from sysdyn.runtime.structure.structure import Structure, structure
+from sysdyn.values import dataclass
 
 SOUGHT = {
     "perturbed_stage": "from a point beside the guess: the equations are singular at the guess itself",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
@@ -15,6 +15,7 @@ from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

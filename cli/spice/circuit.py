@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from sysdyn.cli.spice.netlist import Card, Unreadable, cards, value
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
+from sysdyn.values import dataclass
 
 IGNORED = (".end", ".title", ".options", ".option", ".global", ".width", ".nodeset")
 SILENT = (".op", ".ac", ".dc", ".noise", ".tf", ".four", ".meas", ".measure", ".control", ".endc", ".temp")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from sysdyn.cli.spice.circuit import Model, pairs
 from sysdyn.cli.spice.netlist import Card, Unreadable, number, value
 from sysdyn.cli.spice.sources import SHAPES, Asked, Shape, direct
 from sysdyn.cli.spice.writing import plain, quantity
+from sysdyn.values import dataclass
 
 THERMAL = 0.025864186  # V: k T/q at 27 Celsius, CODATA constants
 LOCAL = {

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 
 from sysdyn.cli.spice.netlist import Unreadable
 from sysdyn.cli.spice.writing import plain, quantity
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

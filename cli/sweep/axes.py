@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.running import separate
+from sysdyn.values import dataclass
 
 Numbers = NDArray[np.float64]
 Evaluate = Callable[[str, str], float | None]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
 

@@ -11,13 +11,14 @@ import itertools
 import json
 import tomllib
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.sweep.axes import MOST, Axis, Numbers
+from sysdyn.values import dataclass
 
 SAMPLES = ("random", "latin", "sobol")
 Case = dict[str, float | str]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.values import dataclass
 
 REFRESH = 10.0
 """Seconds between two versions of the file, at least ten times what writing one takes."""

@@ -12,7 +12,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import islice
 from multiprocessing.connection import Connection
 
@@ -20,6 +20,7 @@ from sysdyn.cli.run.crew import DEATHS, Crew, Serve
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.one_run import Runner, Task
+from sysdyn.values import dataclass
 
 FIRST, LARGEST = 8, 1024
 """Cases of a first chunk, and at most."""

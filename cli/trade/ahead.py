@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from sysdyn.cli.run import targets
@@ -20,6 +19,7 @@ from sysdyn.cli.trade.search import FIRST, Search, tolerance
 from sysdyn.cli.trade.traded import Combination, Measured, Runs
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 STEPS = 20_000
 """Of a first run made ahead at most: one that takes more may be one that the search never makes."""

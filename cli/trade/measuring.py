@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.options import Options, choose_index
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 METHODS = ("dopri", "radau", "bdf")
 LARGE = 20_000

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.cli.trade.measuring import Bench, Limits
@@ -17,6 +16,7 @@ from sysdyn.cli.trade.traded import Combination, Reference
 from sysdyn.cli.verify.agreement import horizon
 from sysdyn.runtime.integrate.accuracy import LAWS
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 FINEST = {"bdf": 1e-13, "radau": 1e-14, "dopri": 3e-14}
 """Tolerances of the runs; finer ones meet round-off."""

@@ -6,7 +6,8 @@ A setting meets an accuracy where its error and the uncertainty of the reference
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from sysdyn.values import dataclass
 
 INDICES = ("2", "3", "2v", "1", "0")
 """As `--index` takes them; a model of index 2 or less is as written at 2 and at 3."""

@@ -8,13 +8,13 @@ Received: traces, bounds by name; handed back: the worst place of each quantity,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.trace.trace import Quantity, Trace
+from sysdyn.values import dataclass
 
 Places = NDArray[np.intp]
 Bounds = Mapping[str, float]

@@ -6,8 +6,6 @@ leave free: those in a vanishing combination of rows of [Phi_q; Psi_f].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started
@@ -15,6 +13,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.structure.redundancy import combination, dependent, reactions
+from sysdyn.values import dataclass
 
 POINTS = 5
 ROUNDING = 1e-9

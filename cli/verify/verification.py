@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
@@ -30,6 +30,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 METHODS = ("bdf", "radau")
 TIMES = 10.0

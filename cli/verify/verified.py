@@ -6,7 +6,6 @@ Received: runs with their traces, bounds by name, the horizon; handed back: disa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from sysdyn.cli.verify.agreement import Bounds, Gap, gaps
@@ -14,6 +13,7 @@ from sysdyn.cli.verify.twins import Twins
 from sysdyn.runtime.judgement import NotMet
 from sysdyn.runtime.simulate import Outcome
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
@@ -20,6 +20,7 @@ from sysdyn.compiler.model.interpret import last_of
 from sysdyn.compiler.program.program import Program
 from sysdyn.dsl.model.expression import Node, topological, topological_unbound
 from sysdyn.dsl.model.network import Network, Slope
+from sysdyn.values import dataclass
 
 Nodes = tuple[Node, ...]
 """Of an expression, each after those it needs."""

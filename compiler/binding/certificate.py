@@ -15,7 +15,6 @@ Received: a network with its branches, numbers bound.  Returned: a Certificate.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
@@ -26,6 +25,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 DECADES = tuple(s * m * 10.0**k for k in range(-9, 7) for m in (1.0, 3.0) for s in (1.0, -1.0))
 """Own variables at which a law is looked at, in SI units."""

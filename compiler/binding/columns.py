@@ -8,7 +8,6 @@ The numbers are those that `bind` gives each run, bit for bit (a caller that dou
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from sysdyn.compiler.model.parameters import Parameters
 from sysdyn.compiler.program.program import Program
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.network import Network
+from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
 

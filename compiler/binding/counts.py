@@ -59,14 +59,14 @@ def _constraints(
     form: DescriptorForm, program: Program, binding: Binding, at_times: frozenset[str]
 ) -> list[Diagnostic]:
     """E517: no block of constraints larger than its set of coordinates."""
-    left = [
-        (k, i)
+    sizes = {
+        k: _size(binding.row_shapes[k])
         for k, r in enumerate(form.rows)
         if r.block in ("phi", "psi") and r.owner not in at_times
-        for i in range(_size(binding.row_shapes[k]))
-    ]
-    if len(left) > LARGEST:
+    }
+    if sum(sizes.values()) > LARGEST:
         return []
+    left = [(k, i) for k, size in sizes.items() for i in range(size)]
     owners = {f.owner: k for k, f in enumerate(form.families) if f.kind == "f"}
     pairs: dict[Element, list[Element]] = {}
     for block, kind in (("phi", "q"), ("psi", "f")):  # a displacement and its flow are one coordinate

@@ -8,7 +8,6 @@ as numbers are given; those it gives by other parameters follow.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from sysdyn.compiler.program.formulas import Formula, program_of
 from sysdyn.compiler.program.program import Program
 from sysdyn.dsl.model.expression import Node, const, topological
 from sysdyn.dsl.model.network import Loop, Network, Parameter
+from sysdyn.values import dataclass
 
 Places = NDArray[np.int64]
 

@@ -13,7 +13,6 @@ Received: a descriptor form and a binding; returned: `Instants`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from sysdyn.compiler.model.interpret import Value, evaluate, grid
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, topological, topological_unbound, variables
 from sysdyn.dsl.model.network import Loop, Table
+from sysdyn.values import dataclass
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]

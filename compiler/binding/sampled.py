@@ -8,7 +8,6 @@ module takes part: it is the interpreter's word against the compiler's.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from sysdyn.compiler.model.magnitudes import magnitudes
 from sysdyn.compiler.model.parameters import Extents, positions
 from sysdyn.compiler.model.terms import has_reduction
 from sysdyn.dsl.model.expression import Node, const, topological
+from sysdyn.values import dataclass
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]

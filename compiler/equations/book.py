@@ -9,7 +9,6 @@ Received: a descriptor form.  Returned: an `Equation` for each row family and ra
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.joining import joined, shorter
@@ -24,6 +23,7 @@ from sysdyn.compiler.model.energies import EnergyModel, Family
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, sub, var, variables
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 FUNCTIONS = ("T*", "T", "V", "V*", "D", "G")
 REFLECTED = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D", "W": "W", "H": "H"}

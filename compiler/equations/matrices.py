@@ -12,7 +12,7 @@ Received: a form without families over ranges, of at most LARGEST rates and mult
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.equations.algebra import Algebra
@@ -23,6 +23,7 @@ from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.dsl.model.expression import Node, add, const, derivative, neg, product, sub, substitute, var, variables
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 LARGEST = 12
 """Rates and multipliers that are solved for in symbols."""

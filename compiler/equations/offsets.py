@@ -12,13 +12,13 @@ Received: a form without families over ranges.  Returned: `Offsets`, None where 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from sysdyn.compiler.equations.matrices import rows_of
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.expression import variables
+from sysdyn.values import dataclass
 
 NEVER = -1e6
 """Of an unknown that a row does not hold."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Summand
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, add, index, sub, substitute, topological
 from sysdyn.dsl.model.network import Loop
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,6 @@ Received: an EnergyModel without families over ranges.  Returned: a PortHamilton
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import Function, gathered
@@ -45,6 +44,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
+from sysdyn.values import dataclass
 
 LARGEST = 24
 """Unknowns up to which matrices are written out."""

@@ -10,14 +10,13 @@ to rows.  Blocks and their meaning: runtime/core/model.h.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sysdyn.compiler.model.energies import Offset, over
 from sysdyn.compiler.model.mirror import letter, lettered, spelled, word
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, topological, variables
 from sysdyn.dsl.model.network import Shape
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
 AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
@@ -71,6 +70,7 @@ class Equations:
     stored: bool = False  # a traced quantity (of block observe)
     fixed: bool = False  # of block initial
     written: bool = True  # of block initial: whether the text says it
+    content: bool = False  # of block initial: what a store holds
 
 
 @dataclass(frozen=True, slots=True)

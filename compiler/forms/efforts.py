@@ -15,12 +15,12 @@ effort as an expression.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from sysdyn.compiler.forms.momenta import at_indices
 from sysdyn.compiler.model.energies import EnergyModel, Row, Virtual
 from sysdyn.compiler.model.terms import Nest, local_variables
 from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, signals_held, substitute, var, variables
+from sysdyn.values import dataclass
 
 PREFIX = "x:"
 """Of the kinds of unknown that stand for effort classes."""

@@ -12,7 +12,7 @@ Received: an EnergyModel whose rows are as written.  Returned: the same model in
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row, tangible
 from sysdyn.compiler.model.terms import Nest, Term, has_reduction, local_variables, vanishes
@@ -29,6 +29,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

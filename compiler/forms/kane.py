@@ -10,7 +10,7 @@ number comes first.  A reaction that something reads is kept with Psi_f Psi_f^T 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Equations, Pin, Unknowns
@@ -34,6 +34,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+from sysdyn.values import dataclass
 
 Entries = dict[str, Node]
 """Coefficients of flows by coordinate, in the counters of the row."""

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.expression import (
@@ -29,6 +28,7 @@ from sysdyn.dsl.model.expression import (
     topological,
     variables,
 )
+from sysdyn.values import dataclass
 
 JUDGED = ("dynamics", "phi_reaction", "psi_reaction", "momentum", "phi", "psi", "gamma", "lambda")
 """Blocks whose rows say how smooth the motion is: others are derivatives of these, or only read."""

@@ -12,7 +12,7 @@ Received: an EnergyModel and the audit's entries.  Returned: ledgers, each with 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import TypeVar
 
@@ -21,6 +21,7 @@ from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, local_variables, summands
 from sysdyn.dsl.model.expression import Node, add, const, derivative, is_const, scale, var, variables
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 MOST = 200
 """Dynamic variables, or coordinates, among which linear invariants are sought."""

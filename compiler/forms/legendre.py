@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.compiler.forms.minors import Square, inverse
 from sysdyn.compiler.model.energies import EnergyModel
@@ -40,6 +40,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.network import Parameter, Slope
+from sysdyn.values import dataclass
 
 LARGEST = 12
 """Coordinates of a block that is looked at."""

@@ -7,7 +7,7 @@ dropped; anything else is an equation on the initial state, a row of block `init
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations, Pin, Unknowns
@@ -16,6 +16,7 @@ from sysdyn.compiler.forms.momenta import resolve
 from sysdyn.compiler.model.energies import EnergyModel, Target
 from sysdyn.compiler.model.terms import counter, local_variables, split, without_nested
 from sysdyn.dsl.model.expression import Node, add, call, const, sub, substitute, time_derivative, var, variables
+from sysdyn.values import dataclass
 
 TURNED = ("kinetic", "potential", "dissipated", "supplied")
 """Members of the audit whose magnitudes make up what went round."""
@@ -100,7 +101,8 @@ def add_initials(
     for equation in equations:
         target = equation.target
         said = Equations("initial", "initial", equation.owner, "initial", target.unit, target.place, fixed=target.fixed)
-        assembly.family(replace(said, label=target.store or said.label, written=not target.store))
+        content = bool(target.store)
+        assembly.family(replace(said, label=target.store or said.label, written=target.said, content=content))
         at = tuple(counter(k) for k in range(len(target.nest)))
         residual = resolve(model, carriers, sub(target.target, target.value))
         for term in without_nested(split(residual, target.nest, target.place), "an initial condition"):

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 from sysdyn.compiler.forms.minors import determinant, inverse
@@ -36,6 +35,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+from sysdyn.values import dataclass
 
 LARGEST = 6
 """Flows of one part: its minors are written out."""

@@ -12,7 +12,7 @@ Returned: an EnergyModel and notes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from sysdyn.compiler.model.mirror import PRIMAL, Mirror
 from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
@@ -21,6 +21,7 @@ from sysdyn.dsl.model.expression import Node, derivative, substitute, topologica
 from sysdyn.dsl.model.network import Loop, Network, Shape
 from sysdyn.dsl.model.units import multiply, si_text
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ class Offset:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; store: whose content, where unsaid."""
+    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; store, unit, said: as in `Initial`."""
 
     target: Node
     value: Node
@@ -82,6 +83,7 @@ class Target:
     place: Place
     store: str = ""
     unit: str = "1"
+    said: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +222,7 @@ def _dynamics(network: Network) -> Iterator[Row]:
 def _initials(network: Network) -> Iterator[Target]:
     for i in network.initials:
         nest, (target, value) = canonical(i.loops, flows(i.target), flows(i.value))
-        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit)
+        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit, i.said)
 
 
 def _quantities(network: Network) -> Iterator[Quantity]:

@@ -13,11 +13,11 @@ A slot is named by what it holds; the binding evaluates it:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from sysdyn.dsl.model.expression import Node, linear, to_text, topological
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+from sysdyn.values import dataclass
 
 Slot = tuple[Any, ...]
 

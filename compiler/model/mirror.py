@@ -6,9 +6,8 @@ that lowers energies takes these names from a `Mirror` and so exists once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sysdyn.dsl.model.expression import Node, substitute, var, variables
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from sysdyn.dsl.model.expression import (
     Node,
@@ -31,6 +30,7 @@ from sysdyn.dsl.model.expression import (
 )
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+from sysdyn.values import dataclass
 
 Nest = tuple[Loop, ...]
 LARGEST_LITERAL = 64  # elements of a sum that is written out: more is an array, and wants a loop

@@ -9,11 +9,12 @@ with constant coefficients stays along its expression.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Coupling, Network, NodeFamily, Terminal
+from sysdyn.values import dataclass
 
 Parts = list[tuple[Node, Node]]
 """Coefficient and displacement of each part of a combination."""

@@ -18,12 +18,13 @@ Dynamic variables and implicit unknowns are read wherever they stand.  A family 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.model.terms import summands
 from sysdyn.dsl.model.expression import Node, index, signals_held, variables
 from sysdyn.dsl.model.network import Branch, Constraint, Coupling, Network, Shape
+from sysdyn.values import dataclass
 
 Quantity = tuple[str, str]
 """What it is (x coordinate, n node, b branch, u implicit unknown, s state, c constraint) and its name."""

@@ -13,7 +13,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.initially import initially
-from sysdyn.compiler.network.primal.integrals import line
+from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.contents import momentum
+from sysdyn.compiler.network.primal.overlaps import count, ranges_of
 from sysdyn.compiler.network.primal.rings import closes, family
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -29,13 +31,14 @@ def with_linkages(network: Network) -> Network:
     kinetic = [b for b in network.branches if b.kind == "kinetic" and b.domain.common == "effort"]
     stores = [b for b in kinetic if b.minus is not None]
     parameters: dict[str, Parameter] = {}
-    looped = [b for b in _in_loops(stores) if sum(b.name == other.name for other in network.branches) == 1]
+    names = [b.name for b in network.branches]
+    looped = [b for b in _in_loops(stores, Sizes(network)) if names.count(b.name) == 1]
     for branch in looped:
-        momentum = _momentum(branch, given.get(branch.name, ()))
-        if momentum is not None:
+        begun = _momentum(branch, given.get(branch.name, ()))
+        if begun is not None:
             counters = tuple(loop.index for loop in branch.loops)
             name, unit = f"{branch.name}.linkage", branch.domain.momentum
-            parameters[branch.name] = Parameter(name, _shape(branch), unit, (momentum,), counters, branch.place)
+            parameters[branch.name] = Parameter(name, _shape(branch), unit, (begun,), counters, branch.place)
     if not parameters:
         return network
     free = {b.name: b for b in looped if b.name not in given and b.law is not None and closes(b, stores)}
@@ -75,7 +78,7 @@ def with_linkages(network: Network) -> Network:
     def unsaid(branch: Branch) -> Initial:
         content = held(ex.var(branch.name, "bp", *branch.at))
         zero, unit = ex.const(0.0), branch.domain.momentum.text
-        return Initial(content, zero, False, branch.loops, branch.place, branch.name, unit)
+        return Initial(content, zero, False, branch.loops, branch.place, branch.name, unit, said=False)
 
     return replace(
         network,
@@ -101,7 +104,7 @@ def _shape(branch: Branch) -> Shape:
     return tuple((loop.first, loop.last) for loop in branch.loops)
 
 
-def _in_loops(stores: Sequence[Branch]) -> list[Branch]:
+def _in_loops(stores: Sequence[Branch], sizes: Sizes) -> list[Branch]:
     """Stores of parts of the network in which a loop of them is closed, by families of nodes."""
     part: dict[str, str] = {}
 
@@ -112,16 +115,21 @@ def _in_loops(stores: Sequence[Branch]) -> list[Branch]:
 
     ends = {id(b): tuple(family(b, t) for t in (b.plus, b.minus)) for b in stores}
     within: dict[str, int] = {}
+    beside: dict[str, int] = {}
     closed: set[str] = set()
     for b in stores:
         one, other = ends[id(b)]
         if one == other:
             within[one] = within.get(one, 0) + 1
-        elif root(one) == root(other):
+            continue
+        for end in (one, other):
+            beside[end] = beside.get(end, 0) + count(ranges_of(b.loops, sizes, b.place))
+        if root(one) == root(other):
             closed.add(one)
         else:
             part[root(one)] = root(other)
-    closed |= {name for name, count in within.items() if count > 1}
+    # a chain within a family closes a loop with another one, or with two ways out of it
+    closed |= {name for name, number in within.items() if number > 1 or beside.get(name, 0) > 1}
     roots = {root(name) for name in closed}
     return [b for b in stores if root(ends[id(b)][0]) in roots]
 
@@ -130,22 +138,17 @@ def _momentum(branch: Branch, initials: Sequence[Initial]) -> Node | None:
     """The initial momentum of a store over its loops; None where it has none that the law gives."""
     if branch.law is None:
         return None
-    own_f, own_p = (ex.var(branch.name, kind, *branch.at) for kind in ("bf", "bp"))
     found: list[Initial] = []
     for initial in initials:
         if initial.target.data[1] == "bp":
             found.append(initial)
             continue
         mark = ex.index("#v")
-        if branch.side == "p":
-            momentum = None if ex.variables(branch.law) - {own_f} else ex.substitute(branch.law, {own_f: mark})
-        else:
-            straight = None if ex.variables(branch.law) - {own_p} else line(branch.law, own_p)
-            momentum = None if straight is None else straight.inverse(mark)
-        if momentum is None:
+        held = momentum(branch, mark)
+        if held is None:
             return None
         here = dict(zip(branch.at, initial.target.args, strict=True))
-        value = ex.substitute(ex.substitute(momentum, here), {mark: initial.value})
+        value = ex.substitute(ex.substitute(held, here), {mark: initial.value})
         found.append(replace(initial, value=value))
     said = initially(found, branch.at)
     return None if said is None else said[0]

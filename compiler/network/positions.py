@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.compiler.network.initially import initially
 from sysdyn.compiler.network.primal.bounds import Sizes
@@ -19,6 +19,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, Shape, State, Terminal
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 Wanted = tuple[str, str]
 """Name and kind (nq, bq) of a displacement."""

@@ -18,13 +18,14 @@ coordinates) or reads the audit of the whole.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.network.dead_branches import dead_branches
 from sysdyn.compiler.network.influence import EVERYTHING, Link, Quantity, links, quantities, reached, read_by
 from sysdyn.dsl.model.expression import add, variables
 from sysdyn.dsl.model.network import Energy, Network, Observation, nodes_read
+from sysdyn.values import dataclass
 
 KINDS = {"x": "coordinate", "n": "node", "b": "branch", "u": "implicit", "s": "state", "c": "constraint"}
 """What a quantity's letter stands for, in the order in which a listing names them."""

@@ -7,13 +7,13 @@ Jacobian do.  The functions that come of it have the contract's arguments (runti
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.terms import Nest, counter
 from sysdyn.compiler.program.program import Program, Programmer
 from sysdyn.dsl.model.expression import Node, index, substitute
 from sysdyn.dsl.model.network import Loop
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

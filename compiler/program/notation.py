@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.model.integers import Element, Index, Reference
+from sysdyn.values import dataclass
 
 LARGEST_POWER = 64  # whole powers up to this are multiplications; beyond, pow: as exact, and no longer
 

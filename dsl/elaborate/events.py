@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
 from sysdyn.dsl.elaborate.parts import Frame
@@ -24,6 +23,7 @@ from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.symbols import ParameterSymbol, Typed
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 BESIDE = 1e-20
 """m/s and the like: a flow in the plane that is no flow yet, and has a direction."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.format.format import format_expression
@@ -37,6 +36,7 @@ from sysdyn.dsl.names.symbols import (
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 _BRANCH = (".e", ".f", ".q", ".p", ".power", ".energy", *(f".{m}" for m in MEMBERS))
 _PORTS = tuple(f".{letter}{k}" for k in (1, 2) for letter in "efqp")

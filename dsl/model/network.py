@@ -7,12 +7,12 @@ A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from sysdyn.dsl.model.expression import Node, is_const, topological
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +246,8 @@ class Initial:
     """target = value (fixed) or ~ value (a guess) at the start; target may be any expression of the unknowns.
 
     Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
-    store: whose content that is, where no text says it; unit: of a displacement, of the rate of a momentum.
+    store: whose content a guess is about, by which it is measured; said: whether the text guesses it; unit: of a
+    displacement, of the rate of a momentum.
     depth: 0 of a scene, 1 of the model, 2 of its components, ...: what has less goes before what has more.
     """
 
@@ -258,6 +259,7 @@ class Initial:
     store: str = ""
     unit: str = "1"
     depth: int = 1
+    said: bool = True
 
 
 @dataclass(frozen=True, slots=True)

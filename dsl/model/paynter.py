@@ -10,7 +10,7 @@ the rule E307 enforces it and its page prints it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

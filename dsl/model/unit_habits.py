@@ -7,9 +7,9 @@ made only where all its factors are units.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, names, si_text
+from sysdyn.values import dataclass
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")

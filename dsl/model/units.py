@@ -6,9 +6,10 @@ A dimension is a vector of rational exponents over m kg s A K mol cd and the bas
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
+
+from sysdyn.values import dataclass
 
 BASES = ("m", "kg", "s", "A", "K", "mol", "cd")
 Dimension = tuple[tuple[str, Fraction | int], ...]  # sorted by base, no zero exponents

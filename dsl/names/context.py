@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from sysdyn.dsl.model import dimensions as dim
@@ -30,6 +29,7 @@ from sysdyn.dsl.names.symbols import (
 from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.dsl.tree.walking import children
+from sysdyn.values import dataclass
 
 Value = Typed | Vector
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from sysdyn.dsl.model.unit_habits import chained, common
 from sysdyn.dsl.model.units import Dimension, known
+from sysdyn.values import dataclass
 
 _NAMES = {
     **dict.fromkeys(("PI", "Pi", "M_PI", "π"), "pi"),

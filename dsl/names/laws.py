@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -12,6 +10,7 @@ from sysdyn.dsl.names.context import Context, Failed
 from sysdyn.dsl.names.members import branch_dimension
 from sysdyn.dsl.names.symbols import BranchSymbol, Definition, Typed
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 ONE_PORTS = ("kinetic", "potential", "dissipator", "effort", "flow")
 TWO_PORTS = ("transformer", "gyrator")

@@ -8,7 +8,6 @@ outside they are replaced by the indices given.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -39,6 +38,7 @@ from sysdyn.dsl.names.symbols import (
     nearest,
 )
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE, "drift": NONE}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from sysdyn.dsl.model.expression import Node
@@ -12,6 +12,7 @@ from sysdyn.dsl.model.network import Domain, Loop, Shape
 from sysdyn.dsl.model.units import Dimension, Unit
 from sysdyn.dsl.text.diagnostics import Place, SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 DomainSymbol = Domain
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from sysdyn.dsl.model.unit_habits import chained, respelled, scaled
 from sysdyn.dsl.model.units import known
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.text.source import Span
+from sysdyn.values import dataclass
 
 _DIGITS_BEFORE = re.compile(r"[0-9]+$")
 _UNIT = re.compile(r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[./][^\W\d]\w*(?:\^-?[0-9]+)?)*")

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
+
+from sysdyn.values import dataclass
 
 _SEVERITIES = {"E": "error", "W": "warning", "N": "note"}
 CHECK = "sysdyn check FILE"

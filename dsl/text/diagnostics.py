@@ -7,11 +7,12 @@ where there is one, the text to write instead (`help`). Rules never raise: they 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from sysdyn.dsl.text.remedies import remedy
 from sysdyn.dsl.text.source import Place, SourceText, Span
+from sysdyn.values import dataclass
 
 __all__ = ["Diagnostic", "Edit", "ModelError", "Place", "Related", "Report", "SourceText", "Span"]
 

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import NamedTuple
+
+from sysdyn.values import dataclass
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 

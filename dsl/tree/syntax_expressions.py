@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sysdyn.dsl.text.source import Span
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree.syntax_expressions import Dotted, Expr, Number, Unit, Word
 from sysdyn.dsl.tree.syntax_scenes import SceneStatement
 from sysdyn.dsl.tree.syntax_statements import Broken, Statement
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sysdyn.dsl.text.source import Span
 from sysdyn.dsl.tree.syntax_expressions import Arg, Expr, Unit, Word
 from sysdyn.dsl.tree.syntax_statements import Broken, Expect, Golden, Init, When
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

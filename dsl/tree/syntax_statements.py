@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from sysdyn.dsl.text.source import Span
 from sysdyn.dsl.tree.syntax_expressions import Arg, Decl, Dotted, Expr, Unit, Word
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

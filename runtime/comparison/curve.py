@@ -8,10 +8,9 @@ largest of them, and its extremum follows from the quadratic derivative in close
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

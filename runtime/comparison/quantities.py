@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.comparison.curve import (
@@ -26,6 +26,7 @@ from sysdyn.runtime.comparison.curve import (
 )
 from sysdyn.runtime.comparison.tube import band, outside
 from sysdyn.runtime.comparison.verdict import About, Compared, Source, Tolerance, Worst
+from sysdyn.values import dataclass
 
 BLOCK = 1 << 16
 """Cells at a time: about 30 arrays of half a megabyte."""

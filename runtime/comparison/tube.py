@@ -8,8 +8,6 @@ not decide are halved.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from sysdyn.runtime.comparison.curve import (
     Curve,
@@ -21,6 +19,7 @@ from sysdyn.runtime.comparison.curve import (
     value_at,
     with_extrema,
 )
+from sysdyn.values import dataclass
 
 HALVINGS = 16
 """What is then undecided counts as outside: it is within 2^-16 of a cell of the tube's border."""

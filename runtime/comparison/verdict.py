@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Protocol
 
 from sysdyn.runtime.comparison.curve import Floats
+from sysdyn.values import dataclass
 
 
 class Incomparable(Exception):  # noqa: N818 (a name of the house: no fault of the program)

@@ -6,11 +6,10 @@ way and added up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
 

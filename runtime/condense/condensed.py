@@ -7,7 +7,6 @@ whose sums read stretches of families become one loop each, whatever their numbe
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from typing import Any
@@ -21,6 +20,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
+from sysdyn.values import dataclass
 
 LEAST, STEEP = 12, 50
 """Unknowns from which it is worth the trouble; the same where laws are steep.  Integrations of 13 to 42 unknowns take

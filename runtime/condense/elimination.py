@@ -12,7 +12,6 @@ constraint between displacements is such a row, its rate takes its place (form 2
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.forms import FORMS
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
+from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 Longs = NDArray[np.int64]

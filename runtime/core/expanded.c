@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NODES 4 /* most points of a method's own quadrature */
-
 void sd_expanded_show(sd_expanded *expanded)
 {
     sd_condensed_expand(expanded->condensed, expanded->inner->y, expanded->y, 0);
@@ -22,7 +20,10 @@ static void follow(sd_expanded *expanded)
         for (int32_t i = 0; i < expanded->face.n; i++)
             sd_met(fabs(expanded->y[i]), &expanded->met[i], &expanded->magnitude[i]);
     }
-    for (int32_t k = 0; k < inner->nodes && k < expanded->nodes; k++)
+    expanded->face.nodes = inner->nodes < expanded->nodes ? inner->nodes : expanded->nodes;
+    expanded->face.node = inner->node;
+    expanded->face.node_weight = inner->node_weight;
+    for (int32_t k = 0; k < expanded->face.nodes; k++)
         sd_condensed_show(expanded->condensed, inner->node_y[k], inner->node_yd[k], expanded->node_y[k],
                           expanded->node_yd[k]);
 }
@@ -65,17 +66,19 @@ void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const d
     memmove(expanded->y, y, size);
     memmove(expanded->yd, yd, size);
     expanded->face.nodes = expanded->inner->nodes;
+    expanded->face.node = expanded->inner->node;
+    expanded->face.node_weight = expanded->inner->node_weight;
 }
 
 sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, int32_t unknowns)
 {
     sd_expanded *expanded = calloc(1, sizeof *expanded);
     size_t n = (size_t)unknowns + 8, m = (size_t)condensed->unknowns + 8;
-    int32_t nodes = inner->node_y ? NODES : 0;
+    int32_t nodes = inner->node_y ? inner->nodes : 0; /* at most */
     if (!expanded)
         return NULL;
     expanded->memory = calloc(2 * n + 2 * m + 2 * (size_t)nodes * n, sizeof(double));
-    expanded->node_y = calloc(2 * NODES, sizeof(double *));
+    expanded->node_y = calloc(2 * (size_t)nodes + 1, sizeof(double *));
     if (!expanded->memory || !expanded->node_y) {
         sd_expanded_free(expanded);
         return NULL;
@@ -87,7 +90,7 @@ sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, i
     expanded->yd = expanded->y + n;
     expanded->z = expanded->yd + n;
     expanded->zd = expanded->z + m;
-    expanded->node_yd = expanded->node_y + NODES;
+    expanded->node_yd = expanded->node_y + nodes;
     for (int32_t k = 0; k < nodes; k++) {
         expanded->node_y[k] = expanded->zd + m + 2 * (size_t)k * n;
         expanded->node_yd[k] = expanded->node_y[k] + n;

@@ -9,7 +9,10 @@
 
 #define MOST 48          /* instants of comparison, at most twice that (many/batch.py) */
 #define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
-#define SAFETY 2.5
+#define SAFETY 2.0
+#define AIM 2.0
+#define LEFT 0.3
+#define SLOWEST 0.75
 #define STRETCH 1.5
 #define SHORT 60
 #define FAR 1e-2
@@ -471,9 +474,9 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         lost = lost_now;
         before = over;
         step_before = step;
-        double drop = pow(1.0 / fmax(1.5 * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, 0.5)));
+        double drop = pow(1.0 / fmax(AIM * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
         tolerance = next;
-        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, 0.2)) * next, many->finest);
+        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, LEFT)) * next, many->finest);
         longest /= STRETCH;
         sd_samples *swap = last;
         if (many->known) {

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ITERATIONS 7       /* of Newton a step */
+#define ITERATIONS 7       /* of Newton a step of three stages */
+#define MORE 1             /* for each stage beyond */
 #define PATIENT 30         /* the same where the step is fixed: nothing is gained by giving up early */
 #define DAMPED 15          /* with corrections shortened */
 #define WALK 45            /* with whole ones: back down an exponential of all digits, one 1/a each, and a few more */
@@ -19,6 +20,14 @@
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
 #define LEAP 8.0           /* the next one is tried that much longer, with fresh slopes at its end */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
+#define WITHIN -0.183
+#define FINEST 5e-12       /* of the estimate: less is round-off */
+#define FEWER 3            /* failures of Newton's in a step from which on each takes stages away */
+#define AWHILE 2           /* steps accepted before the number of stages changes again */
+#define CHANGED 1.2        /* what another one must be worth beside the present one */
+#define LONGER 2.0         /* the first step of more stages beside the last one at most */
+#define FASTEST 0.3        /* contraction with which a longer step is counted on */
+#define BESIDE 2.0         /* iterations' worth of a step besides: slopes and factors */
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
 #define KEEP_HIGH 1.2
@@ -31,25 +40,26 @@
 #define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
 #define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
 
-static const double c[SD_STAGES] = {0.15505102572168219018, 0.64494897427831780982, 1.0};
-static const double inverse_a[SD_STAGES][SD_STAGES] = {
-    {3.2247448713915890491, 1.1678400846904054949, -0.25319726474218082619},
-    {-3.5678400846904054949, 0.7752551286084109509, 1.0531972647421808262},
-    {5.5319726474218082619, -7.5319726474218082619, 5.0},
-};
-/* the quadrature of the method: exact to degree 4 */
-static const double quadrature[SD_STAGES] = {0.37640306270046727505, 0.51248582618842161384, 1.0 / 9.0};
-static const double gamma0 = 3.6378342527444957322;
-static const double complex lambda = 2.6810828736277521339 + 3.0504301992474105694 * I;
-/* A^-1 = S diag(gamma, lambda, conj lambda) S^-1: columns of S, rows of S^-1 */
-static const double column_real[SD_STAGES] = {0.094438762488975241487, 0.25021312296533331138, 1.0};
-static const double complex column_complex[SD_STAGES] = {
-    -0.14125529502095420843 + 0.030029194105147424492 * I, 0.204129352293799932 - 0.3829421127572619378 * I, 1.0};
-static const double row_real[SD_STAGES] = {4.1787185915519047273, 0.32768282076106238708, 0.52337644549944954804};
-static const double complex row_complex[SD_STAGES] = {
-    -2.0893592957759523637 - 0.25143631747289343798 * I, -0.16384141038053119354 + 1.2859634749278027146 * I,
-    0.23831177725027522598 - 0.29801960241411246248 * I};
-static const double estimate[SD_STAGES] = {-10.048809399827415562, 1.3821427331607488958, -1.0 / 3.0};
+/* out [n] := sum_j weight[j] v[j] */
+static inline void sum(int stages, int32_t n, const double *weight, double *const *v, double *out)
+{
+    for (int32_t i = 0; i < n; i++) {
+        double x = weight[0] * v[0][i];
+        for (int j = 1; j < stages; j++)
+            x += weight[j] * v[j][i];
+        out[i] = x;
+    }
+}
+
+static void combine(int stages, int32_t n, const double *weight, double *const *v, double *out)
+{
+    if (stages == 3)
+        sum(3, n, weight, v, out);
+    else if (stages == 5)
+        sum(5, n, weight, v, out);
+    else
+        sum(7, n, weight, v, out);
+}
 
 static int step(void *radau)
 {
@@ -71,40 +81,47 @@ static void start(void *radau, double t, const double *y, const double *yd, doub
     sd_radau_start(radau, t, y, yd, h);
 }
 
-sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *complex_linear)
+sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const *complex_linear, int32_t stages)
 {
     sd_radau *radau = calloc(1, sizeof *radau);
     if (!radau)
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->unknowns + 1;
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
-                          &radau->slope[2], &radau->point, &radau->point_d,
-                          &radau->z[0], &radau->z[1], &radau->z[2], &radau->kept[0], &radau->kept[1], &radau->kept[2],
-                          &radau->d[0], &radau->d[1], &radau->d[2], &radau->y, &radau->rate, &radau->ee,
-                          &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms,
-                          &radau->base[0], &radau->base[1], &radau->base[2],
-                          &radau->full[0], &radau->full[1], &radau->full[2],
-                          &radau->stage[0], &radau->stage[1], &radau->stage[2],
-                          &radau->stage_d[0], &radau->stage_d[1], &radau->stage_d[2], &radau->pull};
-    size_t number = sizeof vectors / sizeof *vectors;
-    radau->memory = calloc(number * m + 3 * nnz, sizeof(double));
-    radau->w = calloc(m + nnz, sizeof(double complex));
-    if (!radau->memory || !radau->w) {
+                          &radau->slope[2], &radau->point, &radau->point_d, &radau->y, &radau->rate, &radau->ee,
+                          &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms, &radau->pull};
+    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full, radau->stage, radau->stage_d};
+    size_t number = sizeof vectors / sizeof *vectors, sets = sizeof of_stages / sizeof *of_stages;
+    size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
+    radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
+    radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
+    radau->gz = calloc(pairs * m + nnz, sizeof(double complex));
+    if (!radau->memory || !radau->gz || !radau->gap) {
         sd_radau_free(radau);
         return NULL;
     }
-    for (size_t i = 0; i < number; i++)
-        *vectors[i] = radau->memory + i * m;
-    radau->jy = radau->memory + number * m;
+    sd_radau_gaps(radau->gap);
+    double *next = radau->memory;
+    for (size_t i = 0; i < number; i++, next += m)
+        *vectors[i] = next;
+    for (size_t i = 0; i < sets; i++)
+        for (int32_t s = 0; s < stages; s++, next += m)
+            of_stages[i][s] = next;
+    radau->jy = next;
     radau->jyd = radau->jy + nnz;
     radau->g = radau->jyd + nnz;
-    radau->gz = radau->w + m;
+    for (size_t k = 0; k < pairs; k++) {
+        radau->w[k] = radau->gz + nnz + k * m;
+        radau->complex_linear[k] = complex_linear[k];
+    }
     radau->system = system;
     radau->linear = linear;
-    radau->complex_linear = complex_linear;
     radau->n = system->unknowns;
+    radau->stages = sd_radau_methods[0].stages;
+    radau->most_stages = stages;
+    radau->method = radau->used = sd_radau_methods;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
-                                  &radau->taken, step, dense, refine, start, 0, c, quadrature, radau->stage,
+                                  &radau->taken, step, dense, refine, start, stages, NULL, NULL, radau->stage,
                                   radau->stage_d, NULL, NULL, NULL, NULL, NULL, 1};
     return radau;
 }
@@ -114,7 +131,8 @@ void sd_radau_free(sd_radau *radau)
     if (!radau)
         return;
     free(radau->memory);
-    free(radau->w);
+    free(radau->gz);
+    free(radau->gap);
     free(radau);
 }
 
@@ -162,7 +180,38 @@ static double tested_norm(const sd_radau *radau, const double *x)
 static void leave_below(sd_radau *radau, double null_pivot)
 {
     radau->linear->null_pivot = null_pivot;
-    sd_linear_z_allow(radau->complex_linear, null_pivot, radau->linear->idle);
+    for (int k = 0; k < SD_PAIRS && radau->complex_linear[k]; k++)
+        sd_linear_z_allow(radau->complex_linear[k], null_pivot, radau->linear->idle);
+}
+
+/* what is interpolated meets no steep law, of what follows from differences of unknowns too little, and has a lower
+ * order than more stages: powers are those of the stages */
+static void show_nodes(sd_radau *radau)
+{
+    const sd_radau_method *used = radau->used;
+    int stages = radau->system->scales > 0 || radau->system->left || used->stages > 3;
+    radau->stepper.nodes = stages ? used->stages : 0;
+    radau->stepper.node = used->c;
+    radau->stepper.node_weight = used->b;
+}
+
+/* Values within a step of more stages may be as far off as its estimate says (where constraints make multipliers), and
+ * shall fall like those of three, with rtol^0.85: the estimate counts within * rtol^(2/3 - 0.85) times. */
+static const double within[SD_METHODS] = {0.0, 0.2, 0.02};
+
+/* Of Newton's corrections, in units of the unknowns' */
+static const double round_off[SD_METHODS] = {10.0, 40.0, 160.0};
+
+/* what the estimate of a method counts beside that of three stages */
+static double strictness(const sd_radau *radau, const sd_radau_method *method)
+{
+    return radau->strict[method - sd_radau_methods];
+}
+
+/* 1 / order of the estimate's error in the step */
+static double power_of(const sd_radau *radau)
+{
+    return 1.0 / (radau->method->stages + 1);
 }
 
 void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd, double h)
@@ -174,20 +223,26 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     for (int32_t i = 0; i < radau->n; i++)
         radau->tested += radau->test[i] >= 0;
     radau->tolerance = fmax(0.1 * pow(radau->rtol, 2.0 / 3.0), 1e-13);
+    for (int k = 0; k < SD_METHODS; k++)
+        radau->strict[k] = fmax(1.0, fmin(within[k] * pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
     memmove(radau->phi, y, size);
     memmove(radau->yd, yd, size);
     memcpy(radau->slope[0], radau->yd, size);
     radau->refined[0] = 1; /* a start is settled */
-    /* what is interpolated meets no steep law, and of what follows from differences of unknowns too little: its powers
-     * are those of the stages */
-    radau->stepper.nodes = radau->system->scales > 0 || radau->system->left ? SD_STAGES : 0;
+    radau->method = sd_radau_methods;
+    while (radau->method->stages < radau->stages)
+        radau->method++;
+    radau->used = radau->method;
+    radau->since = 0;
+    show_nodes(radau);
     radau->h = 1.0;
     set_weights(radau);
     double span = radau->t_end - t, change = tested_norm(radau, yd) * radau->tolerance;
-    if (!(h > 0.0)) { /* local error (h y'/y)^4 within tolerance, with y' / y for the rate of all derivatives */
-        h = FIRST * span * fmin(1.0, pow(1e3 * radau->tolerance, 0.25)); /* runs that are compared begin apart */
+    double power = power_of(radau);
+    if (!(h > 0.0)) { /* local error (h y'/y)^(s+1) within tolerance, with y' / y for the rate of all derivatives */
+        h = FIRST * span * fmin(1.0, pow(1e3 * radau->tolerance, power)); /* runs that are compared begin apart */
         if (isfinite(change) && change > 0.0)
-            h = fmin(h, 0.1 * pow(radau->tolerance, 0.25) / change);
+            h = fmin(h, 0.1 * pow(radau->tolerance, power) / change);
         h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
     }
     radau->h = fmin(radau->fixed_h > 0.0 ? radau->fixed_h : h, radau->h_max);
@@ -198,17 +253,21 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->theta = 1.0;
 }
 
-/* J, E where they are not old, and the factors of J + gamma/h E and J + lambda/h E.  Taken at the last accepted point, or
+/* J, E where they are not old, and the factors of J + gamma/h E and all J + lambda/h E.  Taken at the last accepted point, or
  * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
 static int factorise(sd_radau *radau, int at_end)
 {
     sd_system *system = radau->system;
+    const sd_radau_method *method = radau->method;
+    int last = method->stages - 1;
     if (!radau->old_jacobian) {
-        double **z = radau->z, h = radau->h;
-        for (int32_t i = 0; at_end && i < radau->n; i++) {
-            radau->y[i] = radau->phi[i] + z[2][i];
-            radau->rate[i] =
-                (inverse_a[2][0] * z[0][i] + inverse_a[2][1] * z[1][i] + inverse_a[2][2] * z[2][i]) / h;
+        double h = radau->h;
+        if (at_end) {
+            combine(last + 1, radau->n, method->inverse[last], radau->z, radau->rate);
+            for (int32_t i = 0; i < radau->n; i++) {
+                radau->y[i] = radau->phi[i] + radau->z[last][i];
+                radau->rate[i] /= h;
+            }
         }
         sd_jacobian(system, at_end ? radau->t + h : radau->t, at_end ? radau->y : radau->phi,
                     at_end ? radau->rate : radau->yd, radau->jy, radau->jyd);
@@ -221,21 +280,21 @@ static int factorise(sd_radau *radau, int at_end)
         }
         radau->old_jacobian = 1;
     }
-    double real = gamma0 / radau->h;
-    double complex both = lambda / radau->h;
-    for (int32_t e = 0; e < system->entries; e++) {
+    double real = method->gamma / radau->h;
+    for (int32_t e = 0; e < system->entries; e++)
         radau->g[e] = radau->jy[e] + real * radau->jyd[e];
-        radau->gz[e] = radau->jy[e] + both * radau->jyd[e];
-    }
     radau->ready = 0;
     radau->factorisations++;
     int failed = sd_linear_factor(radau->linear, radau->g, radau->scale);
     radau->bad_row = radau->linear->bad_row;
     radau->bad_column = radau->linear->bad_column;
-    if (!failed) {
-        failed = sd_linear_z_factor(radau->complex_linear, radau->gz, radau->scale);
+    for (int k = 0; k < method->pairs && !failed; k++) {
+        double complex both = method->lambda[k] / radau->h;
+        for (int32_t e = 0; e < system->entries; e++)
+            radau->gz[e] = radau->jy[e] + both * radau->jyd[e];
+        failed = sd_linear_z_factor(radau->complex_linear[k], radau->gz, radau->scale);
         if (failed)
-            sd_linear_z_bad(radau->complex_linear, &radau->bad_row, &radau->bad_column);
+            sd_linear_z_bad(radau->complex_linear[k], &radau->bad_row, &radau->bad_column);
     }
     if (failed)
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
@@ -244,18 +303,19 @@ static int factorise(sd_radau *radau, int at_end)
     return SD_FINE;
 }
 
-/* residuals of the three stages into d */
+/* residuals of the stages into d */
 static int residuals(sd_radau *radau)
 {
+    const sd_radau_method *method = radau->method;
     int32_t n = radau->n;
-    double *z[SD_STAGES] = {radau->z[0], radau->z[1], radau->z[2]};
-    for (int s = 0; s < SD_STAGES; s++) {
-        double a = inverse_a[s][0] / radau->h, b = inverse_a[s][1] / radau->h, e = inverse_a[s][2] / radau->h;
-        for (int32_t i = 0; i < n; i++) {
-            radau->y[i] = radau->phi[i] + z[s][i];
-            radau->rate[i] = a * z[0][i] + b * z[1][i] + e * z[2][i];
-        }
-        sd_residual(radau->system, radau->t + c[s] * radau->h, radau->y, radau->rate, radau->d[s]);
+    for (int s = 0; s < method->stages; s++) {
+        double weight[SD_STAGES];
+        for (int j = 0; j < method->stages; j++)
+            weight[j] = method->inverse[s][j] / radau->h;
+        combine(method->stages, n, weight, radau->z, radau->rate);
+        for (int32_t i = 0; i < n; i++)
+            radau->y[i] = radau->phi[i] + radau->z[s][i];
+        sd_residual(radau->system, radau->t + method->c[s] * radau->h, radau->y, radau->rate, radau->d[s]);
         if (*radau->system->stop)
             return SD_STOPPED;
         int32_t bad = sd_first_bad(n, radau->d[s]);
@@ -267,63 +327,124 @@ static int residuals(sd_radau *radau)
     return SD_FINE;
 }
 
+/* the last factors left a column */
+static int columns_left(const sd_radau *radau)
+{
+    int left = radau->linear->rank < radau->n;
+    for (int k = 0; k < radau->method->pairs; k++)
+        left = left || sd_linear_z_rank(radau->complex_linear[k]) < radau->n;
+    return left;
+}
+
 /* The residuals in d, behind the last correction, are small in every steep row beside the row's own terms: on an
  * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
 static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
 {
     double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
-    int left = radau->linear->rank < radau->n || sd_linear_z_rank(radau->complex_linear) < radau->n, judged = all || left;
+    int left = columns_left(radau), judged = all || left;
     limit = left ? fmax(limit, FAINT_ROW) : limit;
-    for (int s = 0; s < SD_STAGES; s++) {
+    for (int s = 0; s < radau->method->stages; s++) {
         for (int32_t i = 0; i < radau->n; i++) {
             radau->y[i] = radau->phi[i] + radau->z[s][i];
             radau->rate[i] = (fabs(radau->y[i]) + radau->magnitude[i]) / radau->h;
         }
-        if (sd_first_unmet(radau->system, radau->t + c[s] * radau->h, radau->y, radau->rate, radau->d[s], limit,
+        if (sd_first_unmet(radau->system, radau->t + radau->method->c[s] * radau->h, radau->y, radau->rate, radau->d[s], limit,
                            radau->g, radau->scale, judged, radau->terms) >= 0)
             return 0;
     }
     return 1;
 }
 
+/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d */
+static inline void split(sd_radau *radau, int stages, int pairs)
+{
+    const sd_radau_method *method = radau->method;
+    for (int32_t i = 0; i < radau->n; i++) {
+        double r[SD_STAGES];
+        for (int j = 0; j < stages; j++)
+            r[j] = -radau->d[j][i];
+        for (int k = 0; k < pairs; k++) {
+            double complex w = method->rows[k][0] * r[0];
+            for (int j = 1; j < stages; j++)
+                w += method->rows[k][j] * r[j];
+            radau->w[k][i] = w;
+        }
+        double real = method->row[0] * r[0];
+        for (int j = 1; j < stages; j++)
+            real += method->row[j] * r[j];
+        radau->d[0][i] = real;
+    }
+}
+
+/* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and
+ * over what carries the state */
+static inline void join(sd_radau *radau, int stages, int pairs, double *sum, double *state)
+{
+    const sd_radau_method *method = radau->method;
+    const int32_t *idle = radau->linear->idle;
+    for (int32_t i = 0; i < radau->n; i++) {
+        double real = radau->d[0][i];
+        for (int s = 0; s < stages; s++) {
+            double dz = method->column[s] * real;
+            for (int k = 0; k < pairs; k++)
+                dz += 2.0 * (creal(method->columns[k][s]) * creal(radau->w[k][i]) -
+                             cimag(method->columns[k][s]) * cimag(radau->w[k][i]));
+            double v = dz * radau->newton_weight[i];
+            radau->z[s][i] += dz;
+            *sum += v * v;
+            if (idle && !idle[i])
+                *state += v * v;
+        }
+    }
+}
+
 /* One Newton step from the residuals in d; the size of the correction in Newton's weights, and that of what carries the
  * state in state_size. */
 static double correct(sd_radau *radau)
 {
-    int32_t n = radau->n;
-    double *d1 = radau->d[0], *d2 = radau->d[1], *d3 = radau->d[2], sum = 0.0, state = 0.0;
-    double complex *w = radau->w;
-    for (int32_t i = 0; i < n; i++) {
-        double r1 = -d1[i], r2 = -d2[i], r3 = -d3[i];
-        w[i] = row_complex[0] * r1 + row_complex[1] * r2 + row_complex[2] * r3;
-        d1[i] = row_real[0] * r1 + row_real[1] * r2 + row_real[2] * r3;
-    }
-    sd_linear_solve(radau->linear, d1);
-    sd_linear_z_solve(radau->complex_linear, w);
-    for (int32_t i = 0; i < n; i++) {
-        double real = d1[i];
-        for (int s = 0; s < SD_STAGES; s++) {
-            double dz = column_real[s] * real + 2.0 * creal(column_complex[s] * w[i]);
-            double v = dz * radau->newton_weight[i];
-            radau->z[s][i] += dz;
-            sum += v * v;
-            if (radau->linear->idle && !radau->linear->idle[i])
-                state += v * v;
-        }
-    }
+    int stages = radau->method->stages;
+    double all = 0.0, state = 0.0, number = (double)stages * radau->n;
+    if (stages == 3)
+        split(radau, 3, 1);
+    else if (stages == 5)
+        split(radau, 5, 2);
+    else
+        split(radau, 7, 3);
+    sd_linear_solve(radau->linear, radau->d[0]);
+    for (int k = 0; k < radau->method->pairs; k++)
+        sd_linear_z_solve(radau->complex_linear[k], radau->w[k]);
+    if (stages == 3)
+        join(radau, 3, 1, &all, &state);
+    else if (stages == 5)
+        join(radau, 5, 2, &all, &state);
+    else
+        join(radau, 7, 3, &all, &state);
     radau->newton_iterations++;
-    radau->state_size = sqrt(state / (3.0 * n));
-    return n ? sqrt(sum / (3.0 * n)) : 0.0; /* nothing may move: samples alone */
+    radau->state_size = sqrt(state / number);
+    return radau->n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */
+}
+
+/* of Newton a step */
+static int iterations_of(const sd_radau *radau)
+{
+    return ITERATIONS + MORE * (radau->method->stages - 3);
+}
+
+/* Of Newton's corrections in its weights; stages of more have larger round-off */
+static double newton_tolerance(const sd_radau *radau)
+{
+    double least = round_off[radau->method - sd_radau_methods] * DBL_EPSILON / radau->tolerance;
+    return fmax(least, fmin(0.03, sqrt(radau->tolerance)));
 }
 
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 static int iterate(sd_radau *radau, int full, int *used, double *retry)
 {
-    double tolerance = fmax(10.0 * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
+    double tolerance = newton_tolerance(radau);
     double before = 0.0, ratio_before = 0.0, trust = 1.0;
     int patient = full || radau->fixed_h > 0.0;
     *retry = 0.5;
-    int most = patient ? PATIENT : ITERATIONS, converged = 0;
+    int usual = iterations_of(radau), most = patient ? PATIENT : usual, converged = 0;
     for (int m = 1; m <= most + (radau->system->scales > 0); m++) {
         int cause = residuals(radau);
         if (cause)
@@ -347,10 +468,10 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
                 converged = 1;
             }
             trust = radau->theta < SLOW ? radau->theta / (1.0 - radau->theta) : 1.0 / DBL_EPSILON;
-            double end = trust * size * pow(radau->theta, ITERATIONS - 1 - m) / tolerance;
+            double end = trust * size * pow(radau->theta, usual - 1 - m) / tolerance;
             if (!converged && !patient && end >= 1.0 && trust * size > tolerance) {
                 double far = fmax(1e-4, fmin(20.0, end));
-                *retry = 0.8 * pow(far, -1.0 / (4 + ITERATIONS - 1 - m));
+                *retry = 0.8 * pow(far, -1.0 / (radau->method->stages + usual - m));
                 return SD_NEWTON;
             }
         }
@@ -371,7 +492,7 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
 /* z := base + part (z_full - base), residuals there in d */
 static int trial(sd_radau *radau, double part)
 {
-    for (int s = 0; s < SD_STAGES; s++)
+    for (int s = 0; s < radau->method->stages; s++)
         for (int32_t i = 0; i < radau->n; i++)
             radau->z[s][i] = radau->base[s][i] + part * radau->full[s][i];
     return residuals(radau);
@@ -405,12 +526,12 @@ static int full_correction(sd_radau *radau, double *size)
     int cause = factorise(radau, 1);
     if (cause)
         return cause;
-    for (int s = 0; s < SD_STAGES; s++)
+    for (int s = 0; s < radau->method->stages; s++)
         memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
     if ((cause = residuals(radau)))
         return cause;
     *size = correct(radau);
-    for (int s = 0; s < SD_STAGES; s++)
+    for (int s = 0; s < radau->method->stages; s++)
         for (int32_t i = 0; i < radau->n; i++)
             radau->full[s][i] = radau->z[s][i] - radau->base[s][i];
     return isfinite(*size) ? SD_FINE : SD_NEWTON;
@@ -422,11 +543,11 @@ static int full_correction(sd_radau *radau, double *size)
  * scale of its terms. */
 static int iterate_damped(sd_radau *radau, int *used)
 {
-    double tolerance = fmax(10.0 * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
+    double tolerance = newton_tolerance(radau);
     double size;
     int cause = residuals(radau);
     if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
-        for (int s = 0; s < SD_STAGES; s++)
+        for (int s = 0; s < radau->method->stages; s++)
             memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
         cause = SD_FINE;
     }
@@ -440,7 +561,7 @@ static int iterate_damped(sd_radau *radau, int *used)
         if (radau->state_size <= tolerance && residuals(radau) == SD_FINE && rows_hold(radau, tolerance, 1))
             return SD_FINE;
         if (radau->linear->rank < radau->n) {
-            for (int s = 0; s < SD_STAGES; s++)
+            for (int s = 0; s < radau->method->stages; s++)
                 memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
             if ((cause = full_correction(radau, &size)))
                 break;
@@ -456,12 +577,12 @@ static int iterate_damped(sd_radau *radau, int *used)
 static int estimate_error(sd_radau *radau, double *error)
 {
     int32_t n = radau->n;
-    double *v = radau->rate;
+    double *v = radau->rate, strict = strictness(radau, radau->method);
     memcpy(radau->y, radau->phi, (size_t)n * sizeof(double));
     for (int again = 0;; again++) {
+        combine(radau->method->stages, n, radau->method->estimate, radau->z, v);
         for (int32_t i = 0; i < n; i++)
-            v[i] = -(estimate[0] * radau->z[0][i] + estimate[1] * radau->z[1][i] + estimate[2] * radau->z[2][i]) /
-                   radau->h;
+            v[i] = -v[i] / radau->h;
         sd_residual(radau->system, radau->t, radau->y, v, radau->ee);
         if (*radau->system->stop)
             return SD_STOPPED;
@@ -469,11 +590,12 @@ static int estimate_error(sd_radau *radau, double *error)
             radau->ee[i] = -radau->ee[i];
         sd_linear_solve(radau->linear, radau->ee);
         *error = tested_norm(radau, radau->ee);
-        if (!(*error >= 1.0) || again || !(radau->taken == 0 || radau->rejected))
+        if (!(*error * strict >= 1.0) || again || !(radau->taken == 0 || radau->rejected))
             break;
         for (int32_t i = 0; i < n; i++)
             radau->y[i] = radau->phi[i] + (radau->test[i] >= 0 ? radau->ee[i] : 0.0);
     }
+    *error *= strict;
     *error = isfinite(*error) ? fmax(*error, 1e-10) : INFINITY;
     return SD_FINE;
 }
@@ -502,15 +624,74 @@ static void note_pulls(sd_radau *radau)
     }
 }
 
+/* The length of step beside the last one, for each unit of work, that a method would take where its estimate of the
+ * last step had been `error`; iterations: Newton's in the last step.  Its contraction grows with the step. */
+static double worth(const sd_radau *radau, const sd_radau_method *method, double error, int iterations, int troubled,
+                    double *length_taken)
+{
+    double length = SAFETY * pow(fmax(error, 1e-10), -1.0 / (method->stages + 1));
+    double theta = radau->theta, needed = iterations;
+    length = fmax(SHRINK, fmin(GROWTH, length));
+    if (troubled)
+        length = fmin(length, 1.0);
+    if (theta > 0.0 && theta < 1.0) {
+        length = fmin(length, fmax(FASTEST / theta, 1.0));
+        if (length > 1.0)
+            needed *= log(theta) / log(fmin(length * theta, FASTEST));
+    }
+    *length_taken = length;
+    return length / (method->stages * (needed + BESIDE));
+}
+
+/* The method of the next step, whose size so far is `next`: the one that gets on best for its work, as the decay of
+ * Taylor's coefficients in the last step (z) tells the errors of its neighbours; the size of its step. */
+static double choose(sd_radau *radau, double next, double error, int iterations, int troubled)
+{
+    const sd_radau_method *method = radau->method;
+    double size[2], length, h = radau->h;
+    if (radau->most_stages == 3 || radau->since < AWHILE)
+        return next;
+    for (int k = 0; k < 2; k++) {
+        combine(method->stages, radau->n, method->taylor[k], radau->z, radau->rate);
+        size[k] = tested_norm(radau, radau->rate);
+    }
+    if (!(size[0] > 0.0) || !isfinite(size[1]))
+        return next;
+    double best = worth(radau, method, error, iterations, troubled, &length) * CHANGED;
+    if (method->stages > 3) {
+        const sd_radau_method *lower = method - 1;
+        double low = worth(radau, lower, lower->constant * size[0] * strictness(radau, lower), iterations, troubled,
+                           &length);
+        if (low > best) {
+            best = low;
+            radau->method = lower;
+            next = length * h;
+        }
+    }
+    if (method->stages < radau->most_stages && !troubled) {
+        double decay = fmin(size[1] / size[0], 1.0), ratio = (method + 1)->constant / method->constant * decay * decay;
+        ratio *= strictness(radau, method + 1) / strictness(radau, method);
+        if (worth(radau, method + 1, error * ratio, iterations, 0, &length) > best) {
+            radau->method = method + 1;
+            next = fmin(length, LONGER) * h;
+        }
+    }
+    if (radau->method != method)
+        radau->since = radau->ready = 0;
+    return next;
+}
+
 /* the new point, and the next step's size */
-static void accept(sd_radau *radau, double error, int iterations)
+static void accept(sd_radau *radau, double error, int iterations, int troubled)
 {
     size_t size = (size_t)radau->n * sizeof(double);
-    double h = radau->h, **z = radau->z;
-    double limit = fmin(SAFETY, SAFETY * (1 + 2 * ITERATIONS) / (iterations + 2 * ITERATIONS));
-    double ratio = fmax(1.0 / GROWTH, fmin(1.0 / SHRINK, pow(error, 0.25) / limit));
-    if (radau->taken > 0) { /* Gustafsson's predictive controller */
-        double predicted = radau->h_accepted / h * pow(error * error / radau->error_accepted, 0.25) / SAFETY;
+    const sd_radau_method *method = radau->method;
+    double h = radau->h, power = power_of(radau);
+    int usual = iterations_of(radau);
+    double limit = fmin(SAFETY, SAFETY * (1 + 2 * usual) / (iterations + 2 * usual));
+    double ratio = fmax(1.0 / GROWTH, fmin(1.0 / SHRINK, pow(error, power) / limit));
+    if (radau->taken > 0 && radau->since > 0) { /* Gustafsson's predictive controller */
+        double predicted = radau->h_accepted / h * pow(error * error / radau->error_accepted, power) / SAFETY;
         ratio = fmax(ratio, fmax(1.0 / GROWTH, fmin(1.0 / SHRINK, predicted)));
     }
     radau->h_accepted = h;
@@ -518,6 +699,9 @@ static void accept(sd_radau *radau, double error, int iterations)
     double next = h / ratio;
     if (radau->rejected)
         next = fmin(next, h);
+    radau->since++;
+    if (!(radau->fixed_h > 0.0))
+        next = choose(radau, next, error, iterations, troubled);
     double *oldest = radau->before, *slope = radau->slope[2];
     radau->before = radau->last;
     radau->last = oldest;
@@ -531,21 +715,23 @@ static void accept(sd_radau *radau, double error, int iterations)
     radau->h_before = radau->h_used;
     radau->h_used = h;
     note_pulls(radau);
-    for (int s = 0; s < SD_STAGES; s++) {
-        const double *a = inverse_a[s];
+    for (int s = 0; s < method->stages; s++) {
+        combine(method->stages, radau->n, method->inverse[s], radau->z, radau->stage_d[s]);
         for (int32_t i = 0; i < radau->n; i++) {
-            radau->stage[s][i] = radau->phi[i] + z[s][i];
-            radau->stage_d[s][i] = (a[0] * z[0][i] + a[1] * z[1][i] + a[2] * z[2][i]) / h;
+            radau->stage[s][i] = radau->phi[i] + radau->z[s][i];
+            radau->stage_d[s][i] /= h;
         }
     }
-    memcpy(radau->phi, radau->stage[2], size);
-    memcpy(radau->yd, radau->stage_d[2], size);
+    memcpy(radau->phi, radau->stage[method->stages - 1], size);
+    memcpy(radau->yd, radau->stage_d[method->stages - 1], size);
     memcpy(radau->slope[0], radau->yd, size);
-    for (int s = 0; s < SD_STAGES; s++) {
+    for (int s = 0; s < method->stages; s++) {
         double *swap = radau->kept[s];
         radau->kept[s] = radau->z[s];
         radau->z[s] = swap;
     }
+    radau->used = method;
+    show_nodes(radau);
     double t = radau->t + h;
     radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;
     radau->steps++;
@@ -619,8 +805,9 @@ int sd_radau_step(sd_radau *radau)
         if (cause == SD_ERROR_TEST) {
             radau->rejected_steps++;
             radau->rejected = 1;
-            double limit = fmin(SAFETY, SAFETY * (1 + 2 * ITERATIONS) / (iterations + 2 * ITERATIONS));
-            double ratio = fmin(1.0 / SHRINK, pow(error, 0.25) / limit);
+            int usual = iterations_of(radau);
+            double limit = fmin(SAFETY, SAFETY * (1 + 2 * usual) / (iterations + 2 * usual));
+            double ratio = fmin(1.0 / SHRINK, pow(error, power_of(radau)) / limit);
             radau->h *= radau->taken == 0 ? 0.1 : isfinite(ratio) ? 1.0 / fmax(ratio, 1.0) : SHRINK;
         } else {
             radau->newton_failures++;
@@ -643,13 +830,17 @@ int sd_radau_step(sd_radau *radau)
             radau->h *= cause == SD_NEWTON ? retry : 0.25;
             if (++failures > 2)
                 radau->h *= 0.5;
+            if (failures >= FEWER && radau->method->stages > 3) {
+                radau->method--;
+                radau->since = 0;
+            }
             radau->old_jacobian = 0;
             radau->rejected = 1;
         }
     }
     radau->cause = SD_FINE;
     radau->creeping = failures > 0 && error < IDLE ? radau->creeping + 1 : 0;
-    accept(radau, error, iterations);
+    accept(radau, error, iterations, failures > 0);
     if (radau->project)
         project(radau);
     return SD_FINE;

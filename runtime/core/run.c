@@ -71,34 +71,45 @@ static void sample(sd_run *run, double t)
     audit(run, t, run->aux, run->aux_d, run->sample);
 }
 
-/* int_0^to of the polynomial of degree `nodes` that is 1 at node k and 0 at the others and at the step's start (k -1: at
- * the start), by Gauss's rule of degree 3 */
-static double share(const sd_stepper *stepper, int32_t k, double to)
+/* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node, and 0 at
+ * the others, by Gauss's rule of degree 3 or 7 */
+static void shares(const sd_stepper *stepper, double to, double *share)
 {
-    static const double gauss = 0.28867513459481288225; /* 1/(2 sqrt(3)) */
-    double sum = 0.0, own = k < 0 ? 0.0 : stepper->node[k];
-    for (int side = -1; side <= 1; side += 2) {
-        double s = to * (0.5 + side * gauss), value = 1.0;
-        for (int32_t j = -1; j < stepper->nodes; j++) {
-            double other = j < 0 ? 0.0 : stepper->node[j];
-            value *= j == k ? 1.0 : (s - other) / (own - other);
+    static const double gauss[2][4] = {{-0.28867513459481288225, 0.28867513459481288225},
+                                       {-0.43056815579702628761, -0.16999052179242812840, 0.16999052179242812840,
+                                        0.43056815579702628761}};
+    static const double weight[2][4] = {{0.5, 0.5},
+                                        {0.17392742256872692869, 0.32607257743127307131, 0.32607257743127307131,
+                                         0.17392742256872692869}};
+    int high = stepper->nodes > 3, points = stepper->nodes + 1;
+    double node[SD_NODES + 1] = {0.0};
+    memcpy(node + 1, stepper->node, (size_t)stepper->nodes * sizeof *node);
+    for (int k = 0; k < points; k++) {
+        double own = 1.0, sum = 0.0;
+        for (int j = 0; j < points; j++)
+            own *= j == k ? 1.0 : node[k] - node[j];
+        for (int p = 0; p < (high ? 4 : 2); p++) {
+            double s = to * (0.5 + gauss[high][p]), value = weight[high][p];
+            for (int j = 0; j < points; j++)
+                value *= j == k ? 1.0 : s - node[j];
+            sum += value;
         }
-        sum += value;
+        share[k] = to * sum / own;
     }
-    return 0.5 * to * sum;
 }
 
 /* the method's own quadrature over the part `part` of the last step */
 static void integrate_nodes(sd_run *run, double part)
 {
     const sd_stepper *stepper = run->stepper;
-    double from = run->t_from, h = stepper->length ? *stepper->length : *stepper->t - from;
+    double from = run->t_from, h = stepper->length ? *stepper->length : *stepper->t - from, share[SD_NODES + 1];
     if (part < 1.0) { /* the whole step takes nothing of its start */
+        shares(stepper, part, share);
         memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
-        weigh(run, h * share(stepper, -1, part));
+        weigh(run, h * share[0]);
     }
     for (int32_t k = 0; k < stepper->nodes; k++) {
-        double weight = part < 1.0 ? share(stepper, k, part) : stepper->node_weight[k];
+        double weight = part < 1.0 ? share[k + 1] : stepper->node_weight[k];
         if (weight == 0.0)
             continue;
         audit(run, from + stepper->node[k] * h, stepper->node_y[k], stepper->node_yd[k], run->sample);
@@ -143,19 +154,26 @@ static void integrate(sd_run *run, double to)
     run->sampled = to == *stepper->t;
 }
 
-/* The same where an event ends the step at `to`: Gauss's rule of degree 5 on settled points.  Within a step the stages
- * of what follows from constraints alone (the current of a source) are of lower order than their sum over it. */
+/* The same where an event ends the step at `to`: Gauss's rule of degree 5, after many nodes 9, on settled points.  Within
+ * a step the stages of what follows from constraints alone (the current of a source) are of lower order than their sum
+ * over it. */
 static void integrate_cut(sd_run *run, double to)
 {
-    static const double node = 0.77459666924148337704, weight[] = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0};
+    static const double node[2][5] = {{-0.77459666924148337704, 0.0, 0.77459666924148337704},
+                                      {-0.90617984593866399280, -0.53846931010568309104, 0.0, 0.53846931010568309104,
+                                       0.90617984593866399280}};
+    static const double weight[2][5] = {{5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0},
+                                        {0.23692688505618908751, 0.47862867049936646804, 0.56888888888888888889,
+                                         0.47862867049936646804, 0.23692688505618908751}};
+    int high = run->stepper->nodes > 3;
     double half = 0.5 * (to - run->t_from), middle = 0.5 * (to + run->t_from);
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
-    for (int k = -1; k <= 1 && run->audit && half > 0.0; k++) {
-        double t = middle + k * node * half;
+    for (int k = 0; k < (high ? 5 : 3) && run->audit && half > 0.0; k++) {
+        double t = middle + node[high][k] * half;
         run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
         sd_settle_point(run->settle, t, run->aux, run->aux_d);
         audit(run, t, run->aux, run->aux_d, run->sample);
-        weigh(run, half * weight[k + 1]);
+        weigh(run, half * weight[high][k]);
     }
 }
 

@@ -8,6 +8,8 @@
 #include "assembly.h"
 #include "settle.h"
 
+#define SD_NODES 7
+
 enum sd_cause {
     SD_FINE = 0,
     SD_NEWTON = 1,     /* Newton's iteration does not converge */
@@ -36,7 +38,7 @@ typedef struct sd_stepper {
     /* from (t, y, yd) with step h (0: chosen) */
     void (*start)(void *self, double t, const double *y, const double *yd, double h);
     /* a quadrature of the method's own order over the last step (nodes 0: values of `dense` serve): instants and
-     * weights as parts of the step, y, yd [n] there */
+     * weights as parts of the step, y, yd [n] there; before the first start: as many as there may be */
     int32_t nodes;
     const double *node, *node_weight;
     double *const *node_y, *const *node_yd;
@@ -45,7 +47,7 @@ typedef struct sd_stepper {
     const double *length;      /* of the last step, which t does not resolve after many; NULL: the difference of its ends */
     const double *moves, *part_moves; /* [rows of block audit] what moves of displacements that took no time add to the
                                        * integrals over the last step, and over the part of it; NULL: nothing */
-    int32_t collocated;        /* 1: at most three nodes; a polynomial through them and the start serves within the step */
+    int32_t collocated;        /* 1: at most SD_NODES nodes; a polynomial through them and the start serves within the step */
 } sd_stepper;
 
 #define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */

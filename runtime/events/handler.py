@@ -9,7 +9,6 @@ which begin every run as they were bound.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import least_squares
 from sysdyn.runtime.start.impulses import group_rows
 from sysdyn.runtime.start.restart import Restart
+from sysdyn.values import dataclass
 
 CASCADE = 100
 """Rounds of events at one instant: more will never end."""

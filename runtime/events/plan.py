@@ -5,8 +5,9 @@ Rows are places in block observe: a relation a > b is the row a - b.  Made by wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
+
+from sysdyn.values import dataclass
 
 Condition = tuple[Any, ...]
 """("and" | "or", condition, ...), ("not", condition), ("relation", number, operator)"""

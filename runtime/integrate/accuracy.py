@@ -1,7 +1,7 @@
 """An accuracy asked for, met by an estimate of the global error.
 
-A draft is followed by a run at the tolerance that should do, a tenth of the draft's or, where that took many steps,
-less, and both are compared at instants of the draft's own rows; a run behind them at instants of the last one's.
+A draft is followed by a run at the tolerance that should do, a fifth or a tenth of the draft's or, where that took many
+steps, less, and both are compared at instants of the draft's own rows; a run behind them at instants of the last one's.
 With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
 measured over three runs, at most what the method's law credits.  Where the estimate misses what was asked, a finer run
 follows and is compared with the last one.
@@ -13,22 +13,20 @@ early and grows.  Two runs that took the same steps say nothing: a third takes s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.values import dataclass
 
 RUNS = 7
 COARSEST = 1e-2
 LOOSEST = 1e-1
 """Tolerance of a draft at most."""
-SAFETY = 2.5
+SAFETY = 2.0
 """Of the estimate: the instants of comparison miss some of the largest error."""
-RATIO = 0.1
-"""Of the tolerances of the first two runs."""
 RETRIED = (1.0, 0.1, 1e-2)
 """Of the tolerance of a first run: the next ones where it fails."""
 FAR = 1e-2
@@ -41,6 +39,10 @@ WORTH = 0.3
 SHORT, SHORT_CREDIT = 60, 0.75
 """Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
 FIRST_DROP = 1e-2
+AIM, LEFT = 2.0, 0.3
+"""How far below what was asked the next run aims, and the most that is left of its tolerance."""
+SLOWEST = 0.75
+"""The least power with which errors are taken to fall when the next tolerance is chosen."""
 STRETCH = 1.5
 """Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
 differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
@@ -63,7 +65,8 @@ class Law:
 
     gain, power: most runs' estimates stay below gain * tolerance^power; credit: largest power with which the finer
     run's error is believed to be smaller; finest: the smallest tolerance that makes sense; growth: power of the steps
-    that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors.
+    that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors;
+    ratio: of the tolerances of the first two runs.
     """
 
     gain: float
@@ -71,6 +74,7 @@ class Law:
     credit: float
     finest: float
     growth: float = 0.0
+    ratio: float = 0.1
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
@@ -82,7 +86,7 @@ LAWS = {
     # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
     # its error test works with a tenth of the power 2/3 of the tolerance (core/radau.h); on stiff models its order is 3
-    "radau": Law(4.0, 0.85, 0.6, 1e-17, 1.5),
+    "radau": Law(5.0, 1.0, 0.65, 1e-17, 1.5, 0.2),
     "dopri": Law(40.0, 1.0, 0.9, 2e-14),
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
@@ -221,16 +225,16 @@ def _limited(failure: SolverFailure) -> bool:
     return failure.cause in ("max_steps", "max_wall")
 
 
-def _draft(run: Run, tolerance: float, finest: float) -> Sampled:
+def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
     """The first run; where it fails, once more with smaller tolerances."""
     longest = STRETCH * LONGEST
     for smaller in RETRIED[:-1]:
         try:
-            return run(min(max(smaller * tolerance, finest) / RATIO, LOOSEST), longest)
+            return run(min(max(smaller * tolerance, law.finest) / law.ratio, LOOSEST), longest)
         except SolverFailure as failure:
             if _limited(failure) or failure.cause == "stiff":
                 raise
-    return run(max(RETRIED[-1] * tolerance, finest) / RATIO, longest)
+    return run(max(RETRIED[-1] * tolerance, law.finest) / law.ratio, longest)
 
 
 class _Estimate:
@@ -265,10 +269,10 @@ class _Estimate:
 
         What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
         """
-        power = self.law.power if self._power is None else max(self._power, 0.5)
-        drop = (1.0 / max(1.5 * self.over, 1e-300)) ** (1.0 / power)
+        power = self.law.power if self._power is None else max(self._power, SLOWEST)
+        drop = (1.0 / max(AIM * self.over, 1e-300)) ** (1.0 / power)
         least = FIRST_DROP if self._power is None else 1e-3
-        return max(float(np.clip(drop, least, 0.2)) * tolerance, self.law.finest)
+        return max(float(np.clip(drop, least, LEFT)) * tolerance, self.law.finest)
 
 
 def control(
@@ -283,15 +287,15 @@ def control(
     """
     wanted = float(np.min(target, initial=1.0))
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
-    last = _draft(run, tolerance, law.finest)
+    last = _draft(run, tolerance, law)
     estimate, longest = _Estimate(law, target), LONGEST
     number = 1
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
-    tolerance = max(min(tolerance, RATIO * last.tolerance), FAR * last.tolerance, law.finest)
+    tolerance = max(min(tolerance, law.ratio * last.tolerance), FAR * last.tolerance, law.finest)
     while number < RUNS:
         number += 1
-        now = _finer(run, last, tolerance, longest, compared=bool(np.isfinite(estimate.over)))
+        now = _finer(run, last, tolerance, longest, law, compared=bool(np.isfinite(estimate.over)))
         if now is None:
             break
         apart = estimate.compare(last, now)
@@ -306,7 +310,9 @@ def control(
     return _achieved(estimate.apart, False, number, last.tolerance)
 
 
-def _finer(run: Run, last: Sampled, tolerance: float, longest: float, *, compared: bool) -> Sampled | None:
+def _finer(
+    run: Run, last: Sampled, tolerance: float, longest: float, law: Law, *, compared: bool
+) -> Sampled | None:
     """A run with a smaller tolerance; where it fails half the way to it, while that is worth a run.
 
     compared: there is an estimate without it; else its failure is raised.
@@ -320,7 +326,7 @@ def _finer(run: Run, last: Sampled, tolerance: float, longest: float, *, compare
             if _limited(failure) or (not compared and tried == len(RETRIED)):
                 raise
         if not compared:  # there is nothing to hand back yet: as coarse as will do, else a little finer
-            coarse = RATIO * last.tolerance
+            coarse = law.ratio * last.tolerance
             tolerance = coarse if tolerance < WORTH * coarse and tried == 1 else WORTH * tolerance
             continue
         tolerance = float(np.sqrt(tolerance * last.tolerance))

@@ -53,6 +53,8 @@ where constraints are constant sums: their unknowns are interpolated differently
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 UNPULLED = 2
 """Kind of a derivative (core/radau.h): interpolated whatever pulls at its unknown."""
+STAGED = 100_000
+"""Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -154,9 +156,17 @@ class Integration:
         system = self.system.another(name)
         return Settler(system, kinematics, self.magnitude[:n], self._time, state, self._light[:n], left)
 
+    def _stages(self) -> tuple[int, int]:
+        """Of radau: in the first step, at most."""
+        if self.request.stages is not None:
+            return self.request.stages
+        many = self.stepped.unknowns <= STAGED and not self.system.form.scales
+        return 3, lib.STAGES if many else 3
+
     def _stepper(self) -> None:
         request = self.request
-        self.method = Method(request.method, self.stepped, self.linear, self._order, self.underlying)
+        first, most = self._stages()
+        self.method = Method(request.method, self.stepped, self.linear, self._order, self.underlying, most)
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._met = np.zeros(self.system.unknowns)
@@ -168,7 +178,9 @@ class Integration:
         self._tell(method)
         if request.method == "bdf":
             method.max_order = request.max_order
-        elif request.method != "radau":
+        elif request.method == "radau":
+            method.stages = first
+        else:
             method.patience = request.stiff_steps
         if request.method == "energy":
             self._audit = self.system.observer("audit")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ctypes as c
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Ints, RowFamily
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.system import System
+from sysdyn.values import dataclass
 
 HEAD, ROWS = 4, 4
 """Rows of block audit before the ledgers', and of each ledger."""

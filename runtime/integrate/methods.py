@@ -19,7 +19,8 @@ from sysdyn.runtime.model.system import System
 class Method:
     """One of "bdf", "radau", "dopri", "energy" on one system.
 
-    linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri and energy.
+    linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri and energy;
+    stages: of radau, at most.
     Of a condensed system it steps what is kept, and shows every unknown.
     """
 
@@ -30,14 +31,16 @@ class Method:
         linear: Any,
         order: Ints | None,
         underlying: Underlying | None = None,
+        stages: int = 3,
     ) -> None:
         self.name = name
         self.expanded: Any = None
-        self._complex: int | None = None
+        self.complex: tuple[int, ...] = ()
         self._core: Any = None
         if name == "radau":
-            self._complex = _complex_linear(system.pattern, order)
-            self._core = lib.core.sd_radau_new(c.byref(system.core), linear, self._complex)
+            self.complex = tuple(_complex_linear(system.pattern, order) for _ in range(stages // 2))
+            pairs = (c.c_void_p * lib.PAIRS)(*self.complex)
+            self._core = lib.core.sd_radau_new(c.byref(system.core), linear, pairs, stages)
         elif name == "energy":
             assert underlying is not None
             assert isinstance(system, System)
@@ -56,8 +59,8 @@ class Method:
             self._n = system.whole.unknowns
             if system.paired:
                 lib.core.sd_linear_paired(linear)
-                if self._complex:
-                    lib.core.sd_linear_z_paired(self._complex)
+                for item in self.complex:
+                    lib.core.sd_linear_z_paired(item)
             condensed = c.addressof(system.condensed)
             self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
             if not self.expanded:
@@ -97,8 +100,8 @@ class Method:
             lib.core.sd_expanded_free(self.expanded)
         if getattr(self, "_core", None):
             getattr(lib.core, f"sd_{self.name}_free")(self._core)
-        if getattr(self, "_complex", None):
-            lib.core.sd_linear_z_free(self._complex)
+        for item in getattr(self, "complex", ()):
+            lib.core.sd_linear_z_free(item)
 
 
 def _complex_linear(pattern: Pattern, order: Ints | None) -> int:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
 from sysdyn.runtime.start.restart import STILL
+from sysdyn.values import dataclass
 
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration

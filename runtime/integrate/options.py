@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
 from sysdyn.runtime.structure.structure import Structure
 from sysdyn.runtime.trace.trace import Parameter
+from sysdyn.values import dataclass
 
 Progress = Callable[[float, float | None], None]
 """Fraction of the span done, seconds left (None: not known yet)."""

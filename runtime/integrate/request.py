@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.values import dataclass
 
 LONGEST = 0.05
 """Longest step as part of the span: short events of sources are met, and the dense output stays honest."""
@@ -35,6 +34,7 @@ class Request:
     where stability holds it to more steps than these; settled_to: scaled residual that will do for rows
     by which runs are compared and nothing else, of a draft for all, 0: round-off;
     condense: what constant sums define leaves the system (condense/);
+    stages: of radau, in the first step and at most, None: chosen;
     apart: part of a step; instants within it that are nearer to the row before are passed over.
     """
 
@@ -61,6 +61,7 @@ class Request:
     draft: bool = False
     apart: float = 0.0
     condense: bool = True
+    stages: tuple[int, int] | None = None
 
     @property
     def tolerance(self) -> float:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.trace.keeping import Held, Writer, keeping
 from sysdyn.runtime.trace.trace import Column, Layout, Trace, columns_of
+from sysdyn.values import dataclass
 
 LONG = 1000
 """Steps of the bdf after which method auto tries radau."""

@@ -6,10 +6,9 @@ A step ends just before such an instant and the next begins just after it, so th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
 
 CLOSE = 1e-13
 """Of the span: what happens within is one event (the same instant by two formulas)."""

@@ -8,7 +8,6 @@ empty): where coordinates without inertia are determined by constraints, and imp
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.values import dataclass
 
 SMALL = 32
 """Unknowns up to which the core judges the matrix first (core/dense.h)."""

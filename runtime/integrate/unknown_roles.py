@@ -10,13 +10,12 @@ are nearly linear: an unknown of a steep law counts as it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.structure.rates import unique
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

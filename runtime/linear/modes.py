@@ -11,7 +11,6 @@ first Markov parameter m that is not zero), the motion that keeps the output at 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from sysdyn.runtime.linear.precise import Decomposed
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import count, decomposed
+from sysdyn.values import dataclass
 
 Complexes = NDArray[np.complex128]
 VANISHING = 1e-11

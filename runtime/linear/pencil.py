@@ -9,7 +9,7 @@ from inputs alone.  With S = [E V, A W]^-1 the pencil falls apart (Berger, Ilchm
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced, Wide, lost
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import TOLERANCE, count, decomposed, null_space
+from sysdyn.values import dataclass
 
 CLOCKS = (0, 3, 6, 9, 12, -3, -6)
 """Powers of ten of the units of time that are tried, 1/s."""

@@ -9,13 +9,13 @@ largest, else it is refused.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
 
 Wide = NDArray[Any]
 """An array of mpf or mpc."""

@@ -11,13 +11,13 @@ Receives a `Transfer` and the matrices it is of.  Returns arrays.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.linear.modes import Complexes, Transfer
 from sysdyn.runtime.linear.tangent import Reduced
 from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
 
 POINTS = 401
 """Of a frequency response, spaced evenly in log w, the corners added."""

@@ -12,7 +12,7 @@ Receives a System and what of it is tangible.  Hands on states of rest, each onc
 from __future__ import annotations
 
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from sysdyn.runtime.numerics.least_change import DENSE, FOLDS, Problem, Work, so
 from sysdyn.runtime.numerics.rank import least_squares, null_space
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
+from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 MET = 1e-9

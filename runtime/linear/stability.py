@@ -11,8 +11,6 @@ minimum (K > 0) is stable; without dissipators and gyroscopic efforts a directio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.linear.modes import Mode, balanced, modes
@@ -22,6 +20,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.values import dataclass
 
 STILL = 1e-7
 """Real part of an eigenvalue, relative to the largest one, that decides nothing: half the digits of a double root."""

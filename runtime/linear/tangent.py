@@ -17,7 +17,7 @@ Receives a System, a consistent state, the slopes by inputs and of outputs.  Han
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -31,6 +31,7 @@ from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, least_squares
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
+from sysdyn.values import dataclass
 
 LARGEST = 1500
 """Unknowns and rates up to which full matrices are taken."""

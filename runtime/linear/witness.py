@@ -10,13 +10,14 @@ these do not hold the modes: sums at a node are rounded before anything is asked
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import mpmath
 import numpy as np
 from sysdyn.runtime.linear.precise import DETERMINED, Values, shaken, subtract
 from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
 
 LARGEST = 120
 """Unknowns up to which determinants are taken."""

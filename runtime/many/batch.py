@@ -7,13 +7,13 @@ numbers of the runs.  Handed back: `Finished`.  A run without a result (`state` 
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import accuracy
-from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, RATIO, STRETCH
+from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, STRETCH
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
@@ -29,6 +29,7 @@ from sysdyn.runtime.simulate import alternatives, counted, formed
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, Structure
+from sysdyn.values import dataclass
 
 MOST = 48
 """Instants of comparison that are taken of a run's steps, at most twice that (core/many.c)."""
@@ -147,8 +148,8 @@ class Batch:
         self._targets = self._wanted()
         finest = float(np.min(self._targets, initial=1.0))
         tolerance = law.tolerance(finest if finest < 1.0 else 1e-4)
-        draft = min(max(tolerance, law.finest) / RATIO, LOOSEST)
-        fine = max(min(tolerance, RATIO * draft), law.finest)
+        draft = min(max(tolerance, law.finest) / law.ratio, LOOSEST)
+        fine = max(min(tolerance, law.ratio * draft), law.finest)
         longest = FREELY if free and way.method == "dopri" and keep == END else LONGEST
         try:
             self.passes = tuple(self._pass(k, (draft, fine)[k], longest) for k in (0, 1))
@@ -241,8 +242,7 @@ class Batch:
             zero += [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
         if made.underlying is not None:
             states.append((c.addressof(made.underlying.core.contents), c.sizeof(lib.Underlying)))
-        if made.method._complex:
-            zero.append(lib.core.sd_linear_z_pivoted(made.method._complex))
+        zero += [lib.core.sd_linear_z_pivoted(item) for item in made.method.complex]
         # observers read the audit's families behind the unknowns
         rooms = [np.zeros(max(system.form.extended, system.unknowns) + 8) for _ in range(3)]
         made.run_.contents.start_rate = lib.pointer(rooms[2])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.core_library import ROWS, reader
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import ContractError
+from sysdyn.values import dataclass
 
 CONTRACT = 1
 _VIEWS = 256

@@ -11,6 +11,7 @@ from sysdyn.runtime import _core  # type: ignore[attr-defined]
 from sysdyn.runtime.model.core_structures import (
     CAUSES,
     MAX_ORDER,
+    PAIRS,
     ROW_HEAD,
     ROWS,
     STAGES,
@@ -54,6 +55,7 @@ from sysdyn.runtime.model.core_structures import (
 __all__ = [
     "CAUSES",
     "MAX_ORDER",
+    "PAIRS",
     "ROWS",
     "ROW_HEAD",
     "STAGES",
@@ -130,7 +132,7 @@ def _load() -> Any:
         "sd_bdf_dense": (None, [_P, _D, _P, _P]),
         "sd_linear_z_new": (_P, [_I, _P, _P, _P]),
         "sd_linear_z_free": (None, [_P]),
-        "sd_radau_new": (c.POINTER(Radau), [_P, _P, _P]),
+        "sd_radau_new": (c.POINTER(Radau), [_P, _P, _P, c.c_int32]),
         "sd_radau_free": (None, [_P]),
         "sd_radau_stepper": (_P, [_P]),
         "sd_radau_start": (None, [_P, _D, _P, _P, _D]),

@@ -8,7 +8,9 @@ from __future__ import annotations
 import ctypes as c
 
 MAX_ORDER = 5
-STAGES = 3
+STAGES = 7
+PAIRS = 3
+POINTS = 3
 DOPRI_STAGES = 16
 DOPRI_DENSE = 7
 ENERGY_STAGES = 6
@@ -233,27 +235,50 @@ class Bdf(c.Structure):
     ]
 
 
+class RadauMethod(c.Structure):
+    """sd_radau_method."""
+
+    _fields_ = [
+        ("stages", _I),
+        ("pairs", _I),
+        *[(name, _D * STAGES) for name in ["c", "b"]],
+        ("inverse", _D * STAGES * STAGES),
+        ("gamma", _D),
+        ("lambda_", _D * 2 * PAIRS),
+        *[(name, _D * STAGES) for name in ["column", "row"]],
+        *[(name, _D * 2 * STAGES * PAIRS) for name in ["columns", "rows"]],
+        ("estimate", _D * STAGES),
+        ("lift", _D * (STAGES + 1)),
+        ("taylor", _D * STAGES * 2),
+        ("constant", _D),
+    ]
+
+
 class Radau(c.Structure):
     """sd_radau."""
 
     _fields_ = [
         ("system", _P),
         ("linear", _P),
-        ("complex_linear", _P),
-        ("n", _I),
-        ("tested", _I),
+        ("complex_linear", _P * PAIRS),
+        *[(name, _I) for name in ["n", "tested", "stages", "most_stages"]],
         *[(name, _D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
         *[(name, _P) for name in ["atol", "magnitude", "met", "test", "power", "smooth"]],
-        *[(name, _D) for name in ["tolerance", "t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
+        ("tolerance", _D),
+        ("strict", _D * 3),
+        *[(name, _D) for name in ["t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
         *[(name, _D) for name in ["error_accepted", "theta", "state_size"]],
-        *[(name, _I) for name in ["ready", "old_jacobian", "rejected", "creeping"]],
+        *[(name, _I) for name in ["ready", "old_jacobian", "rejected"]],
+        *[(name, _P) for name in ["method", "used"]],
+        *[(name, _I) for name in ["since", "creeping"]],
         *[(name, _P) for name in ["phi", "yd", "last", "before"]],
-        ("slope", _P * STAGES),
-        ("refined", _I * STAGES),
+        ("slope", _P * POINTS),
+        ("refined", _I * POINTS),
         *[(name, _P * STAGES) for name in ["z", "kept", "stage", "stage_d", "d", "base", "full"]],
-        *[(name, _P) for name in ["point", "point_d", "pull", "y", "rate", "ee", "weight", "newton_weight", "scale"]],
-        *[(name, _P) for name in ["terms", "jy", "jyd", "g", "memory"]],
-        *[(name, _P) for name in ["w", "gz"]],
+        *[(name, _P) for name in ["point", "point_d", "pull", "gap", "y", "rate", "ee", "weight", "newton_weight"]],
+        *[(name, _P) for name in ["scale", "terms", "jy", "jyd", "g", "memory"]],
+        ("w", _P * PAIRS),
+        ("gz", _P),
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
         *[(name, _L) for name in ["factorisations", "taken"]],
         *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],

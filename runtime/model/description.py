@@ -7,13 +7,14 @@ hands on a `Description`: unknown families, row families, blocks with their kern
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.failures import ContractError, RowLabel
 from sysdyn.runtime.model.switches import Switches
+from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -77,7 +78,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class RowFamily:
-    """Rows of one label.  name, stored, rate: of the rows of block observe; fixed, written: of block initial."""
+    """Rows of one label.  name, stored, rate: of rows of block observe; fixed, written, content: of block initial."""
 
     block: str
     label: str
@@ -92,6 +93,7 @@ class RowFamily:
     rate: bool
     fixed: bool
     written: bool
+    content: bool
 
     @property
     def size(self) -> int:
@@ -220,6 +222,7 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
         rate=bool(value.get("rate", False)),
         fixed=bool(value.get("fixed", True)),
         written=bool(value.get("written", True)),
+        content=bool(value.get("content", False)),
     )
 
 

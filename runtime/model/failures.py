@@ -6,10 +6,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,11 +16,10 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from sysdyn.runtime.model.description import BASE, SCALE, Description, Ints, RowFamily, element
 from sysdyn.runtime.model.failures import ContractError, RowLabel
+from sysdyn.values import dataclass
 
 NOWHERE = -(2**30)
 """A table's entry for a family that this call must not touch: any place made of it is out of range."""

@@ -6,7 +6,6 @@ No loop over elements: a kernel of 10^5 iterations costs a few NumPy operations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Index, Ints, Kernel, Reference, Shape
 from sysdyn.runtime.model.failures import ContractError
+from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
 Array = TypeVar("Array", bound=NDArray[Any])

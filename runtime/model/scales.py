@@ -11,7 +11,6 @@ During a run magnitudes grow with max |y|; a second run starts with the maxima o
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_places, with_flows
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
+from sysdyn.values import dataclass
 
 ROUND_OFF = 1e-12
 """Of the largest quantity of the same unit: smaller ones are what is left of a zero."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -21,6 +20,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
 from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
 from sysdyn.runtime.model.patterns import Pattern, Places, compress, places, read_only
+from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 Found = TypeVar("Found")

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import ctypes as c
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.equilibrate import sparse_factors
+from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
+from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 SINGULAR_VALUES = 120
@@ -355,23 +356,29 @@ def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
     return best
 
 
-def where_light(problem: Problem, x: Floats, light: Mask) -> Floats:
-    """The point nearest to problem.guess by the rows linearised at x, full matrices; moves of the light unknowns cost
-    nothing, and these stay as in x.
+def in_order(problem: Problem, x: Floats, levels: Sequence[Mask]) -> Floats:
+    """The point nearest to problem.guess by the rows linearised at x, full matrices: moves of the first level are the
+    least, then those of the next, each with what stands before it held; others cost nothing and stay as in x.
     """
-    linear, light = _Linear(problem, x), light[problem.free]
+    linear, levels = _Linear(problem, x), [level[problem.free] for level in levels]
     a = np.zeros(linear.shape)
     i, j, v = linear.entries
     np.add.at(a, (i, j), v)
     u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
-    aim = a[:, ~light] @ u[~light] - (problem.residual(x) * linear.row_scale)[problem.use]
-    size = np.abs(a[:, light]).max(axis=0, initial=0.0)
-    left, sigma, _ = decomposed(a[:, light] / np.where(size > 0.0, size, 1.0))
-    rest = left[:, count(sigma) :].T
-    heavy = np.flatnonzero(problem.free)[~light]
-    moved = least_squares(rest @ a[:, ~light], rest @ aim, RANK)
-    found = x.copy()
-    found[heavy] = problem.guess[heavy] + moved * linear.unit[heavy]
+    rest = np.any(levels, axis=0)
+    aim = a[:, rest] @ u[rest] - (problem.residual(x) * linear.row_scale)[problem.use]
+    row, column = factors(a)
+    a, aim = row[:, None] * a, row * aim
+    found, places = x.copy(), np.flatnonzero(problem.free)
+    below = ~rest
+    for level, later in zip(levels, (np.any(levels[k + 1 :], axis=0) | below for k in range(len(levels))), strict=True):
+        left, sigma, _ = decomposed(a[:, later] * column[later])
+        only = left[:, count(sigma) :].T
+        left, sigma, right = decomposed(only @ a[:, level])
+        k = int((sigma > RANK * np.abs(a[:, level]).max(initial=0.0)).sum())  # nothing may be left of a level
+        moved = right[:k].T @ ((left[:, :k].T @ (only @ aim)) / sigma[:k])
+        aim = aim - a[:, level] @ moved
+        found[places[level]] = problem.guess[places[level]] + moved * linear.unit[places[level]]
     return found
 
 

@@ -46,7 +46,7 @@ class Equations:
         self.rates = rates_of(settled)
         self.momenta = system.of_groups("momentum")
         self._rows(settled)
-        self.measuring = measuring and bool(self.unsaid.any())
+        self.measuring = measuring and any(r.content for r in settled.description.rows)
         self.missed = np.flatnonzero(self.guessed & self.measuring)
         self.first = self.n + self.rates.size
         self.unsettled = inertial_rates(settled)

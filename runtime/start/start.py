@@ -10,7 +10,7 @@ the one that found it stays with the state.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
@@ -24,12 +24,13 @@ from sysdyn.runtime.numerics.least_change import (
     Problem,
     Solution,
     Work,
+    in_order,
     least_residual,
     solve,
-    where_light,
 )
 from sysdyn.runtime.numerics.rank import rank
-from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of, row_scale
+from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of, row_scale
+from sysdyn.values import dataclass
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
@@ -54,10 +55,12 @@ CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 NEARER = 12
 """Steps towards the least change of the state."""
-YIELDS, BACK = 1e-5, 1e-9
-"""Scaled changes of a guess that are tried without: none is wanted, the weights are small but not zero."""
+BACK = 1e-10
+"""Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
+FLOOR = 1e-5
+"""Of the largest alike: below it rows hold to EXACT of that, ten times the round-off that full matrices make of it."""
 EVEN = 1.05
-"""Growth of the whole change for which a guess stays as written: what it yields is small to second order."""
+"""Growth of the change of what is not written that a step may bring where nothing else moves less."""
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
 EXPLAINED = 0.1
@@ -240,9 +243,9 @@ def _bent(starter: Starter, t: float, x: Floats) -> Mask:
 def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: Mask) -> Solution:
     """The solution without what guesses of the state moved for the sake of what follows from it: that costs nothing.
 
-    The least weighted change of the state's guesses under all rows, by steps to the least of the rows linearised; what
-    follows from the state is free.  Guesses that can stay do so exactly.  Positions in curved constraints are left
-    alone, and what is too large for full matrices.
+    The least change of contents under all rows, of what the text guesses first, then of the rest, by steps to the least
+    of the rows linearised; what follows from the state is free.  Positions in curved constraints are left alone, and
+    what is too large for full matrices.
     """
     if best.x.size > DENSE:
         return best
@@ -254,7 +257,7 @@ def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: M
         if found is None or not moved < 0.5 * last:
             break
         best, last = found, moved
-        if moved < BACK:
+        if moved < CLOSED:
             break
     return best
 
@@ -287,20 +290,28 @@ def _nearer(
     if not (x != guess)[state].any():
         return None, 0.0
     problem = problem_of(starter, t, x, guess, rows=starter.every, free=free)
-    by_content = starter.by_content(t, x, problem.scale)
-    problem = replace(problem, weight=np.where(state & ~starter.written, by_content, problem.weight))
-    aim = where_light(problem, x, follows)
+    # rows of what is small beside the largest of its kind hold to the round-off that full matrices make of that
+    largest = starter.largest_alike(np.maximum(problem.scale, np.abs(x)))
+    scale = np.maximum(problem.scale, FLOOR * largest)
+    weight = np.where(state, starter.by_content(t, x, scale), WEIGHT["following"] * scale / largest)
+    problem = replace(problem, scale=scale, weight=weight)
+    levels = state & starter.written, state & ~starter.written
+    aim = in_order(problem, x, levels)
     size = np.maximum(problem.scale, starter.scale(t, guess))
 
-    def change(z: Floats) -> float:
-        return float(np.linalg.norm(((z - guess) * problem.weight / problem.scale)[state]))
+    def change(z: Floats) -> list[float]:
+        moved = (z - guess) * problem.weight / problem.scale
+        return [float(np.linalg.norm(moved[level])) for level in levels]
 
-    for stays in (YIELDS, BACK):
-        near = np.where(np.abs(aim - guess) > stays * size, aim, guess)
+    said, unsaid = change(x)
+    for stays in (BACK * np.maximum(size, largest), NOISE * size):
+        near = np.where(np.abs(aim - guess) > stays, aim, guess)
         for held in (state, state & (near == guess)):
             found = solve(problem.within(free & ~held), np.where(held, near, x))
             clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
-            if clean is not None and change(clean) <= EVEN * change(x):
+            now = (np.inf, np.inf) if clean is None else change(clean)
+            less = now[0] < (1.0 - NOISE) * said or (now[0] <= (1.0 + BACK) * said and now[1] <= EVEN * unsaid)
+            if clean is not None and less:
                 return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
     return None, 0.0
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import ctypes as c
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from sysdyn.runtime.model.system import KEPT, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.equations import Equations
+from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
@@ -320,28 +320,31 @@ class Starter:
         return found
 
     def by_content(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """Weights of guesses that are not written: contents of one unit are measured alike, flows by their momenta."""
+        """Weights of guesses: contents of one unit are measured alike, flows by their momenta."""
         families, form = self.system.description.families, self.system.form
         flows = {f.owner: form.at[k] for k, f in enumerate(families) if f.kind == "f"}
         own = np.full(self.system.rows, -1, dtype=np.int64)
         effort: dict[str, str] = {}
         for group, family, first in form.groups:
             rows = self.system.description.rows[family]
-            if group == "dynamics" and rows.owner in flows:
-                effort[rows.owner] = rows.unit
+            if group in ("dynamics", "momentum") and rows.owner in flows:
+                effort |= {rows.owner: rows.unit} if group == "dynamics" else {}
                 own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
         own_units = np.array(units)[self.system.family_of[: self.n]]
         names = np.concatenate([own_units, np.full(self.rates.size, ""), self.equations.units])
         pattern = self.system.pattern
-        inertia = pattern.columns_of() == own[pattern.row]
-        content = np.zeros(x.size)
-        content[pattern.columns_of()[inertia]] = np.abs(self.system.jacobian(t, *self.expand(x))[1][inertia])
-        content = np.where(content > 0.0, content, 1.0)
+        columns, inertia = pattern.columns_of(), np.zeros(x.size)
+        jy, jyd = self.system.jacobian(t, *self.expand(x))
+        for values, mine in ((jyd, ~self.system.of_groups("momentum")), (jy, self.system.of_groups("momentum"))):
+            held = (columns == own[pattern.row]) & mine[pattern.row]
+            inertia[columns[held]] += np.abs(values[held])
+        content = np.where(inertia > 0.0, inertia, 1.0)
         _, unit = np.unique(names, return_inverse=True)
         largest = np.zeros(int(unit.max()) + 1)
         np.maximum.at(largest, unit, content * scale)
-        return np.asarray(WEIGHT["unwritten"] * content * scale / largest[unit])
+        guessed = np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
+        return np.asarray(guessed * content * scale / largest[unit])
 
     @remembered
     def following(self, t: float, x: Floats) -> Mask:
@@ -384,9 +387,13 @@ class Starter:
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
+        return np.where(np.abs(x) > NOISE * np.maximum(scale, self.largest_alike(x)), x, 0.0)
+
+    def largest_alike(self, x: Floats) -> Floats:
+        """Of each unknown the largest magnitude of its kind and unit."""
         largest = np.zeros(int(self.equations.alike.max(initial=0)) + 1)
         np.maximum.at(largest, self.equations.alike, np.abs(x))
-        return np.where(np.abs(x) > NOISE * np.maximum(scale, largest[self.equations.alike]), x, 0.0)
+        return np.asarray(largest[self.equations.alike])
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:

@@ -9,7 +9,6 @@ In a system a left-out row reads "its multiplier = 0": the motion is that of the
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from sysdyn.runtime.numerics.least_change import solve
 from sysdyn.runtime.numerics.rank import TOLERANCE, least_squares
 from sysdyn.runtime.start.start import EXACT, ConsistentState
 from sysdyn.runtime.start.starter import Starter, weighted
+from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
 DENSE = 300

@@ -8,8 +8,6 @@ Freedom: rank of [Phi_q; Psi_f], taken from the reactions of the multipliers (vi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
@@ -21,6 +19,7 @@ from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, independent, nearby, reactions, vanished
+from sysdyn.values import dataclass
 
 DENSE = 300
 SMALL = 32

@@ -14,7 +14,6 @@ import signal
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -26,6 +25,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.opening import opened
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Parameter, Store, columns_of, input_output
+from sysdyn.values import dataclass
 
 __all__ = ["Column", "Layout", "Parameter", "Quantity", "Trace", "TraceWriter", "columns_of"]
 

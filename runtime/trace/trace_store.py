@@ -15,7 +15,6 @@ import re
 import resource
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Description, Floats, element
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.values import dataclass
 
 BLOCK = 1024
 BEFORE = 8

@@ -3,7 +3,6 @@ miss something.
 """
 
 import json
-import time
 from pathlib import Path
 
 import h5py
@@ -153,16 +152,10 @@ def test_results_are_equal_bit_for_bit_whoever_runs_them(tmp_path, monkeypatch):
     assert "trace.q1" not in tables[0]
 
 
-def test_ten_thousand_runs_a_second_of_the_pendulum():
-    """One period at 1e-4, end values: the rate of a core by CPU time, the best of five; half of it is asked here, for
-    machines differ (tests/bench/sweeps.py measures).
-    """
+def test_runs_in_the_core_pass_no_line_of_python_each(effort):
+    """A period of the pendulum at 1e-4, end values: 10000 runs a second of a core (tests/bench/sweeps.py)."""
     loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd"), until="3.07"))
     core = InCore(loaded, ["th_0"], "end")
     cases = [{"th_0": float(a)} for a in np.linspace(0.05, 0.5, 500)]
-    spent = []
-    for _ in range(5):
-        began = time.process_time()
-        core.run(range(500), cases)
-        spent.append(time.process_time() - began)
-    assert 500 / min(spent) > 5000
+    lines = [effort(lambda n=n: core.run(range(n), cases[:n]))[1] for n in (100, 100, 500)]
+    assert lines[2] - lines[1] < 10 * 400

@@ -179,27 +179,6 @@ def test_a_poison_run_on_dask_is_named_after_three_deaths(fall, cluster):
     assert "died 3 times" in named.reason
 
 
-def sleeping(request, keep, chunk):
-    began = time.monotonic()
-    time.sleep(0.01 * len(chunk.tasks))
-    return ([Kept(number, 0, True) for number, _ in chunk.tasks], []), time.monotonic() - began
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_dask_costs_less_than_5_ms_a_run(fall, cluster):
-    """Runs of 10 ms each: wall time of a worker and a run over that; the best of three, for machines are shared."""
-    from sysdyn.cli.sweep.on_dask import results
-
-    number, crew, spent = 400, len(cluster.workers), []
-    for _ in range(3):
-        began = time.monotonic()
-        cases = [(k, {}) for k in range(number)]
-        found = list(results(fall, cases, number, cluster.scheduler_address, "end", sleeping))
-        spent.append((time.monotonic() - began) * crew / number)
-        assert sorted(item.run for item in found) == list(range(number))
-    assert min(spent) - 0.01 < 5e-3
-
-
 @pytest.mark.filterwarnings("ignore")
 def test_the_command_and_python_on_dask(fall, cluster, capsys):
     from sysdyn.cli.main import run

@@ -142,13 +142,11 @@ def test_labels_cover_their_hull_once(first, message):
     assert message in error.value.diagnostics[0].message
 
 
-def test_large_arrays_bind_without_loops_in_python():
-    import time
-
+def test_large_arrays_bind_without_loops_in_python(effort):
     model = compile_network(chain(10))
-    started = time.process_time()
-    binding = model.bind({"n": 1_000_000})
-    assert time.process_time() - started < 3.0  # 0.1 s when alone
+    _, few = effort(lambda: model.bind({"n": 10}))
+    binding, many = effort(lambda: model.bind({"n": 1_000_000}))
+    assert many <= 1.05 * few
     assert binding.values["m"].shape == (1_000_000,)
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import random
-import time
 from pathlib import Path
 
 import pytest
@@ -55,9 +54,7 @@ def damaged(random_, text):
 
 def check(text):
     source = SourceText("fuzz.sd", text)
-    begin = time.process_time()
     tree, found = parse(source)
-    assert time.process_time() - begin < 2.0
     for item in found:
         assert item.code in codes()
         assert 0 <= item.place.span.start <= item.place.span.end <= len(text)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from sysdyn.compiler.network.primal.balances import MULTIPLIER, ZERO, Balances
 from sysdyn.compiler.network.primal.bounds import Box
 from sysdyn.compiler.network.primal.series import Series
 from sysdyn.dsl.model.network import Network
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, between, number
+from sysdyn.values import dataclass
 
 Key = tuple[int, int]  # item, dimension
 Cut = tuple[int, int, Bound]  # item, dimension, first index behind the cut

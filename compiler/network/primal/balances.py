@@ -10,7 +10,6 @@ The effort of a node is read from its multiplier, is zero at a reference, and is
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.network.primal.alike import Cell, End, Likeness, Link
 from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, box_holds, parts, union, without
@@ -27,6 +26,7 @@ from sysdyn.compiler.network.primal.incidence import (
 )
 from sysdyn.dsl.model.expression import Node, index, linear, reduction, var
 from sysdyn.dsl.model.network import Constraint, Loop
+from sysdyn.values import dataclass
 
 MULTIPLIER, ZERO, WALK = "multiplier", "zero", "walk"
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.dsl.model.expression import Node, add, const, evaluate, index, sub, substitute, to_text
 from sysdyn.dsl.model.network import Network, Parameter, Shape
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

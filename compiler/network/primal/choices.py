@@ -7,7 +7,6 @@ is kept by `Slopes`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from sysdyn.compiler.network.primal.integrals import Rests, antiderivative, line, polynomial
@@ -31,6 +30,7 @@ from sysdyn.dsl.model.expression import (
 from sysdyn.dsl.model.network import Branch, Table
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+from sysdyn.values import dataclass
 
 Notes = tuple[tuple[str, str], ...]
 OWN = {"kinetic": ("bf", "p"), "potential": ("bq", "e"), "dissipator": ("bf", "e")}

@@ -7,7 +7,7 @@ of rate zero where not all of these are fixed and a loop of stores and efforts m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
@@ -46,6 +46,27 @@ def charge(branch: Branch, effort: Node) -> Node | None:
     q = own(branch, "bq")
     straight = None if variables(branch.law) - {q} else line(branch.law, q)
     return None if straight is None else straight.inverse(effort)
+
+
+def held_at(branch: Branch, kind: str, value: Node) -> Node | None:
+    """What a store over its own loops holds where its content, effort or flow is the value; None where no law tells."""
+    if kind in ("bq", "bp"):
+        return value
+    if branch.kind == "potential":
+        return charge(branch, value)
+    return momentum(branch, value)
+
+
+def momentum(branch: Branch, flow: Node) -> Node | None:
+    """The momentum of a kinetic store at a flow; None where the law does not give it."""
+    if branch.law is None:
+        return None
+    if branch.side == "p":
+        f = own(branch, "bf")
+        return None if variables(branch.law) - {f} else substitute(branch.law, {f: flow})
+    p = own(branch, "bp")
+    straight = None if variables(branch.law) - {p} else line(branch.law, p)
+    return None if straight is None else straight.inverse(flow)
 
 
 def at_stores(network: Network, incidence: Incidence, reader: Reader) -> Iterator[Initial]:
@@ -187,9 +208,11 @@ class Contents:
 
     # -- initial conditions -------------------------------------------------------------------------------------
 
-    def resolved(self) -> Iterator[Initial]:
-        """The initial conditions of coordinates and other unknowns."""
+    def resolved(self, measured: Container[str]) -> Iterator[Initial]:
+        """The initial conditions of coordinates and other unknowns; measured: stores whose guesses stand elsewhere."""
         for initial in self.initials:
+            if not initial.fixed and initial.target.op == "var" and initial.target.data[0] in measured:
+                continue
             if not touches_network(initial.target) and not touches_network(initial.value):
                 yield initial
                 continue
@@ -207,7 +230,7 @@ class Contents:
     def _led(self, coordinate: str) -> bool:
         """Whether a statement gives the content of a leader of the coordinate's classes."""
         leaders = [m for m in self.members if m.leads and m.coordinate == coordinate]
-        return any(_meet(m.box, box) for m in leaders for _, box, _ in self._given.get(m.element.name, []))
+        return any(meet(m.box, box) for m in leaders for _, box, _ in self._given.get(m.element.name, []))
 
     def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
         """The loops that the target still follows."""
@@ -259,7 +282,8 @@ def _follows(m: Member) -> bool:
     return m.element.branch.kind == "potential" and not m.leads
 
 
-def _meet(a: Box, b: Box) -> bool:
+def meet(a: Box, b: Box) -> bool:
+    """Whether boxes have elements in common."""
     return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))
 
 

@@ -21,7 +21,7 @@ from sysdyn.compiler.network.primal.laws import Laws, laws
 from sysdyn.compiler.network.primal.potentials import Potentials
 from sysdyn.compiler.network.primal.reading import Book, Piece, Reader
 from sysdyn.compiler.network.primal.series import Series, series
-from sysdyn.compiler.network.primal.unsaid import unsaid
+from sysdyn.compiler.network.primal.unsaid import measured
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
@@ -45,13 +45,14 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     reader = Reader(sizes, book)
     initials = tuple(at_stores(network, incidence, reader))
     contents = Contents(reader, classes.members, initials, network.branches)
+    guesses, stores = measured(network, initials, sizes, reader, reflected=reflected)
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),
         coordinates=(*network.coordinates, *_node_coordinates(network), *classes.coordinates),
         unknowns=(*network.unknowns, *said.unknowns.values()),
         states=(*network.states, *said.states.values(), *contents.states),
-        initials=(*contents.resolved(), *said.initials, *unsaid(network, initials, sizes, reader, reflected=reflected)),
+        initials=(*contents.resolved(stores), *said.initials, *guesses),
         nodes=(),
         branches=(),
         couplings=(),

@@ -9,7 +9,6 @@ virtual work.  A statement in a loop counts with every iteration that reads the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.model.terms import counter, terms
 from sysdyn.compiler.network.primal.incidence import Element
@@ -33,6 +32,7 @@ from sysdyn.dsl.model.expression import (
 )
 from sysdyn.dsl.model.network import Loop, Network
 from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Sizes, between, box_holds, box_size
 from sysdyn.dsl.model.expression import Node, index, sub
 from sysdyn.dsl.model.network import Branch, Domain, Network, NodeFamily, Terminal
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+from sysdyn.values import dataclass
 
 PLUS, MINUS = 0, 1
 

@@ -7,7 +7,6 @@ found also of functions of a line in v, and of  v/sqrt(a + b v^2).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 from sysdyn.dsl.model.expression import (
     Node,
@@ -26,6 +25,7 @@ from sysdyn.dsl.model.expression import (
     topological,
 )
 from sysdyn.dsl.model.expression import variables as unknowns
+from sysdyn.values import dataclass
 
 Rests = list[tuple[Node, int]]
 """Expressions free of v that are not zero (0) or have a sign where the result holds."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -48,6 +48,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.network import Branch, Table
+from sysdyn.values import dataclass
 
 _SHELLS = {
     "sinh": lambda w: call("asinh", w),

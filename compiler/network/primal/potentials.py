@@ -8,7 +8,6 @@ same cell one index further, it is a run: the steps in between are summed over t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sysdyn.compiler.network.primal.balances import MULTIPLIER, WALK, ZERO, Effort
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Interval
@@ -16,6 +15,7 @@ from sysdyn.compiler.network.primal.incidence import PLUS, Touch, unrolled
 from sysdyn.compiler.network.primal.reading import Range, Ranges, Reader
 from sysdyn.dsl.model.expression import Node, add, const, index, linear, neg, reduction, sub, var
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

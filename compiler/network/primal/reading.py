@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Sizes, box_holds
@@ -39,6 +39,7 @@ from sysdyn.dsl.model.expression import (
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES, STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+from sysdyn.values import dataclass
 
 Result = TypeVar("Result")
 FUNCTIONS = frozenset(f"b{name}" for name in STATE_FUNCTIONS)

@@ -11,13 +11,14 @@ classes it is cut into, and the node cells that were merged.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.compiler.network.primal.alike import Cell, End, Likeness, Link
 from sysdyn.compiler.network.primal.bounds import Bound, Box, number, parts, shape_of, union
 from sysdyn.compiler.network.primal.incidence import Element, Incidence, NodeCell, Touch, ground
 from sysdyn.dsl.model.expression import Node, add
 from sysdyn.dsl.model.network import Coordinate, Shape
+from sysdyn.values import dataclass
 
 Places = tuple[tuple[int | None, Bound], ...]
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

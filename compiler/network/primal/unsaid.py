@@ -1,16 +1,18 @@
-"""Contents of stores that nothing is said of: guesses of zero, where no coordinate alone tells them.
+"""Guesses of what stores hold, where no coordinate alone tells it: zero, or what the text guesses.
 
 Where a store stands between coordinates (an ungrounded capacitor in the complementary family, an inductor in two
-meshes) the least change of these coordinates is not the least change of what it holds.  All stores that share a
-coordinate with such a one are then measured by their contents.
+meshes), or several stores on one (capacitors in parallel there), the least change of these coordinates is not the least
+change of what is held.  All stores that share a coordinate with such a one are then measured by their contents.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Sizes
-from sysdyn.compiler.network.primal.overlaps import beside, meeting, narrowed, ranges_of
+from sysdyn.compiler.network.primal.bounds import Box, Sizes
+from sysdyn.compiler.network.primal.contents import held_at, meet
+from sysdyn.compiler.network.primal.overlaps import Ranges, beside, meeting, narrowed, ranges_of
 from sysdyn.compiler.network.primal.reading import Reader
 from sysdyn.dsl.model.expression import Node, const, var, variables
 from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
@@ -19,39 +21,71 @@ _CONTENT = {"potential": "bq", "kinetic": "bp"}
 _SAYING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 
 
-def unsaid(
+def measured(
     network: Network, initials: Sequence[Initial], sizes: Sizes, reader: Reader, *, reflected: bool
-) -> Iterator[Initial]:
-    """One guess for the stores of a statement whose contents follow from several coordinates, or beside those.
+) -> tuple[tuple[Initial, ...], frozenset[str]]:
+    """One guess for the stores of a statement that are measured by their contents; the stores all of whose guesses by
+    the text are among them.
 
     Between common-flow nodes of the author's network positions are guessed, not lengths.
     """
     found: list[tuple[Initial, set[str]]] = []
     shared: set[str] = set()
+    held: dict[tuple[str, str], list[Box]] = {}
     known = {initial.store for initial in initials}
     for b in network.branches:
         if b.kind not in _CONTENT or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
-        for _, content in _contents(b, b.loops, reader):
+        for loops, content in _contents(b, b.loops, reader):
             read = _unknowns(content)
             if len(read) > 1:
                 shared |= _owners(read)
+                continue
+            for node in read:
+                others = held.setdefault((node.data[0], node.data[1]), [])
+                box = _over(node, loops, sizes, b)
+                shared |= {node.data[0]} if any(meet(box, other) for other in others) else set()
+                others.append(box)
         for part in () if b.name in known else _parts(b, initials, sizes):
-            for loops, content in _contents(b, part, reader):
-                guess = Initial(content, const(0.0), False, loops, b.place, b.name, unit.text)
+            for loops, content in _contents(b, part.loops, reader):
+                guess = replace(part, target=content, loops=loops, store=b.name, unit=unit.text)
                 found.append((guess, _owners(_unknowns(content))))
     shared -= _written(network.energies)
-    yield from (initial for initial, owners in found if owners & shared)
+    kept = tuple(initial for initial, owners in found if owners & shared)
+    return kept, frozenset(i.store for i in kept if i.said)
 
 
-def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[tuple[Loop, ...]]:
-    """The loops over the elements of a statement but for those whose content is guessed: a fixed one stays anyway."""
-    within = ranges_of(b.loops, sizes, b.place)
-    said = [i for i in initials if not i.fixed and i.target.op == "var" and i.target.data[0] == b.name]
-    said = [i for i in said if i.target.data[1] in _SAYING[b.kind] and not i.target.data[2]]
-    holes = [found[0] for i in said if (found := meeting(i, b.at, within, sizes)) is not None]
-    yield from (narrowed(b.loops, rest) for rest in beside(within, holes))
+def _over(node: Node, loops: Sequence[Loop], sizes: Sizes, b: Branch) -> Box:
+    """The elements of a family that a statement reads."""
+    within = ranges_of(loops, sizes, b.place)
+    return tuple(sizes.affine(at, within, b.place).over(within) for at in node.args)
+
+
+def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
+    """Guesses of the contents of a statement's elements: by the text, and zero where it guesses nothing.
+
+    Left out is what it guesses in words that tell no content; a fixed one stays anyway.
+    """
+    zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
+    left = [ranges_of(b.loops, sizes, b.place)]
+    for initial in reversed([i for i in initials if _guesses(i, b)]):  # the last statement counts
+        there: list[Ranges] = []
+        for ranges in left:
+            found = meeting(initial, b.at, ranges, sizes)
+            there += [ranges] if found is None else beside(ranges, [found[0]])
+            content = None if found is None else held_at(b, initial.target.data[1], found[1])
+            if found is not None and content is not None:
+                yield replace(initial, value=content, loops=narrowed(b.loops, found[0]))
+        left = there
+    yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in left)
+
+
+def _guesses(i: Initial, b: Branch) -> bool:
+    """Whether an initial condition guesses what a store holds."""
+    if i.fixed or i.target.op != "var" or i.target.data[0] != b.name:
+        return False
+    return i.target.data[1] in _SAYING[b.kind] and not i.target.data[2]
 
 
 def _contents(b: Branch, loops: tuple[Loop, ...], reader: Reader) -> Iterator[tuple[tuple[Loop, ...], Node]]:

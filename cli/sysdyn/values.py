@@ -1,0 +1,138 @@
+"""Frozen values: `dataclass(frozen=True, slots=True)` of the standard library, without compiling each class at import.
+
+The standard decorator writes the methods of every class as text and compiles it whenever it is imported: of 300 classes
+that took 40 % of the start of a command.  Here `__init__` is compiled once for each number of fields, and the names of
+a class are put in; what else a value needs is shared.  Classes that ask for more are left to the standard decorator.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import cache
+from operator import attrgetter
+from types import CodeType, FunctionType
+from typing import TYPE_CHECKING, Any
+
+SPECIAL = ("ClassVar", "InitVar", "KW_ONLY")
+"""Kinds of fields that are left to the standard decorator."""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Standard:
+    """A value as the standard decorator leaves it: its kind of field and its options, for `fields` and `replace`."""
+
+    name: str = ""
+
+
+@cache
+def _setting(count: int, after: bool) -> CodeType:
+    """`__init__` of a value of so many fields, set each by its slot; after: `__post_init__` follows."""
+    names = [f"a{k}" for k in range(count)]
+    lines = [f"_{name}(self, {name})" for name in names] + ["_after(self)"] * after + ["pass"]
+    made: dict[str, Any] = {}
+    exec(f"def __init__({', '.join(['self', *names])}):\n " + "\n ".join(lines), made)  # noqa: S102 (numbers alone)
+    code: CodeType = made["__init__"].__code__
+    return code
+
+
+def _refuse_set(self: object, name: str, _value: object) -> None:
+    raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+
+
+def _refuse_delete(self: object, name: str) -> None:
+    raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+
+
+def _state(self: Any) -> list[Any]:
+    return [getattr(self, name) for name in self.__match_args__]
+
+
+def _restore(self: Any, state: list[Any]) -> None:
+    for name, value in zip(self.__match_args__, state, strict=True):
+        object.__setattr__(self, name, value)
+
+
+def _text(self: Any) -> str:
+    inside = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.__match_args__)
+    return f"{type(self).__qualname__}({inside})"
+
+
+SHARED = {
+    "__setattr__": _refuse_set, "__delattr__": _refuse_delete, "__getstate__": _state, "__setstate__": _restore,
+    "__repr__": _text,
+}  # fmt: skip
+
+
+def _compared(names: tuple[str, ...]) -> dict[str, Callable[..., Any]]:
+    """Values of one class are equal where their fields are."""
+    held = attrgetter(*names)
+
+    def equal(self: object, other: object) -> Any:
+        return held(self) == held(other) if other.__class__ is self.__class__ else NotImplemented
+
+    def hashed(self: object) -> int:
+        return hash(held(self))
+
+    return {"__eq__": equal, "__hash__": hashed}
+
+
+def _plain(cls: type, options: dict[str, bool]) -> bool:
+    """Frozen, with slots, of no other class, all its fields by position."""
+    return (
+        options in ({"frozen": True, "slots": True}, {"frozen": True, "slots": True, "eq": False})
+        and cls.__bases__ == (object,)
+        and bool(cls.__annotations__)
+        and not any(isinstance(value, dataclasses.Field) for value in vars(cls).values())
+        and not any(kind in str(written) for written in cls.__annotations__.values() for kind in SPECIAL)
+    )
+
+
+def _field(name: str, kind: Any, default: Any) -> Any:
+    """A field as the standard decorator leaves it."""
+    made: Any = dataclasses.field(default=default)
+    made.name, made.type = name, kind
+    made._field_type = _Standard.__dataclass_fields__["name"]._field_type  # type: ignore[attr-defined]
+    return made
+
+
+def _made(cls: type, *, eq: bool) -> Any:
+    """The class anew, with slots and methods; what it writes itself stays."""
+    own = {name: value for name, value in vars(cls).items() if name not in ("__dict__", "__weakref__")}
+    kinds = cls.__annotations__
+    names = tuple(kinds)
+    defaults = {name: own.pop(name) for name in names if name in own}
+    if list(defaults) != list(names[len(names) - len(defaults) :]):
+        raise TypeError(f"{cls.__qualname__}: a field without a default follows one with it")
+    own = SHARED | (_compared(names) if eq else {}) | own
+    own |= {"__slots__": names, "__match_args__": names}
+    own["__dataclass_params__"] = _Standard.__dataclass_params__  # type: ignore[attr-defined]
+    own["__dataclass_fields__"] = {
+        name: _field(name, kind, defaults.get(name, dataclasses.MISSING)) for name, kind in kinds.items()
+    }
+    made = type(cls.__name__, (), own)
+    code = _setting(len(names), "__post_init__" in own)
+    code = code.replace(co_varnames=("self", *names), co_qualname=f"{cls.__qualname__}.__init__")
+    known = {f"_a{k}": vars(made)[name].__set__ for k, name in enumerate(names)} | {"_after": own.get("__post_init__")}
+    init = FunctionType(code, known, "__init__", tuple(defaults.values()))
+    init.__annotations__ = kinds | {"return": None}
+    made.__init__ = init  # type: ignore[misc]
+    return made
+
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass
+else:
+
+    def dataclass(cls: type | None = None, /, **options: bool) -> Any:
+        """The standard decorator, or the same sooner."""
+
+        def wrap(cls: type) -> Any:
+            if _plain(cls, options):
+                return _made(cls, eq=options.get("eq", True))
+            return dataclasses.dataclass(**options)(cls)
+
+        return wrap if cls is None else wrap(cls)
+
+
+__all__ = ["dataclass"]

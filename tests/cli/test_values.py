@@ -1,0 +1,97 @@
+"""Values made by sysdyn.values are those of the standard decorator."""
+
+import copy
+import dataclasses
+import inspect
+import pickle
+
+import pytest
+from sysdyn import values
+
+
+@values.dataclass(frozen=True, slots=True)
+class Ours:
+    """A value."""
+
+    a: int
+    b: str = "x"
+    c: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.a < 0:
+            raise ValueError("a")
+
+    @property
+    def twice(self) -> int:
+        return 2 * self.a
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Theirs:
+    """A value."""
+
+    a: int
+    b: str = "x"
+    c: tuple[int, ...] = ()
+
+
+@values.dataclass(frozen=True, slots=True, eq=False)
+class Alone:
+    array: list[int]
+
+
+@values.dataclass(slots=True)
+class Grows:
+    items: list[int] = dataclasses.field(default_factory=list)
+
+
+def test_values_are_made_written_compared_and_kept_as_the_standard_ones():
+    ours, theirs = Ours(1, c=(2,)), Theirs(1, c=(2,))
+    assert repr(ours) == repr(theirs).replace("Theirs", "Ours")
+    assert ours == Ours(1, "x", (2,))
+    assert ours != Ours(2, c=(2,))
+    assert ours != theirs
+    assert len({ours, Ours(1, c=(2,)), Ours(1)}) == 2
+    assert dataclasses.asdict(ours) == dataclasses.asdict(theirs)
+    assert [(f.name, f.type, f.default) for f in dataclasses.fields(ours)] == [
+        (f.name, f.type, f.default) for f in dataclasses.fields(theirs)
+    ]
+    assert dataclasses.replace(ours, a=5).twice == 10
+    assert pickle.loads(pickle.dumps(ours)) == copy.deepcopy(ours) == ours
+    mine, standard = (inspect.signature(cls.__init__).parameters.values() for cls in (Ours, Theirs))
+    assert [(p.name, p.kind, p.default) for p in mine] == [(p.name, p.kind, p.default) for p in standard]
+    assert (Ours.__doc__, Ours.__qualname__, Ours.__module__) == ("A value.", "Ours", __name__)
+
+
+def test_values_are_frozen_and_have_slots():
+    ours = Ours(1)
+    for change in (lambda: setattr(ours, "a", 2), lambda: setattr(ours, "d", 2), lambda: delattr(ours, "a")):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            change()
+    assert not hasattr(ours, "__dict__")
+    match ours:
+        case Ours(1, b):
+            assert b == "x"
+
+
+def test_wrong_calls_name_what_is_wrong():
+    with pytest.raises(TypeError, match=r"Ours.__init__\(\) missing 1 required positional argument: 'a'"):
+        Ours()
+    with pytest.raises(TypeError, match="unexpected keyword argument 'd'"):
+        Ours(1, d=2)
+    with pytest.raises(ValueError, match="a"):
+        Ours(-1)
+    with pytest.raises(TypeError, match="without a default"):
+
+        @values.dataclass(frozen=True, slots=True)
+        class _Wrong:
+            a: int = 1
+            b: int
+
+
+def test_other_kinds_are_the_standard_decorators_own():
+    assert Alone([1]) != Alone([1])
+    assert Grows().items is not Grows().items
+    grows = Grows()
+    grows.items = [1]
+    assert grows == Grows([1])
