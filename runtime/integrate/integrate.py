@@ -193,10 +193,12 @@ class Integration:
 
     def _tell(self, method: Any) -> None:
         """What the method is told of each unknown that it steps: tolerance, magnitude, roles."""
-        found, seen = self.roles, (self._atol, self.magnitude, self._met)
+        found, seen, origin = self.roles, (self._atol, self.magnitude, self._met), self.origin
         if self.forms is not None:
             kept = self.forms.stepped.kept
-            found = self._kept_roles(self.forms.stepped.whole, kept)
+            if origin.kept is None:
+                origin.kept = self._kept_roles(self.forms.stepped.whole, kept)
+            found = origin.kept
             seen = (None if self._atol is None else self._atol[kept], self.magnitude[kept], self._met[kept])
         smooth = found.smooth.astype(np.int32)
         if self.forms is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing

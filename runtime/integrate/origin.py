@@ -33,6 +33,8 @@ class Origin:
         self.least = np.where(system.are("q", "f"), UNRESOLVED * unresolved(system, self.y, self.jy), 0.0)
         self._sized: tuple[float, tuple[Floats, float]] | None = None
         self._light: NDArray[np.bool_] | None = None
+        self.kept: Roles | None = None
+        """Roles of what is left where unknowns leave the runs (condense/)."""
 
     def sized(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""

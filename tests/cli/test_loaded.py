@@ -39,7 +39,11 @@ def masses(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("name", ["seed/pendulum", "seed/dc_motor", "seed/bouncing_ball", "seed/diode_circuit"])
+SAME = ("pendulum", "dc_motor", "bouncing_ball", "diode_circuit", "co_circuit", "two_tank")
+"""One or none of each: constraints, inputs, events, steep laws; unknowns that leave the runs."""
+
+
+@pytest.mark.parametrize("name", [f"seed/{name}" for name in SAME])
 def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
     file = MODELS / f"{name}.sd"
     model = load(file, scene="reference")
@@ -55,7 +59,10 @@ def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
         assert all(mine[n].nominal == other[n].nominal and mine[n].units == other[n].units for n in mine.names)
 
 
-@pytest.mark.parametrize(("name", "scene"), [("seed/slider_crank", "reference"), ("gallery/lead_filter", "charges")])
+CASES = (("seed/slider_crank", "reference"), ("gallery/lead_filter", "charges"), ("seed/two_tank", "reference"))
+
+
+@pytest.mark.parametrize(("name", "scene"), CASES)
 def test_a_run_depends_on_nothing_that_ran_before(name, scene):
     """Structures of other runs, of other forms and of one that stopped, leave no trace in it."""
     used, fresh = (load(MODELS / f"{name}.sd", scene=scene) for _ in range(2))
