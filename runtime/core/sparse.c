@@ -142,6 +142,8 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     }
     for (int32_t k = 0; k < n; k++) {
         int32_t c = lu->order[k];
+        if (lu->most > 0 && nl + nu > lu->most)
+            return 3;
         if (grow(nl + rows - k, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
             return 2;
         lu->l_start[k] = (int32_t)nl;
