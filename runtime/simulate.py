@@ -167,9 +167,13 @@ def formed(
     system = written if form == "3" else written.another(form)
     missing = obstacle(system, start) if form == "0" else ()
     if missing:
+        still = sorted({name.rstrip("'") for name in missing if name.endswith("'")})[:3]
+        remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""
         raise NoSuchForm(
             f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "
-            "constraints and the gammas (coordinates without inertia): index 2 or 3 with bdf or radau"
+            "constraints and the gammas (coordinates without inertia; a balance without it would have to be "
+            "differentiated too, once where flows stand in it, twice where none does): "
+            f"{remedy}index 2 or 3 with bdf or radau"
         )
     return system, index, warnings
 

@@ -28,6 +28,7 @@ from sysdyn.compiler.forms.kane import repeats
 from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network, Scene
@@ -187,6 +188,12 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
     until = None if options.max_wall is None or since is None else since + options.max_wall
     started = start(prepared, options.t_start, report, options.redundancy, until)
     if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
+        return None
+    number = started.system.form.written
+    if number * budget.STEPPED > budget.there():
+        need, most = (budget.shown(amount) for amount in (number * budget.STEPPED, budget.there()))
+        text = f"a run of {number} unknowns needs {need}, and there are {most}"
+        report.error("E119", text, prepared.network.place, help="fewer elements")
         return None
     if not checked:
         check_module(prepared, started, options.t_end)

@@ -18,6 +18,7 @@
 #define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
 #define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
+#define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
 
 enum { NONE, MATRIX, BASIS };
@@ -73,6 +74,7 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
     if (!settle->basis || !settle->lift)
         return 2;
     settle->basis->null_pivot = LEAST_PIVOT;
+    settle->basis->most = 1000000 + (int64_t)FILL * column[settle->rows];
     settle->basis_column = column;
     settle->basis_row = row;
     settle->basis_y = place_y;
@@ -187,9 +189,13 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
     if (sd_first_bad(entries, value) >= 0)
         return 1;
     sd_sparse *lu = settle->basis;
-    if ((!lu->pivoted || sd_sparse_refactor(lu, settle->basis_column, settle->basis_row, value)) &&
-        sd_sparse_pivot(lu, settle->basis_column, settle->basis_row, value))
-        return 1;
+    if (!lu->pivoted || sd_sparse_refactor(lu, settle->basis_column, settle->basis_row, value)) {
+        int failed = sd_sparse_pivot(lu, settle->basis_column, settle->basis_row, value);
+        if (failed > 1) /* it fills too much */
+            settle->refused = REFUSALS;
+        if (failed)
+            return 1;
+    }
     settle->ready = BASIS;
     return 0;
 }

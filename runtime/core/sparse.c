@@ -129,6 +129,15 @@ static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *large
     return best;
 }
 
+/* lets go of the factors */
+static void leave(sd_sparse *lu)
+{
+    free(lu->l_row), free(lu->u_row), free(lu->l_value), free(lu->u_value);
+    lu->l_row = lu->u_row = NULL;
+    lu->l_value = lu->u_value = NULL;
+    lu->l_room = lu->u_room = 0;
+}
+
 int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
     int32_t n = lu->n, rows = lu->rows;
@@ -142,6 +151,10 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     }
     for (int32_t k = 0; k < n; k++) {
         int32_t c = lu->order[k];
+        if (lu->most > 0 && nl + nu > lu->most) {
+            leave(lu);
+            return 3;
+        }
         if (grow(nl + rows - k, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
             return 2;
         lu->l_start[k] = (int32_t)nl;

@@ -1,0 +1,42 @@
+"""What large models ask for."""
+
+import subprocess
+import sys
+
+from reduced import ROOT
+from sysdyn.cli.main import run
+from sysdyn.dsl.model import budget
+
+LINE = ROOT / "models" / "gallery" / "transmission_line.sd"
+ROOM = 2 << 30
+"""Bytes of address space: the first step of 10000 sections takes a fifth of a gigabyte, of memory, libraries apart."""
+
+
+PROGRAM = f"""
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, ({ROOM}, {ROOM}))
+from sysdyn.cli.main import run
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+def test_a_step_of_ten_thousand_sections_is_no_matter_of_gigabytes(tmp_path):
+    """A basis of the projection that filled far more than its matrix took 3.3 GB here, and 22 GB of 100000 sections."""
+    asked = ["simulate", str(LINE), "--set", "n=10000", "--max-steps", "1", "--json", "-o", str(tmp_path / "t.h5")]
+    done = subprocess.run([sys.executable, "-c", PROGRAM, *asked], capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert "the limit of steps is reached" in done.stdout
+
+
+def test_a_run_that_there_is_no_memory_for_is_not_begun(tmp_path, capsys, monkeypatch):
+    """E119 with what it needs."""
+    path = tmp_path / "line.sd"
+    path.write_text(LINE.read_text().replace("param n = 100000", "param n = 1000"))
+    monkeypatch.setattr(budget, "there", lambda: 8 << 20)
+    monkeypatch.setattr(budget, "granted", lambda: 8 << 20)
+    assert run(["check", str(path)]) == 0
+    capsys.readouterr()
+    assert run(["simulate", str(path), "-o", str(tmp_path / "t.h5")]) == 1
+    said = capsys.readouterr().err
+    assert "E119" in said
+    assert f"needs {budget.shown(5002 * budget.STEPPED)}" in said
