@@ -83,7 +83,7 @@ LAWS = {
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
     # its error test works with a tenth of the power 2/3 of the tolerance (core/radau.h); on stiff models its order is 3
     # to 7, and with more stages errors fall faster: a run too fine costs little, one too coarse a third
-    "radau": Law(10.0, 0.85, 0.6, 1e-17, 1.5),
+    "radau": Law(8.0, 0.85, 0.6, 1e-17, 1.5),
     "dopri": Law(40.0, 1.0, 0.9, 2e-14),
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
