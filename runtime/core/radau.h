@@ -75,6 +75,7 @@ typedef struct sd_radau {
     double *d[SD_STAGES];                           /* right sides and corrections */
     double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it */
     double *point, *point_d;  /* [written and more] */
+    double *first;            /* [n] d[0] while a correction is tried */
     double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
