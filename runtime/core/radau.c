@@ -23,6 +23,7 @@
 #define WITHIN -0.183
 #define FINEST 5e-12       /* of the estimate: less is round-off */
 #define FEWER 3            /* failures of Newton's in a step from which on each takes stages away */
+#define SHORTENED 50       /* steps of three stages after one that needed shortened corrections */
 #define AWHILE 2           /* steps accepted before the number of stages changes again */
 #define CHANGED 1.2        /* what another one must be worth beside the present one */
 #define LONGER 2.0         /* the first step of more stages beside the last one at most */
@@ -233,7 +234,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     while (radau->method->stages < radau->stages)
         radau->method++;
     radau->used = radau->method;
-    radau->since = 0;
+    radau->since = radau->hold = 0;
     show_nodes(radau);
     radau->h = 1.0;
     set_weights(radau);
@@ -653,7 +654,9 @@ static double choose(sd_radau *radau, double next, double error, int iterations,
 {
     const sd_radau_method *method = radau->method;
     double size[2], length, h = radau->h;
-    if (radau->most_stages == 3 || radau->since < AWHILE)
+    if (radau->hold > 0)
+        radau->hold--;
+    if (radau->most_stages == 3 || radau->since < AWHILE || radau->hold > 0)
         return next;
     for (int k = 0; k < 2; k++) {
         combine(method->stages, radau->n, method->taylor[k], radau->z, radau->rate);
@@ -790,6 +793,10 @@ int sd_radau_step(sd_radau *radau)
         }
         int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
         if (stuck && leap != 1 && radau->system->scales > 0) {
+            if (radau->method != sd_radau_methods) /* shortened corrections of more stages are dear */
+                radau->since = 0;
+            radau->method = sd_radau_methods;
+            radau->hold = SHORTENED;
             sd_radau_extrapolate(radau, radau->h);
             cause = iterate_damped(radau, &iterations);
             fresh = 1;

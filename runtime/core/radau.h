@@ -65,6 +65,7 @@ typedef struct sd_radau {
     int32_t ready, old_jacobian, rejected;
     const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */
     int32_t since;                                  /* steps accepted since the method changed */
+    int32_t hold;                                   /* steps that still take three stages */
     int32_t creeping;                               /* steps in a row for which Newton failed at first */
     double *phi, *yd;         /* [n] the last accepted point */
     double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */

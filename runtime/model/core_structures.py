@@ -270,7 +270,7 @@ class Radau(c.Structure):
         *[(name, _D) for name in ["error_accepted", "theta", "state_size"]],
         *[(name, _I) for name in ["ready", "old_jacobian", "rejected"]],
         *[(name, _P) for name in ["method", "used"]],
-        *[(name, _I) for name in ["since", "creeping"]],
+        *[(name, _I) for name in ["since", "hold", "creeping"]],
         *[(name, _P) for name in ["phi", "yd", "last", "before"]],
         ("slope", _P * POINTS),
         ("refined", _I * POINTS),
