@@ -23,6 +23,7 @@
 #define WITHIN -0.183
 #define FINEST 5e-12       /* of the estimate: less is round-off */
 #define FEWER 3            /* failures of Newton's in a step from which on each takes stages away */
+#define SHORTENED 50       /* steps of three stages after one that needed shortened corrections */
 #define AWHILE 2           /* steps accepted before the number of stages changes again */
 #define CHANGED 1.2        /* what another one must be worth beside the present one */
 #define LONGER 2.0         /* the first step of more stages beside the last one at most */
@@ -89,7 +90,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->unknowns + 1;
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
                           &radau->slope[2], &radau->point, &radau->point_d, &radau->y, &radau->rate, &radau->ee,
-                          &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms, &radau->pull};
+                          &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms, &radau->pull, &radau->first};
     double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full, radau->stage, radau->stage_d};
     size_t number = sizeof vectors / sizeof *vectors, sets = sizeof of_stages / sizeof *of_stages;
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
@@ -233,7 +234,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     while (radau->method->stages < radau->stages)
         radau->method++;
     radau->used = radau->method;
-    radau->since = 0;
+    radau->since = radau->hold = 0;
     show_nodes(radau);
     radau->h = 1.0;
     set_weights(radau);
@@ -489,13 +490,12 @@ static int iterate(sd_radau *radau, int full, int *used, double *retry)
     return SD_NEWTON;
 }
 
-/* z := base + part (z_full - base), residuals there in d */
-static int trial(sd_radau *radau, double part)
+/* z := base + part (z_full - base) */
+static void move(sd_radau *radau, double part)
 {
     for (int s = 0; s < radau->method->stages; s++)
         for (int32_t i = 0; i < radau->n; i++)
             radau->z[s][i] = radau->base[s][i] + part * radau->full[s][i];
-    return residuals(radau);
 }
 
 /* the part of the correction `full` of size `size` that is taken: the next one with the same factors is smaller
@@ -503,14 +503,17 @@ static int trial(sd_radau *radau, double part)
 static double damped_part(sd_radau *radau, double size)
 {
     for (double part = 1.0; part >= LEAST_PART; part *= 0.5) {
-        int cause = trial(radau, part);
+        move(radau, part);
+        int cause = residuals(radau);
         if (cause == SD_STOPPED)
             return 0.0;
         if (cause == SD_FINE) {
+            memcpy(radau->first, radau->d[0], (size_t)radau->n * sizeof(double));
             double next = correct(radau);
-            cause = trial(radau, part);
+            move(radau, part);
+            memcpy(radau->d[0], radau->first, (size_t)radau->n * sizeof(double));
             /* up an exponential every correction is as large as the last */
-            if (cause == SD_FINE && next <= size * (part < 1.0 ? 1.0 - 0.25 * part : 1.0)) {
+            if (next <= size * (part < 1.0 ? 1.0 - 0.25 * part : 1.0)) {
                 radau->theta = next / size;
                 return part;
             }
@@ -519,8 +522,9 @@ static double damped_part(sd_radau *radau, double size)
     return 0.0;
 }
 
-/* The full correction at the present stages, with fresh slopes: base and full, its size; z has it. */
-static int full_correction(sd_radau *radau, double *size)
+/* The full correction at the present stages, with fresh slopes: base and full, its size; z has it.  known: d holds the
+ * residuals there. */
+static int full_correction(sd_radau *radau, int known, double *size)
 {
     radau->old_jacobian = 0;
     int cause = factorise(radau, 1);
@@ -528,7 +532,7 @@ static int full_correction(sd_radau *radau, double *size)
         return cause;
     for (int s = 0; s < radau->method->stages; s++)
         memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
-    if ((cause = residuals(radau)))
+    if (!known && (cause = residuals(radau)))
         return cause;
     *size = correct(radau);
     for (int s = 0; s < radau->method->stages; s++)
@@ -545,7 +549,7 @@ static int iterate_damped(sd_radau *radau, int *used)
 {
     double tolerance = newton_tolerance(radau);
     double size;
-    int cause = residuals(radau);
+    int cause = residuals(radau), known = cause == SD_FINE;
     if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
         for (int s = 0; s < radau->method->stages; s++)
             memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
@@ -554,7 +558,7 @@ static int iterate_damped(sd_radau *radau, int *used)
     for (int m = 1; m <= WALK && cause == SD_FINE; m++) {
         *used = m;
         leave_below(radau, NULL_PIVOT);
-        cause = full_correction(radau, &size);
+        cause = full_correction(radau, known, &size);
         leave_below(radau, LEAST_PIVOT);
         if (cause)
             break;
@@ -563,12 +567,13 @@ static int iterate_damped(sd_radau *radau, int *used)
         if (radau->linear->rank < radau->n) {
             for (int s = 0; s < radau->method->stages; s++)
                 memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
-            if ((cause = full_correction(radau, &size)))
+            if ((cause = full_correction(radau, 0, &size)))
                 break;
         }
         double part = damped_part(radau, fmax(size, DBL_MIN));
         if (part == 0.0 || (m >= DAMPED && part < 1.0))
             return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
+        known = 1;
     }
     return cause ? cause : SD_NEWTON;
 }
@@ -649,7 +654,9 @@ static double choose(sd_radau *radau, double next, double error, int iterations,
 {
     const sd_radau_method *method = radau->method;
     double size[2], length, h = radau->h;
-    if (radau->most_stages == 3 || radau->since < AWHILE)
+    if (radau->hold > 0)
+        radau->hold--;
+    if (radau->most_stages == 3 || radau->since < AWHILE || radau->hold > 0)
         return next;
     for (int k = 0; k < 2; k++) {
         combine(method->stages, radau->n, method->taylor[k], radau->z, radau->rate);
@@ -786,6 +793,10 @@ int sd_radau_step(sd_radau *radau)
         }
         int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
         if (stuck && leap != 1 && radau->system->scales > 0) {
+            if (radau->method != sd_radau_methods) /* shortened corrections of more stages are dear */
+                radau->since = 0;
+            radau->method = sd_radau_methods;
+            radau->hold = SHORTENED;
             sd_radau_extrapolate(radau, radau->h);
             cause = iterate_damped(radau, &iterations);
             fresh = 1;

@@ -65,6 +65,7 @@ typedef struct sd_radau {
     int32_t ready, old_jacobian, rejected;
     const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */
     int32_t since;                                  /* steps accepted since the method changed */
+    int32_t hold;                                   /* steps that still take three stages */
     int32_t creeping;                               /* steps in a row for which Newton failed at first */
     double *phi, *yd;         /* [n] the last accepted point */
     double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */
@@ -75,6 +76,7 @@ typedef struct sd_radau {
     double *d[SD_STAGES];                           /* right sides and corrections */
     double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it */
     double *point, *point_d;  /* [written and more] */
+    double *first;            /* [n] d[0] while a correction is tried */
     double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;

@@ -95,3 +95,20 @@ def test_order_on_the_pendulum(stages):
             errors.append(max(np.abs(found["q1"] - Q1).max(), np.abs(found["kappa1"] - KAPPA).max()))
         observed = np.log2(errors[0] / errors[1])
         assert observed > order - 0.2  # pre-asymptotic: errors fall faster
+
+
+@pytest.mark.parametrize(("rtol", "allowed", "steps"), [(1e-6, 1e-5, 60), (1e-9, 1e-8, 80), (1e-12, 1e-11, 150)])
+def test_stages_that_pay_are_taken(rtol, allowed, steps):
+    """By itself the oscillator takes a fraction of the steps of three stages, as accurate between them."""
+    t = np.linspace(0, 10, 101)
+    _, columns, finished = run(models.mass_spring(), 10.0, instants=t, method="radau", rtol=rtol)
+    assert np.abs(columns["q_x"] - oscillation(t)).max() < allowed
+    assert finished.statistics.steps < steps
+    with_three = run(models.mass_spring(), 10.0, instants=t, method="radau", rtol=rtol, stages=(3, 3))[2]
+    assert with_three.statistics.steps > 2 * finished.statistics.steps
+
+
+def test_round_off_ends_no_run():
+    """Newton's corrections of seven stages are coarser; below what they resolve the pendulum's run still ends."""
+    _, columns, _ = run(models.pendulum(), 4.0, "2", 2, INSTANTS, method="radau", rtol=1e-16)
+    assert np.abs(columns["q1"] - Q1).max() < 1e-11
