@@ -68,11 +68,15 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]} | {PERTURBED_STAGE}
 
 
-@pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("arrays", 500)])
+OPEN: dict[str, set[int]] = {"scalar": set(), "arrays": {52, 174}}
+"""Networks whose starts still differ, of those that were tried."""
+
+
+@pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("arrays", 180)])
 def test_random_networks_partly_said_begin_with_the_contents_of_the_closed_form(sort, number):
-    """In all formulations; what is fixed in contradiction has no start in any (two of 180 arrays differ: 52, 174)."""
+    """In all formulations; what is fixed in contradiction has no start in any."""
     seeds = range(number if os.environ.get("SYSDYN_LONG") else 9 if sort == "scalar" else 4)
     verdicts = {seed: judged(seed, sort) for seed in seeds}
     differ = {seed: verdict for seed, verdict in verdicts.items() if verdict not in {"agree", "refused"}}
-    assert len(differ) <= (0.015 * number if sort == "arrays" and number == len(seeds) else 0), differ
+    assert set(differ) <= OPEN[sort], differ
     assert [*verdicts.values()].count("agree") > 0.75 * len(verdicts)
