@@ -160,7 +160,8 @@ class Integration:
         """Of radau: in the first step, at most."""
         if self.request.stages is not None:
             return self.request.stages
-        return 3, lib.STAGES if self.stepped.unknowns <= STAGED else 3
+        many = self.stepped.unknowns <= STAGED and not self.system.form.scales
+        return 3, lib.STAGES if many else 3
 
     def _stepper(self) -> None:
         request = self.request
