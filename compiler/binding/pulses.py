@@ -141,10 +141,12 @@ def _cells(signal: Outline, t0: float, t1: float) -> Array:
         ends = [signal(t, t)[0] for t in (low, high)]
         size = max(size, *(float(np.abs(e[np.isfinite(e)]).max(initial=0.0)) for e in ends))
         least, most = signal(low, high)
-        hidden = np.maximum(most - np.maximum(*ends), np.minimum(*ends) - least)
+        with np.errstate(invalid="ignore"):
+            hidden = np.maximum(most - np.maximum(*ends), np.minimum(*ends) - least)
+            varies = most - least
         # what is bounded by nothing hides anything; a pulse that no end met yet is measured by its own bounds
-        whole = np.where(np.isfinite(most - least), np.maximum(np.abs(least), np.abs(most)), np.inf)
-        plain = (hidden <= HIDDEN * size) & (most - least <= VARIES * size)
+        whole = np.where(np.isfinite(varies), np.maximum(np.abs(least), np.abs(most)), np.inf)
+        plain = (hidden <= HIDDEN * size) & (varies <= VARIES * size)
         open_ = ~plain & ~(whole <= HIDDEN * size)
         done.append(low[~open_])
         low, high = low[open_], high[open_]

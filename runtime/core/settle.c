@@ -9,6 +9,7 @@
 
 #define EPSILON 1e-14   /* of redundant rows */
 #define ITERATIONS 6
+#define PATIENT 40      /* of the last attempt: an exponential is climbed down a step at a time */
 #define EXACT 4e-15     /* scaled residual that counts as round-off */
 #define FINE 1e-13      /* ... and that with which old factors have done what they can */
 #define CLOSE 1e-9      /* scaled residual with which one may live */
@@ -30,7 +31,7 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, in
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
     size_t all = system->left ? (size_t)whole + 8 : 0;
-    settle->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * m + 5 * n + 4 * all, sizeof(double));
+    settle->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * m + 6 * n + 4 * all, sizeof(double));
     if (!settle->memory) {
         free(settle);
         return NULL;
@@ -49,7 +50,8 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, in
     settle->x0 = settle->x + n;
     settle->scale = settle->x0 + n;
     settle->step = settle->scale + n; /* unknowns, rates and rows */
-    settle->matrix = settle->step + n + m;
+    settle->met = settle->step + n + m;
+    settle->matrix = settle->met + n;
     settle->room = settle->matrix + linear->entries + 1;
     settle->whole = whole;
     return settle;
@@ -283,16 +285,31 @@ static double move(sd_settle *settle, double *y, double *yd)
     return largest;
 }
 
-/* The iteration from (y, yd) = x0; the best point met, its residual in `best`, is left in x. */
-static void iterate(sd_settle *settle, double t, double *y, double *yd, double *best)
+/* x := (y, chosen yd) */
+static void take(const sd_settle *settle, const double *y, const double *yd, double *x)
 {
-    int32_t n = settle->unknowns;
+    memcpy(x, y, (size_t)settle->unknowns * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        x[settle->unknowns + k] = yd[settle->rate[k]];
+}
+
+/* (y, chosen yd) := x */
+static void put(const sd_settle *settle, const double *x, double *y, double *yd)
+{
+    memcpy(y, x, (size_t)settle->unknowns * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] = x[settle->unknowns + k];
+}
+
+/* The iteration from (y, yd) towards what is nearest to x0; the best point met, its residual in `best`, is left in x. */
+static void iterate(sd_settle *settle, double t, double *y, double *yd, int most, double *best)
+{
     int fresh = settle->ready != MATRIX, failed = fresh && factorise(settle, t, y, yd);
     double moved = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     *best = before;
     settle->drift = settle->constraints;
-    memcpy(settle->x, settle->x0, (size_t)(n + settle->rates) * sizeof(double));
-    for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
+    take(settle, y, yd, settle->x);
+    for (int m = 0; m < most && !failed && !*settle->system->stop; m++) {
         if (moved < SMALL && before <= fmax(EXACT, settle->enough))
             break;
         moved = move(settle, y, yd);
@@ -301,9 +318,7 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, double *
         if (now < *best || now <= EXACT || (now <= FINE && drag >= SMALL)) {
             *best = now;
             drag = moved;
-            memcpy(settle->x, y, (size_t)n * sizeof *y);
-            for (int32_t k = 0; k < settle->rates; k++)
-                settle->x[n + k] = yd[settle->rate[k]];
+            take(settle, y, yd, settle->x);
         }
         if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < (fresh ? CLOSE : FINE) && moved < SMALL))
             break;
@@ -315,12 +330,14 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, double *
     }
 }
 
-/* (y, chosen yd) := x */
-static void put(const sd_settle *settle, const double *x, double *y, double *yd)
+/* (y, chosen yd): the state as in x0, what follows from it as at the last point that settled */
+static void put_near(const sd_settle *settle, double *y, double *yd)
 {
-    memcpy(y, x, (size_t)settle->unknowns * sizeof *y);
-    for (int32_t k = 0; k < settle->rates; k++)
-        yd[settle->rate[k]] = x[settle->unknowns + k];
+    int32_t n = settle->unknowns;
+    put(settle, settle->x0, y, yd);
+    for (int32_t j = 0; j < n + settle->rates; j++)
+        if (settle->weight[j] < DRAWN)
+            *(j < n ? &y[j] : &yd[settle->rate[j - n]]) = settle->met[j];
 }
 
 /* what the point makes of other unknowns, and its residuals */
@@ -336,32 +353,36 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done)
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
-    int32_t n = settle->unknowns;
     double best;
     settle->calls++;
-    memcpy(settle->x0, y, (size_t)n * sizeof *y);
-    for (int32_t k = 0; k < settle->rates; k++)
-        settle->x0[n + k] = yd[settle->rate[k]];
+    take(settle, y, yd, settle->x0);
     if (settle->basis && settle->hold == 1.0 && settle->refused < REFUSALS) {
         if (follow(settle, t, y, yd, &best)) {
+            take(settle, y, yd, settle->met);
             finish(settle, t, y, yd, 1);
             return 0;
         }
         put(settle, settle->x0, y, yd);
     }
-    iterate(settle, t, y, yd, &best);
+    iterate(settle, t, y, yd, ITERATIONS, &best);
     if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
         settle->hold = HELD;
         settle->ready = 0;
-        iterate(settle, t, y, yd, &best);
+        iterate(settle, t, y, yd, ITERATIONS, &best);
         settle->hold = 1.0;
         settle->ready = 0;
+    }
+    if (best > CLOSE && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
+        put_near(settle, y, yd);
+        iterate(settle, t, y, yd, PATIENT, &best);
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
     int done = best <= CLOSE || (measure(settle, t, y, yd), settle->own <= CLOSE);
-    if (!done)
+    if (done)
+        take(settle, y, yd, settle->met);
+    else
         put(settle, settle->x0, y, yd);
     settle->failures += !done;
     finish(settle, t, y, yd, done);

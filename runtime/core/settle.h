@@ -35,7 +35,7 @@ typedef struct sd_settle {
     const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;
-    double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;
+    double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *met, *memory; /* met: the last point that settled */
     sd_sparse *basis;                /* of G^T, its rows over the weights: what follows pivots first; or NULL */
     const int32_t *basis_column, *basis_row;      /* its pattern: [rows + 1], unknowns and rates of each row */
     const int32_t *basis_y, *basis_yd;            /* [entries] places of dF/dy, dF/dyd in it, -1: none */
@@ -47,7 +47,7 @@ typedef struct sd_settle {
     int32_t refused;                 /* attempts by the basis that led nowhere */
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
                                         rate of another; norm of the constraint rows */
-    int64_t calls, failures;
+    int64_t calls, failures;         /* calls - failures > 0: a point has been met */
     const struct sd_condensed *seen;       /* points are handed over as this system has them; NULL: with all unknowns */
     double *room;                    /* [2][unknowns of the whole system] for points with all of them, and kept ones */
     int32_t whole;                   /* unknowns of a point: those of the system, or of the one that it is condensed from */

@@ -396,8 +396,10 @@ class Runs:
         return found
 
     def _sampled(self, rows: Floats, finished: Finished) -> Floats:
-        """The compared quantities [k, quantities] at rows."""
-        if finished.beyond > BEYOND:
+        """The compared quantities [k, quantities] at rows; no numbers of a run that tells nothing of itself: one that
+        passed over something, or, a draft apart, one whose rows do not all meet the equations.
+        """
+        if finished.beyond > BEYOND or (finished.unsettled and self.samplings):
             rows = np.full_like(rows, np.nan)
         return rows[:, [*(lib.ROW_HEAD + self.places).tolist(), *(METERS[name] for name in self.meters)]]
 

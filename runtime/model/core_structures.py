@@ -392,7 +392,7 @@ class Settle(c.Structure):
         ("k_q", _P),
         ("k_f", _P),
         ("kinematics", _I),
-        *[(name, _P) for name in ["jy", "jyd", "matrix", "row_scale", "r", "x", "x0", "step", "memory"]],
+        *[(name, _P) for name in ["jy", "jyd", "matrix", "row_scale", "r", "x", "x0", "step", "met", "memory"]],
         *[(name, _P) for name in ["basis", "basis_column", "basis_row", "basis_y", "basis_yd"]],
         *[(name, _P) for name in ["lift", "basis_value"]],
         ("hold", _D),
