@@ -285,7 +285,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed)
     _close(runs, achieved, judgement)
     finished, _, writer = runs.done
-    if finished.unsettled:
+    if finished.unsettled and not options.events:
         warnings = (*warnings, f"{finished.unsettled} rows do not meet the equations: they are the integrator's own")
     nominal = runs.nominal(finished.largest, finished.magnitude)
     estimate = achieved.error_estimate if achieved is not None else None

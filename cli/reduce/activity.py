@@ -1,8 +1,8 @@
 """The energy activity of each element over a scene: the integral of its absolute power (Louca and Stein).
 
 The energy that went through an element since the start, or that a statement holds, is a curve E(t); the integral of
-abs(dE/dt) is its total variation.  A trace holds E and its rate at accepted steps, so E is a cubic in each cell, and
-the variation of a cubic is known in closed form by its extremes.  One run gives all elements.
+abs(dE/dt) is its total variation.  A trace holds E and its rate at accepted steps and at instants between them, so E
+is a cubic in each cell, and the variation of a cubic is known in closed form by its extremes.  One run gives all elements.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from sysdyn.runtime.trace.trace import Quantity, Trace
 from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
+CELLS = 400
+"""Of a scene at least: the steps of a method of high order are too long for one cubic each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,10 @@ def activities(
                          prepared.network.place)  # fmt: skip
             return None
         own = tuple(o.name for o in prepared.network.observations)
-        options = replace(options, output=folder / "activity.h5", every=None, watch=None, sampled_at=())
+        cells = np.linspace(options.t_start, options.t_end, CELLS + 1)[1:-1]
+        options = replace(
+            options, output=folder / "activity.h5", every=None, at=tuple(cells), watch=None, sampled_at=()
+        )
         if options.accuracy is not None and own:  # of the scene's quantities alone
             options = replace(options, accuracy=None, accuracy_on=tuple((name, options.accuracy) for name in own))
         inner = Report()

@@ -9,7 +9,7 @@
 
 #define MOST 48          /* instants of comparison, at most twice that (many/batch.py) */
 #define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
-#define SAFETY 2.0
+#define SAFETY 2.5
 #define AIM 2.0
 #define LEFT 0.3
 #define SLOWEST 0.75

@@ -397,9 +397,10 @@ class Runs:
 
     def _sampled(self, rows: Floats, finished: Finished) -> Floats:
         """The compared quantities [k, quantities] at rows; no numbers of a run that tells nothing of itself: one that
-        passed over something, or, a draft apart, one whose rows do not all meet the equations.
+        passed over something, or, a draft and runs with events apart, one whose rows do not all meet the equations.
         """
-        if finished.beyond > BEYOND or (finished.unsettled and self.samplings):
+        lost = finished.unsettled and self.samplings and not self.options.events
+        if finished.beyond > BEYOND or lost:
             rows = np.full_like(rows, np.nan)
         return rows[:, [*(lib.ROW_HEAD + self.places).tolist(), *(METERS[name] for name in self.meters)]]
 
