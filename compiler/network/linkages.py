@@ -75,11 +75,16 @@ def with_linkages(network: Network) -> Network:
 
     states = [State(f"{name}.linkage", _shape(b), b.domain.momentum, b.place) for name, b in free.items()]
 
+    def unsaid(branch: Branch) -> Initial:
+        content = held(ex.var(branch.name, "bp", *branch.at))
+        zero, unit = ex.const(0.0), branch.domain.momentum.text
+        return Initial(content, zero, False, branch.loops, branch.place, branch.name, unit, said=False)
+
     return replace(
         network,
         parameters=(*network.parameters, *parameters.values()),
         branches=tuple(law(b) for b in network.branches),
-        initials=tuple(start(i) for i in network.initials),
+        initials=(*(start(i) for i in network.initials), *(unsaid(b) for b in free.values())),
         states=(*network.states, *states),
         constraints=tuple(replace(c, expression=held(c.expression)) for c in network.constraints),
         dynamics=(

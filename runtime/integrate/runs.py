@@ -396,11 +396,8 @@ class Runs:
         return found
 
     def _sampled(self, rows: Floats, finished: Finished) -> Floats:
-        """The compared quantities [k, quantities] at rows; no numbers of a run that tells nothing of itself: one that
-        passed over something, or, a draft and runs with events apart, one whose rows do not all meet the equations.
-        """
-        lost = finished.unsettled and self.samplings and not self.options.events
-        if finished.beyond > BEYOND or lost:
+        """The compared quantities [k, quantities] at rows."""
+        if finished.beyond > BEYOND:
             rows = np.full_like(rows, np.nan)
         return rows[:, [*(lib.ROW_HEAD + self.places).tolist(), *(METERS[name] for name in self.meters)]]
 

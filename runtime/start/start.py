@@ -278,6 +278,8 @@ def _nearer(
 ) -> tuple[Solution | None, float]:
     """One step of it, and how far it went in units of magnitudes; None where there is none."""
     x = best.x
+    if not starter.balanced:
+        return None, 0.0
     follows = starter.following(t, x) | starter.idle
     follows[starter.carried()] = True
     if not (x != guess)[free & ~follows].any():

@@ -319,6 +319,12 @@ class Starter:
                     found[mine] += matrix[at + unsettled[mine] - place]
         return found
 
+    @property
+    def balanced(self) -> bool:
+        """Flows have balances of their own, which say what their stores hold; in Kane's form they are shared."""
+        owners = {self.system.description.rows[family].owner for _, family, _ in self.system.form.groups}
+        return all(f.owner in owners for f in self.system.description.families if f.kind == "f")
+
     def by_content(self, t: float, x: Floats, scale: Floats) -> Floats:
         """Weights of guesses: contents of one unit are measured alike, flows by their momenta."""
         families, form = self.system.description.families, self.system.form

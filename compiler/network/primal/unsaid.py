@@ -32,6 +32,7 @@ def measured(
     found: list[tuple[Initial, set[str]]] = []
     shared: set[str] = set()
     held: dict[tuple[str, str], list[Box]] = {}
+    known = {initial.store for initial in initials}
     for b in network.branches:
         if b.kind not in _CONTENT or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
             continue
@@ -46,7 +47,7 @@ def measured(
                 box = _over(node, loops, sizes, b)
                 shared |= {node.data[0]} if any(meet(box, other) for other in others) else set()
                 others.append(box)
-        for part in _parts(b, initials, sizes):
+        for part in () if b.name in known else _parts(b, initials, sizes):
             for loops, content in _contents(b, part.loops, reader):
                 guess = replace(part, target=content, loops=loops, store=b.name, unit=unit.text)
                 found.append((guess, _owners(_unknowns(content))))
