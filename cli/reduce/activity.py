@@ -2,7 +2,8 @@
 
 The energy that went through an element since the start, or that a statement holds, is a curve E(t); the integral of
 abs(dE/dt) is its total variation.  A trace holds E and its rate at accepted steps and at instants between them, so E
-is a cubic in each cell, and the variation of a cubic is known in closed form by its extremes.  One run gives all elements.
+is a cubic in each cell, and the variation of a cubic is known in closed form by its extremes.  One run gives all
+elements.
 """
 
 from __future__ import annotations
