@@ -19,7 +19,6 @@
 #define UNSEEN 100.0
 #define SHORT_CREDIT 0.75
 #define FIRST_DROP 1e-2
-#define BLIND_DROP 0.03
 #define PARTED 10.0
 #define MUCH 0.3
 #define BEND 4.0
@@ -477,8 +476,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         step_before = step;
         double drop = pow(1.0 / fmax(AIM * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
         tolerance = next;
-        drop = isfinite(over) ? fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, LEFT)) : BLIND_DROP;
-        next = fmax(drop * next, many->finest);
+        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, LEFT)) * next, many->finest);
         longest /= STRETCH;
         sd_samples *swap = last;
         if (many->known) {

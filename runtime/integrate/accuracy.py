@@ -39,8 +39,6 @@ WORTH = 0.3
 SHORT, SHORT_CREDIT = 60, 0.75
 """Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
 FIRST_DROP = 1e-2
-BLIND_DROP = 0.03
-"""Of the tolerance where a comparison says nothing: that is no reason to go far."""
 AIM, LEFT = 2.0, 0.3
 """How far below what was asked the next run aims, and the most that is left of its tolerance."""
 SLOWEST = 0.75
@@ -271,8 +269,6 @@ class _Estimate:
 
         What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
         """
-        if not np.isfinite(self.over):
-            return max(BLIND_DROP * tolerance, self.law.finest)
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
         drop = (1.0 / max(AIM * self.over, 1e-300)) ** (1.0 / power)
         least = FIRST_DROP if self._power is None else 1e-3
