@@ -160,7 +160,8 @@ def tree(folder: Path) -> Path:
         shutil.copytree(place, package / room, ignore=shutil.ignore_patterns("__pycache__"))
     around = importlib.util.find_spec("sysdyn")
     if around is not None and around.origin is not None:  # the package itself: where it is found its rooms are
-        shutil.copy(around.origin, package / "__init__.py")
+        for module in Path(around.origin).parent.glob("*.py"):
+            shutil.copy(module, package / module.name)
     for name in [n for n in sys.modules if n == "sysdyn" or n.startswith("sysdyn.")]:
         del sys.modules[name]  # looking for the rooms has imported it from where it is installed
     importlib.invalidate_caches()
