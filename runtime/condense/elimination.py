@@ -15,6 +15,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.condense.composition import ranges
 from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.forms import FORMS
 from sysdyn.runtime.model.system import System
@@ -185,7 +186,7 @@ class _Search:
         pivot = pivot[np.lexsort((self.columns[pivot], depth))]
         row = self.rows[pivot]
         count = self.start[row + 1] - self.start[row]
-        entry = self.entry[np.repeat(self.start[row] - (np.cumsum(count) - count), count) + np.arange(count.sum())]
+        entry = self.entry[ranges(self.start[row], count)]
         entry = entry[~np.isin(entry, pivot)]
         start = np.concatenate([[0], np.cumsum(count - 1)])
         return Elimination(self.columns[pivot], row, pivot, start, entry, unread)
