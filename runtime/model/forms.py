@@ -123,8 +123,9 @@ class Form:
 
 def unknown_name(description: Description, form: Form, place: int) -> str:
     """Name of the unknown at a place of y."""
-    for k, family in enumerate(description.families):
-        if family.kind != "audit" and form.at[k] <= place < form.at[k] + family.size:
+    for k in reversed(np.flatnonzero(form.at <= place).tolist() if place < form.written else []):
+        family = description.families[k]
+        if family.kind != "audit" and place < form.at[k] + family.size:
             return element(family.name, family.shape, place - int(form.at[k]))
     place -= form.written
     for k in description.families_of("kappa"):
