@@ -18,6 +18,7 @@ from sysdyn.dsl.elaborate.scenes import SceneReader
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.network import Network, Parameter, Scene, nodes_read
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
@@ -61,7 +62,8 @@ def read(path: str | Path, report: Report, name: str | None = None) -> Document:
 
 def document(source: SourceText, report: Report) -> Document:
     """Parse a text; what is wrong with its syntax goes to the report."""
-    file, problems = parse(source)
+    with at_rest():
+        file, problems = parse(source)
     report.extend(problems)
     models = {i.name.name: i for i in reversed(file.items) if isinstance(i, syntax.Model)}
     scenes: dict[str, syntax.Scene] = {}
@@ -108,7 +110,7 @@ def network(
     None where the report has errors, or N608: a network that lacks a part of the text is none, and where a statement
     could not be read only names and units are judged.  required: parameters and inputs must have values.
     """
-    with _deep(), budget.drawn():
+    with _deep(), at_rest(), budget.drawn():
         try:
             return _network(document, model, scene, report, settings, levels, required=required, outputs=outputs)
         except budget.SpentError as spent:

@@ -182,7 +182,7 @@ class _Lowering:
                 declare(Equations(kind, name, name, kind, unit, rows[0].place, rate))
         said = _by_name(self.model.of_kind("lambda"))
         for s in self.model.states:
-            rows = said.get(s.name)
+            rows = said.get(s.name, [])
             place = rows[0].place if rows else s.place
             declare(Equations("lambda", s.name, s.name, "lambda", f"{s.units['s']}/s", place))
 

@@ -27,7 +27,7 @@ HEALTHY = 1e-7
 """Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less."""
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
 LONGEST = 12
-"""Definitions one after the other: of more, what is left reads everything (a chain of scalars would fill its matrix)."""
+"""Definitions one after the other: through more of them the rest would read everything (a chain of scalars)."""
 PREFERRED = ("kappa", "mu", "e", "f")
 """Kinds in the order in which they are defined by rows that could define more than one."""
 
