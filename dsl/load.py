@@ -62,8 +62,7 @@ def read(path: str | Path, report: Report, name: str | None = None) -> Document:
 
 def document(source: SourceText, report: Report) -> Document:
     """Parse a text; what is wrong with its syntax goes to the report."""
-    with at_rest():
-        file, problems = parse(source)
+    file, problems = parse(source)
     report.extend(problems)
     models = {i.name.name: i for i in reversed(file.items) if isinstance(i, syntax.Model)}
     scenes: dict[str, syntax.Scene] = {}

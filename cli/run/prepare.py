@@ -69,6 +69,7 @@ class Prepared:
         }
 
 
+@at_rest()
 def prepare(
     network: Network,
     report: Report,
@@ -88,8 +89,7 @@ def prepare(
     """
     cpu = time.process_time()
     whole, place = network, None
-    with at_rest():
-        network, left_out = pruned(whole) if prune else (whole, ())
+    network, left_out = pruned(whole) if prune else (whole, ())
     if left_out and not _well_formed(whole, report):
         return None
     if formulation is None:
