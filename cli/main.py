@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import gc
 import importlib
 import signal
 import sys
@@ -13,6 +12,7 @@ from typing import Any
 
 import click
 from sysdyn.cli.streams import standing_streams
+from sysdyn.dsl.model.collecting import keep
 
 COMMANDS = {
     "check": "Check models: everything that needs no time integration.",
@@ -86,7 +86,7 @@ def group() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its code."""
-    gc.set_threshold(50_000, 20, 100)  # what a long text has become stays alive: nothing to look for
+    keep()
     sys.exit(run(arguments))
 
 

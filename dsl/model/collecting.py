@@ -9,6 +9,10 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+MANY = 1_000_000
+"""Objects of a long text: of 30000 lines."""
+_keeping = False
+
 
 @contextmanager
 def at_rest() -> Iterator[None]:
@@ -20,4 +24,13 @@ def at_rest() -> Iterator[None]:
     try:
         yield
     finally:
+        if _keeping and gc.get_count()[0] > MANY:
+            gc.freeze()
         gc.enable()
+
+
+def keep() -> None:
+    """The process ends with its command: what a long text has become is never looked through for garbage."""
+    global _keeping
+    _keeping = True
+    gc.set_threshold(50_000, 20, 100)
