@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 from sysdyn.cli.streams import standing_streams
+from sysdyn.dsl.model.collecting import keep
 
 COMMANDS = {
     "check": "Check models: everything that needs no time integration.",
@@ -85,6 +86,7 @@ def group() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its code."""
+    keep()
     sys.exit(run(arguments))
 
 
