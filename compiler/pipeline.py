@@ -37,8 +37,8 @@ from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.network.along import along
-from sysdyn.compiler.network.precedence import outermost
 from sysdyn.compiler.network.primal import Step, primal
+from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.compiler.network.reflection import reflect, relabelled
 from sysdyn.compiler.network.stated import FOREIGN, as_elements
 from sysdyn.compiler.network.verify import verify_network
