@@ -41,6 +41,7 @@ from sysdyn.compiler.network.authors import shown, told
 from sysdyn.compiler.network.gathered import gathered
 from sysdyn.compiler.network.precedence import outermost
 from sysdyn.compiler.network.primal import Step, primal
+from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.compiler.network.reflection import reflect, relabelled
 from sysdyn.compiler.network.stated import FOREIGN, as_elements
 from sysdyn.compiler.network.verify import verify_network
