@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import secrets
+import os
 import signal
 import threading
 import time
@@ -105,7 +105,7 @@ class TraceWriter:
             self.path = self.path.resolve()
             if self.path.exists() and not self.path.is_file():
                 raise OSError(f"{self.path} is no regular file")
-            self._token = secrets.token_hex(4)
+            self._token = os.urandom(4).hex()
             self._visible = self._store("a")
             self._publish(self._visible)
 
