@@ -1,8 +1,8 @@
 """C text -> shared library, kept by its content (cache.py).
 
-The key is the sha256 of text, flags and the compiler file (asking it for its version takes 5 ms): a rebuilt library at an
-old path would give the old code (dlopen), and processes that build the same text at once must not meet half a file: each
-builds in a folder of its own.
+The key is the sha256 of text, flags and the compiler file (asking it for its version takes 5 ms): a rebuilt library at
+an old path would give the old code (dlopen), and processes that build the same text at once must not meet half a file:
+each builds in a folder of its own.
 Nothing of the user's text reaches a command line.
 """
 
