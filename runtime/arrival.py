@@ -78,7 +78,7 @@ def _arrived(
     y, yd, settled = run.settler.settle(options.t_end, y[:n], yd[:n])
     if not settled:
         raise SolverFailure("newton", options.t_end, 0.0)
-    return ConsistentState(options.t_end, y.copy(), yd.copy(), (), 0.0, 0, ())
+    return ConsistentState(options.t_end, y.copy(), yd.copy(), (), 0.0)
 
 
 def _nothing(rows: Floats) -> None:

@@ -48,7 +48,7 @@ def resting(target: Target, prepared: Prepared, tries: int, most: int | None = N
     guess = _guess(prepared, system, t0)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
     states = rests(Resting(system, tangible, t0, guess), tries, most)
-    state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf, 0, ())
+    state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf)
     return Found(target, prepared, system, state, prepared.binding), states
 
 

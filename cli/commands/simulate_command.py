@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,6 +60,8 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
 
 def _to_standard_output(request: Request, console: Console, line: ProgressLine) -> Ran | None:
     """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
+    import tempfile
+
     from sysdyn.cli.run.running import run
 
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:

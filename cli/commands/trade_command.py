@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import click
+from sysdyn import __version__
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run import lock, targets
-from sysdyn.cli.run.running import Request, version
+from sysdyn.cli.run.running import Request
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
 from sysdyn.cli.trade.reference import NoReference
 from sysdyn.cli.trade.search import tolerance
@@ -112,7 +113,7 @@ def _lock(request: Request, found: Traded, best: Measured) -> Path:
     assert scene is not None
     c = best.combination
     held = lock.Lock(c.formulation, c.index, c.method, c.levels, best.tolerance, found.accuracy)
-    return lock.write(request.file, scene, held, version())
+    return lock.write(request.file, scene, held, __version__)
 
 
 def _judged(found: Traded, console: Console, use: str) -> int:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from importlib.metadata import version
 
+from sysdyn import __version__
 from sysdyn.cli.manual import library, topics
 from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.source_text import block
@@ -24,7 +24,7 @@ def site() -> str:
     links = [(t.name, t.name) for t in pages] + [("std", "library"), ("codes", "codes")]
     bar = "".join(f'<a href="#{target}">{escape(name)}</a>' for target, name in links)
     parts = [
-        f"<h1>sysdyn {escape(version('sysdyn'))}</h1>",
+        f"<h1>sysdyn {escape(__version__)}</h1>",
         "<p>A model compiler for physical systems: the language, its library, and what the findings mean.</p>",
         f"<nav>{bar}</nav>",
         *(

@@ -11,6 +11,7 @@ from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
 
+from sysdyn import __version__
 from sysdyn.cli.page.junit import junit as junit_file
 from sysdyn.dsl.text import codes
 from sysdyn.dsl.text.diagnostics import Diagnostic
@@ -75,8 +76,6 @@ def _case(d: Diagnostic) -> str:
 
 def sarif(found: Sequence[Diagnostic], plain: Plain) -> str:
     """SARIF 2.1.0: the pages of the codes are its rules; columns are counted in code points."""
-    from importlib.metadata import version
-
     used = sorted({d.code for d in found})
     pages = codes.codes()
     rules = [
@@ -90,7 +89,7 @@ def sarif(found: Sequence[Diagnostic], plain: Plain) -> str:
         for code in used
     ]
     notices = [{"level": "error", "message": {"text": str(p["message"])}} for p in plain]
-    driver = {"name": "sysdyn", "version": version("sysdyn"), "rules": rules}
+    driver = {"name": "sysdyn", "version": __version__, "rules": rules}
     run: dict[str, Any] = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",

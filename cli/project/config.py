@@ -6,7 +6,6 @@ the first that has one counts. What a scene says (accuracy, formulation, ...) is
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -147,6 +146,8 @@ def _instead(table: str, key: str) -> str:
     for other, keys in KEYS.items():
         if other != table and key in keys:
             return f": it belongs in [{other}]" if other else ": it stands above the tables"
+    import difflib
+
     near = difflib.get_close_matches(key, [*KEYS[table], *(KEYS if not table else ())], 1, 0.5)
     return f"; nearest: '{near[0]}'" if near and near[0] else f"; there are {', '.join(KEYS[table])}"
 

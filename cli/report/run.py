@@ -7,6 +7,8 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.starting import described
 from sysdyn.compiler.binding.certificate import certificate
+from sysdyn.runtime.model.description import element
+from sysdyn.runtime.start.start import freedom
 
 SHOWN = 60
 """Rows of a table of values."""
@@ -60,9 +62,10 @@ def start(study: Study) -> str:
         parts.append(table(("guess", "as written", "at the start", "why"), rows[:SHOWN], left=(0, 3)) + more)
     else:
         parts.append("<p>No written guess was moved.</p>")
-    if state.freedom > 0:
-        names = ", ".join(state.guesses[:12]) + (" …" if len(state.guesses) > 12 else "")
-        parts.append(f"<p>{state.freedom} more values could be fixed, among {escape(names)}.</p>")
+    more_values, guesses = freedom(system, state)
+    if more_values > 0:
+        names = ", ".join(guesses[:12]) + (" …" if len(guesses) > 12 else "")
+        parts.append(f"<p>{more_values} more values could be fixed, among {escape(names)}.</p>")
     parts.append(f'<p class="soft">Largest scaled residual {state.residual:.1e} at t = {state.t:g} s.</p>')
     rows, position = [], 0
     for family in system.description.families:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -125,6 +124,8 @@ def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report
 @contextlib.contextmanager
 def _file(outcome: Outcome) -> Iterator[Path]:
     """The trace's file; of one that is held in memory, a file for as long as it is read."""
+    import tempfile
+
     if outcome.trace is not None:
         yield outcome.trace
         return

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -102,6 +101,8 @@ def read(file: str, target: Target, version: str, report: Report) -> Lock | None
     path = path_of(file)
     if file == "-" or not path.is_file():
         return None
+    import tomllib
+
     try:
         held = tomllib.loads(path.read_text(encoding="utf-8"))
         stale = _stale(held, target, version)
@@ -193,6 +194,8 @@ def write(file: str, target: Target, lock: Lock, version: str) -> Path:
     path = path_of(file)
     held: dict[str, Any] = {}
     if path.is_file():
+        import tomllib
+
         try:
             held = tomllib.loads(path.read_text(encoding="utf-8"))
             held = {} if _stale(held, target, version) else held

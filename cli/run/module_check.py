@@ -15,6 +15,7 @@ from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
 from sysdyn.compiler.forms.descriptor import Block
 from sysdyn.runtime.model.scales import group_maximum, magnitudes
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.points import normal, uniform
 
 Array = NDArray[np.float64]
 
@@ -78,16 +79,16 @@ def _points(system: System, started: Started, oracle: SampledRows, until: float)
     scale, time = magnitudes(system, t0, until, y, yd)
     # the magnitude of what begins at zero is a guess: one far too small would hide its terms behind rounding
     scale = np.maximum(scale, LEAST * group_maximum(system, scale))
-    random = np.random.default_rng(20260220)
     order = _order(system, oracle)
     number = 1 + len(NEARBY)
     points = Points(np.full(number, t0), np.zeros((number, order.size)), np.zeros((number, order.size)))
     extended = [np.concatenate([x, np.zeros(order.size - x.size)]) for x in (y, yd)]
     sizes = [np.concatenate([x, np.ones(order.size - x.size)]) for x in (scale, scale / max(time, 1e-300))]
+    later = 0.5 + 0.5 * uniform(number)
+    ways = np.sign(normal(number, 2, order.size)) * (0.5 + uniform(number * 2 * order.size).reshape(number, 2, -1))
     for k, distance in enumerate((0.0, *NEARBY)):
-        points.t[k] += distance * (until - t0) * (0.5 + 0.5 * random.random())
-        for target, x, size in zip((points.y, points.yd), extended, sizes, strict=True):
-            away = random.uniform(0.5, 1.5, x.size) * random.choice((-1.0, 1.0), x.size)
+        points.t[k] += distance * (until - t0) * later[k]
+        for target, x, size, away in zip((points.y, points.yd), extended, sizes, ways[k], strict=True):
             target[k] = (x + distance * size * away)[order]
     return points
 

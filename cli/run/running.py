@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
+from sysdyn import __version__
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import lock, targets
 from sysdyn.cli.run.events import plan, zeno
@@ -121,7 +120,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
 
 def _locked(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
     """The request with what the file's lock says where neither it nor the scene does."""
-    held = None if request.no_lock else lock.read(request.file, target, version(), report)
+    held = None if request.no_lock else lock.read(request.file, target, __version__, report)
     if held is None:
         return request, None
     found = lock.taken(held, target, request.formulation, request.index, request.method, request.levels)
@@ -385,7 +384,7 @@ def _said(target: Target, prepared: Prepared) -> dict[str, str]:
     return {
         "Conventions": "CF-1.11",
         "title": target.name,
-        "source": f"sysdyn {version()}",
+        "source": f"sysdyn {__version__}",
         "model": prepared.network.model,
         "scene": prepared.network.scene.name if prepared.network.scene else "",
         "formulation": prepared.formulation,
@@ -397,15 +396,6 @@ def _said(target: Target, prepared: Prepared) -> dict[str, str]:
 def model_digest(target: Target) -> str:
     """SHA-256 of the model's text."""
     return hashlib.sha256(target.document.file.source.text.encode("utf-8", "surrogatepass")).hexdigest()
-
-
-@functools.cache
-def version() -> str:
-    """Of the package."""
-    try:
-        return metadata.version("sysdyn")
-    except metadata.PackageNotFoundError:  # run from a folder that is not installed
-        return "unknown"
 
 
 def _parameters(prepared: Prepared) -> Iterator[Parameter]:

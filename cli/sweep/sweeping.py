@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn import __version__
 from sysdyn.cli.run import lock
-from sysdyn.cli.run.running import Request, model_digest, version
+from sysdyn.cli.run.running import Request, model_digest
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import Journal
@@ -115,12 +116,12 @@ def sweep(
     target = runner.loaded().target
     sha = model_digest(target)
     texts = lock.hashes(target.document.file.source, target.document.file.items)
-    digest = study.digest(request=replace(request, output=None), texts=texts, version=version(), keep=keep)
+    digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
     units = _units(runner)
     attributes = {
         "Conventions": "CF-1.11",
         "title": f"sweep of {target.name}",
-        "source": f"sysdyn {version()}",
+        "source": f"sysdyn {__version__}",
         "model": target.model.name.name,
         "scene": target.scene.name.name if target.scene else "",
         "model_sha256": sha,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import MISSING
 from functools import cache
 from operator import attrgetter
 from types import CodeType, FunctionType
@@ -29,7 +30,7 @@ class _Standard:
 def _setting(count: int, after: bool) -> CodeType:
     """`__init__` of a value of so many fields, set each by its slot; after: `__post_init__` follows."""
     names = [f"a{k}" for k in range(count)]
-    lines = [f"_{name}(self, {name})" for name in names] + ["_after(self)"] * after + ["pass"]
+    lines = [f"_{name}(self, {name})" for name in names] + ["_after(self)"] * after
     made: dict[str, Any] = {}
     exec(f"def __init__({', '.join(['self', *names])}):\n " + "\n ".join(lines), made)  # noqa: S102 (numbers alone)
     code: CodeType = made["__init__"].__code__
@@ -96,6 +97,18 @@ def _field(name: str, kind: Any, default: Any) -> Any:
     return made
 
 
+class _Fields:
+    """`__dataclass_fields__` of a class, made when `fields` or `replace` first ask."""
+
+    def __init__(self, kinds: dict[str, Any], defaults: dict[str, Any]) -> None:
+        self._kinds, self._defaults = kinds, defaults
+
+    def __get__(self, _value: object, cls: type) -> dict[str, Any]:
+        found = {name: _field(name, kind, self._defaults.get(name, MISSING)) for name, kind in self._kinds.items()}
+        cls.__dataclass_fields__ = found  # type: ignore[attr-defined]
+        return found
+
+
 def _made(cls: type, *, eq: bool) -> Any:
     """The class anew, with slots and methods; what it writes itself stays."""
     own = {name: value for name, value in vars(cls).items() if name not in ("__dict__", "__weakref__")}
@@ -107,9 +120,7 @@ def _made(cls: type, *, eq: bool) -> Any:
     own = SHARED | (_compared(names) if eq else {}) | own
     own |= {"__slots__": names, "__match_args__": names}
     own["__dataclass_params__"] = _Standard.__dataclass_params__  # type: ignore[attr-defined]
-    own["__dataclass_fields__"] = {
-        name: _field(name, kind, defaults.get(name, dataclasses.MISSING)) for name, kind in kinds.items()
-    }
+    own["__dataclass_fields__"] = _Fields(kinds, defaults)
     made = type(cls.__name__, (), own)
     code = _setting(len(names), "__post_init__" in own)
     code = code.replace(co_varnames=("self", *names), co_qualname=f"{cls.__qualname__}.__init__")

@@ -14,8 +14,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from sysdyn import __version__
 from sysdyn.cli.run import lock
-from sysdyn.cli.run.running import Request, version
+from sysdyn.cli.run.running import Request
 from sysdyn.cli.trade.traded import Combination, Measured, Reference, Runs
 from sysdyn.compiler.program import cache
 from sysdyn.dsl.text.diagnostics import SourceText
@@ -78,5 +79,5 @@ def journal(request: Request, source: SourceText, items: tuple[syntax.TopLevel, 
     if request.file == "-":
         return None
     asked = asdict(replace(request, file=Path(request.file).name, output=None, timings=True, no_lock=True))
-    said = {"version": version(), "asked": asked, "files": lock.hashes(source, items)}
+    said = {"version": __version__, "asked": asked, "files": lock.hashes(source, items)}
     return Journal(hashlib.sha256(json.dumps(said, sort_keys=True, default=str).encode()).hexdigest()[:32])

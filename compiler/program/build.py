@@ -1,7 +1,8 @@
 """C text -> shared library, kept by its content (cache.py).
 
-The key is the sha256 of text, flags and compiler version: a rebuilt library at an old path would give the old code
-(dlopen), and processes that build the same text at once must not meet half a file: each builds in a folder of its own.
+The key is the sha256 of text, flags and the compiler file (asking it for its version takes 5 ms): a rebuilt library at
+an old path would give the old code (dlopen), and processes that build the same text at once must not meet half a file:
+each builds in a folder of its own.
 Nothing of the user's text reaches a command line.
 """
 
@@ -11,9 +12,6 @@ import hashlib
 import os
 import shlex
 import shutil
-import subprocess
-import tempfile
-from functools import cache
 from itertools import takewhile
 from pathlib import Path
 
@@ -53,8 +51,10 @@ def compiler() -> tuple[tuple[str, ...], tuple[str, ...]]:
     raise NoCompilerError(f"there is no C compiler ({wanted or 'cc, gcc, clang'})")
 
 
-@cache
-def _version(command: tuple[str, ...], _changed: tuple[float, ...]) -> str:
+def _runs(command: tuple[str, ...]) -> None:
+    """Raises NoCompilerError where what is called a compiler is none."""
+    import subprocess
+
     name = " ".join(command)
     try:
         run = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=60, check=False)
@@ -62,22 +62,31 @@ def _version(command: tuple[str, ...], _changed: tuple[float, ...]) -> str:
         raise NoCompilerError(f"{name} cannot be run: {error}") from error
     if run.returncode:
         raise NoCompilerError(f"{name} --version fails with status {run.returncode}", run.stderr)
-    return run.stdout
+
+
+def _identity(path: str) -> str:
+    """Which compiler stands at a path: another version is another file."""
+    real = Path(path).resolve()
+    found = real.stat()
+    return f"{real} {found.st_size} {found.st_mtime_ns}"
 
 
 def build(text: str, flags: tuple[str, ...] = FLAGS) -> Path:
     """The shared library of a C text; BuildError where the compiler fails, OSError where the folder is not writable."""
     command, options = compiler()
-    version = _version(command, tuple(Path(path).stat().st_mtime for path in command))
-    said = (*command, version, *flags, *options, text)
+    said = (*map(_identity, command), *flags, *options, text)
     key = hashlib.sha256("\0".join(said).encode()).hexdigest()
     entry = cache_.path_of(key)
     if cache_.sound(entry, key):
         return entry
+    _runs(command)
     return _compile((*command, *flags, *options), text, entry.parent, key)
 
 
 def _compile(command: tuple[str, ...], text: str, folder: Path, key: str) -> Path:
+    import subprocess
+    import tempfile
+
     with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as place:
         source, output = Path(place) / "model.c", Path(place) / "model.so"
         source.write_text(text, encoding="ascii")

@@ -14,7 +14,6 @@ import hashlib
 import os
 import shutil
 import stat
-import tempfile
 import time
 from functools import cache
 from pathlib import Path
@@ -74,6 +73,8 @@ def _trusted(parent: os.stat_result) -> bool:
 
 @cache
 def _folder_of_process() -> Path:
+    import tempfile
+
     made = Path(tempfile.mkdtemp(prefix="sysdyn-"))
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     return made

@@ -108,7 +108,8 @@ class Connections(Statements):
         ]
         help_ = f"{wanted.name}: {', '.join(right[:5])}; " if right else f"a node of {wanted.name}; "
         help_ += "a transformer, gyrator or source couples domains"
-        subject = None if end.node is None else f"domain of {end.node.name}"
+        declared = None if end.node is None else end.node.place.start[0]
+        subject = None if end.node is None else f"{end.domain.name} for {wanted.name} at nodes of line {declared}"
         return self.resolver.fail("E401", message, span, help=help_, subject=subject)
 
     def _is_displacement_of(

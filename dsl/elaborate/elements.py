@@ -77,7 +77,9 @@ class Elements(Connections):
             help_ = f"{kind}({sides[0]} = ...)"
             raise self.resolver.fail("E303", f"'{kind}' takes one law, {len(args)} given", s.span, help=help_)
         if args[0].name is None:
-            raise self.resolver.fail("E404", "positional argument", args[0].span, help=f"{sides[0]} = ...")
+            text, side = self.source_text(args[0].span), "f" if kind in ("flow", "kinetic") else sides[0]
+            message = f"'{text}' is a positional argument: '{kind}' is given its law by name"
+            raise self.resolver.fail("E404", message, args[0].span, help=f"{side} = {text}")
         if args[0].name not in sides:
             raise self.resolver.fail(
                 "E405", f"'{kind}' has no law '{args[0].name}'", args[0].span, help=", ".join(sides)

@@ -213,7 +213,8 @@ class Instances(Elements):
                 continue
             if arg.name not in head.parameters:
                 near = nearest(arg.name, (*head.parameters, *head.inputs))
-                listed = f"nearest: '{near}'" if near else f"it has {', '.join(head.parameters) or 'none'}"
+                known = ", ".join((*head.parameters, *head.inputs))
+                listed = f"nearest: '{near}'" if near else f"it has {known or 'none'}"
                 raise self.resolver.fail(
                     "E405", f"'{component.name}' has no parameter '{arg.name}'", arg.span, help=listed
                 )
@@ -251,12 +252,7 @@ class Instances(Elements):
                     bound.add(name)
                 case _:
                     if len(head.branches) != 1:
-                        wants = ", ".join((*head.ports, *(b for b in head.branches if b))) or "no connection"
-                        said = [self.source_text(c.span) for c in s.connections]
-                        pairs = zip(wants.split(", "), said, strict=False)
-                        listed = ", ".join(f"{name} = {text}" for name, text in pairs)
-                        message = f"'{s.decl.name}: {component.name}' is connected by name: {wants}"
-                        raise self.resolver.fail("E402", message, connection.span, help=listed)
+                        raise self._by_name(s, component, head, connection)
                     self._bind_branch(s, component, head, space, next(iter(head.branches)), connection, bound)
         for name in (*head.ports, *head.branches):
             if name not in bound:
@@ -269,6 +265,21 @@ class Instances(Elements):
                     "E414", f"input '{name}' of '{s.decl.name}' is not bound", s.span, help=f"{name} = ..."
                 )
         return inputs
+
+    def _by_name(
+        self, s: syntax.Instance, component: ComponentSymbol, head: Head, connection: syntax.Connection
+    ) -> Failed:
+        """Report E402: nodes in a row where each belongs to a port of its own."""
+        ports = [*head.ports, *filter(None, head.branches)]
+        nodes = list[syntax.Expr]()
+        for c in s.connections:
+            nodes += [c.plus, c.minus] if isinstance(c, syntax.Across) else []
+            nodes += [c.node] if isinstance(c, syntax.Single) else []
+        left = [name for name in ports if all(getattr(c, "name", None) != name for c in s.connections)]
+        texts = [self.source_text(node.span) for node in nodes]
+        pairs = [f"{name} = {text}" for name, text in zip(left, texts, strict=False)]
+        message = f"'{s.decl.name}: {component.name}' is connected by name: {', '.join(ports) or 'no connection'}"
+        return self.resolver.fail("E402", message, connection.span, help=", ".join(pairs))
 
     def _bind(
         self,

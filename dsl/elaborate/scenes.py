@@ -16,6 +16,7 @@ from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.habits import blamed
 from sysdyn.dsl.names.members import Located
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
@@ -302,7 +303,9 @@ class SceneReader:
             raise Failed
         if value.dimension is not None and unit.dimension != value.dimension:
             message = f"'{format_expression(item.expr)}' is in {dim.show(value.dimension)}, not {unit.text}"
-            raise self.resolver.fail("E208", message, item.unit.span, help=f"in {common(value.dimension)}")
+            missing = self.resolver.missing(value.dimension, unit.dimension, item.expr)
+            help_ = missing if blamed(missing) else f"in {common(value.dimension)}"
+            raise self.resolver.fail("E208", message, item.unit.span, help=help_)
         return unit
 
     def _accuracy(self, s: syntax.Accuracy) -> None:

@@ -38,19 +38,20 @@ def read_table(
     if item.extrapolation == "extend":
         message = f"table '{name}' is extrapolated ('extend') beyond its data"
         report.warning("W302", message, place, help="clamp or stop")
-    problem = _line_problem(rows) if len(units) == 1 else _grid_problem(rows, len(units), item.interpolation)
-    if problem:
-        report.error("E206", f"table {name}: {problem}", place)
+    back = next((k for k, (a, b) in enumerate(pairwise(rows), 1) if a[0] >= b[0]), None) if len(units) == 1 else None
+    if back is not None:
+        where = place if item.rows is None else Place(source, item.rows[back].span)
+        number = f"row {back + 1}" if item.rows is None else "this row"
+        message = f"table {name}: {number} does not lie behind the one before it: arguments increase from row to row"
+        report.error("E206", message, where, help="the rows in the order of their arguments, each once")
+        return None
+    problem = _grid_problem(rows, len(units), item.interpolation) if len(units) > 1 else None
+    if problem or len(rows) < 2:
+        report.error("E206", f"table {name}: {problem or 'two rows at least'}", place, help="(0, 0), (1, 2)")
         return None
     axes = tuple(tuple(sorted({row[k] for row in rows})) for k in range(len(units)))
     values = tuple(row[-1] for row in sorted(rows))
     return Table(name, item.interpolation, item.extrapolation or "clamp", axes, values, place)
-
-
-def _line_problem(rows: list[Row]) -> str | None:
-    if len(rows) < 2 or any(a[0] >= b[0] for a, b in pairwise(rows)):
-        return "the arguments must increase from row to row, two rows at least"
-    return None
 
 
 def _grid_problem(rows: list[Row], arguments: int, interpolation: str) -> str | None:

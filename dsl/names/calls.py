@@ -170,7 +170,9 @@ class Calls(Context):
 
     def _arguments(self, name: str, heads: Sequence[tuple[str, Dimension]], e: syntax.Call) -> list[Node]:
         if len(heads) != len(e.args):
-            raise self.fail("E206", f"{name} takes {len(heads)} arguments, {len(e.args)} given", e.span)
+            wants = f"{len(heads)} argument{'s' * (len(heads) != 1)}"
+            shape = f"{name}({', '.join(head for head, _ in heads)})"
+            raise self.fail("E206", f"{name} takes {wants}, {len(e.args)} given", e.span, help=shape)
         nodes = []
         for (head, dimension), arg in zip(heads, e.args, strict=True):
             message = f"argument '{head}' of {name} is in {{}}, wants {dim.show(dimension)}"

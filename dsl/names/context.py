@@ -232,6 +232,7 @@ class Context:
 
     def fail(self, code: str, message: str, span: syntax.Span, **more: object) -> Failed:
         """Report an error; raise what is returned."""
+        more.setdefault("subject", habits.blamed(more.get("help")))
         self.report.error(code, message, self.place(span), **more)  # type: ignore[arg-type]
         return Failed()
 

@@ -14,6 +14,8 @@ def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
     inner = number.operand if isinstance(number, syntax.Negative) else number
     assert isinstance(inner, (syntax.Number, syntax.Quantity))
     text = f"{'-' if inner is not number else ''}{inner.text}"
+    if common(wanted) == "K":
+        return f"celsius({text}), or '{text} K' where kelvins are meant"
     return f"write '{text} {common(wanted)}'" if wanted else f"write '{text}', a number"
 
 

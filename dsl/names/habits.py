@@ -55,6 +55,16 @@ _FUNCTIONS = {
     "delay": "std.control.sample_hold holds a value between samples",
 }
 _DERIVATIVES = frozenset({"der", "diff", "ddt", "deriv", "derivative", "D", "dot_", "Der", "DER"})
+_PROBES = {"V": "e", "v": "e", "I": "f", "i": "f"}
+"""What SPICE reads of nodes and elements."""
+_VARIABLES = {
+    "electrical": dict.fromkeys(("v", "V", "u", "U", "voltage"), "e") | dict.fromkeys(("i", "I", "current"), "f"),
+    "translation": dict.fromkeys(("F", "force"), "e") | dict.fromkeys(("v", "velocity", "speed"), "f"),
+    "rotation": dict.fromkeys(("M", "tau", "torque"), "e") | dict.fromkeys(("w", "omega", "n", "speed"), "f"),
+    "hydraulic": dict.fromkeys(("P", "dp", "pressure"), "e") | dict.fromkeys(("Q", "flow"), "f"),
+    "heat": dict.fromkeys(("T", "temperature"), "e") | dict.fromkeys(("Q", "P", "heat"), "f"),
+    "thermal": dict.fromkeys(("T", "temperature"), "e") | dict.fromkeys(("S", "entropy"), "f"),
+}
 _ENDINGS = ("_dot", "dot", "_d", "_prime", "Dot")
 
 
@@ -94,8 +104,21 @@ def function(word: str, arguments: list[str]) -> Remedy | None:
     if word in ("pow", "power") and len(arguments) == 2:
         whole = "^".join(a if a.replace("_", "").replace(".", "").isalnum() else f"({a})" for a in arguments)
         return Remedy(whole, whole)
+    if word in _PROBES and all(a.replace("_", "").isalnum() for a in arguments) and 0 < len(arguments) < 3:
+        return Remedy(" - ".join(f"{a}.{_PROBES[word]}" for a in arguments))
     right = _FUNCTIONS.get(word)
     return None if right is None else Remedy(right)
+
+
+def variable(domain: str, word: str) -> str | None:
+    """The letter of the variable that a domain's own word or symbol means."""
+    return _VARIABLES.get(domain, {}).get(word)
+
+
+def blamed(said: object) -> str | None:
+    """The parameter that `unitless` says the same of, wherever it is read."""
+    name, found, _ = said.partition("' is a number without unit") if isinstance(said, str) else ("", "", "")
+    return f"unit of {name[1:]}" if found else None
 
 
 def unitless(name: str, value: str | None, factor: Dimension) -> str:

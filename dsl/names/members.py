@@ -15,6 +15,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Domain
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
+from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Failed, Part, Quadrature, SeveralError, Use, Value
 from sysdyn.dsl.names.names import Names
 from sysdyn.dsl.names.symbols import (
@@ -327,6 +328,10 @@ class Members(Names):
         """Members e f q p of a branch, and the power it absorbs."""
         family, domain = symbol.family, symbol.domain
         at = (*family.prefix, *at)
+        meant = habits.variable(domain.name, name)
+        if meant is not None and (name not in BRANCH or not self._is_store(symbol, name)):
+            shown = self._shown(e.base)
+            raise self.fail("E102", f"'{shown}' has no member '{name}'", e.span, help=f"write {shown}.{meant}")
         if name not in BRANCH:
             raise self.no_member(self._shown(e.base), e, BRANCH if nearest(name, BRANCH) else branch_words(domain))
         power = multiply(domain.effort.dimension, domain.flow.dimension)
@@ -339,6 +344,11 @@ class Members(Names):
         if name in MEMBERS:
             return self._state_function(symbol, at, name, power, e)
         return Typed(ex.var(family.name, f"b{name}", *at), branch_dimension(domain, name))
+
+    def _is_store(self, symbol: BranchSymbol, name: str) -> bool:
+        """Whether a branch has the state function `name`."""
+        law = self.laws.get(symbol.family.name)
+        return name in MEMBERS and law is not None and law.kind == MEMBERS[name].edge
 
     def _summed(self, symbol: BranchSymbol) -> bool:
         """Whether a branch has no momentum of its own: all but kinetic stores."""
@@ -446,6 +456,8 @@ class Members(Names):
         if e.name in space.elsewhere:
             message = f"'{self._shown(e.base)}' has no member '{e.name}'{level}"
             raise self.fail("E102", message, e.span, help=f"level {space.elsewhere[e.name]} has it")
+        if isinstance(branch, BranchSymbol) and habits.variable(branch.domain.name, e.name) is not None:
+            return self._changed(self.branch_quantity(branch, (), e.name, e), change)  # which says what is meant
         names = [n for n in space.scope.symbols if n]
         near = nearest(e.name, (*names, *BRANCH) if branch is not None else names)
         listed = (*branch_words(branch.domain), *names) if isinstance(branch, BranchSymbol) else names

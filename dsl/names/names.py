@@ -123,6 +123,9 @@ class Names(Context):
         remedy = habits.name(name, self.source.text, span.start, self._moves)
         if remedy is not None:
             return self.remedied(code, message.format(name), span, remedy)
+        if name in dim.FUNCTIONS:
+            said = {"celsius": "celsius(20)"}.get(name, f"{name}(...)")
+            return self.fail(code, message.format(name), span, help=f"a function: {said}")
         near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
         help_ = f"nearest name in scope: '{near}'" if near else f"declare it by param {name} = ..., let, coord or node"
         return self.fail(code, message.format(name), span, help=help_, subject=f"name {name}")
@@ -156,9 +159,8 @@ class Names(Context):
                 help_ = "write its member: multiplier, residual, on(...)"
                 raise self.fail("E104", f"constraint '{symbol.name}' is not a value", span, help=help_)
             case BranchSymbol() | TwoPortSymbol() | InstanceSymbol():
-                raise self.fail(
-                    "E104", f"element '{symbol.name}' is not a value", span, help=f"a member: {symbol.name}.f"
-                )
+                help_ = f"a member: {symbol.name}.e or {symbol.name}.f"
+                raise self.fail("E104", f"element '{symbol.name}' is not a value", span, help=help_)
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
                 remedy = habits.name(symbol.name, self.source.text, span.start, self._moves)
                 message = f"'{symbol.name}' is not a value"

@@ -30,25 +30,30 @@ _BODY = ("statement", "scene_statement", "action", "item", "role", "bundle_membe
 _BLOCKS_OF_STATEMENTS = ("for_", "when", "every", "level", "scene")
 
 
-def _rows() -> tuple[dict[str, int], ...]:
-    """For each state the action on each terminal: a state to shift to, or -1 - rule."""
-    sets = {str(number): line.split() for number, line in enumerate(LOOKAHEADS.splitlines())}
-    rows = []
-    for line in ROWS.splitlines():
-        row: dict[str, int] = {}
-        for entry in line.split():
+class _Rows(dict[int, dict[str, int]]):
+    """For each state the action on each terminal: a state to shift to, or -1 - rule.  Read when a text comes there."""
+
+    def __init__(self) -> None:
+        self._sets, self._lines = LOOKAHEADS.splitlines(), ROWS.splitlines()
+
+    def __missing__(self, state: int) -> dict[str, int]:
+        row = self[state] = {}
+        for entry in self._lines[state].split():
             action, _, number = entry.partition(":")
-            row.update(dict.fromkeys(sets[number], int(action)))
-        rows.append(row)
-    return tuple(rows)
+            row.update(dict.fromkeys(self._sets[int(number)].split(), int(action)))
+        return row
 
 
-def _gotos() -> tuple[dict[str, int], ...]:
+class _Gotos(dict[int, dict[str, int]]):
     """For each state the next state behind each left side."""
-    return tuple(
-        {left: int(state) for left, _, state in (entry.rpartition(":") for entry in line.split())}
-        for line in GOTOS.splitlines()
-    )
+
+    def __init__(self) -> None:
+        self._lines = GOTOS.splitlines()
+
+    def __missing__(self, state: int) -> dict[str, int]:
+        entries = (entry.rpartition(":") for entry in self._lines[state].split())
+        row = self[state] = {left: int(following) for left, _, following in entries}
+        return row
 
 
 def _build(name: str) -> Build:
@@ -74,8 +79,8 @@ def _actions() -> tuple[tuple[str, int, Build | None, bool, tuple[tuple[int, boo
     return tuple(actions)
 
 
-_TABLE_ROWS = _rows()
-_TABLE_GOTOS = _gotos()
+_TABLE_ROWS = _Rows()
+_TABLE_GOTOS = _Gotos()
 _TABLE_RULES = _actions()
 
 

@@ -180,6 +180,7 @@ def unknown(word: str, after: str, body: str) -> Complaint:
                 help_ = (
                     f"const NAME = ..., or move it {into}" if word == "param" and body == "item" else f"move it {into}"
                 )
+                help_ = "trace x in mm" if word == "output" and body == "scene_statement" else help_
                 return "E107", f"'{word}' belongs {place}, not {here}", help_
     if body == "action":
         return "E113", "an action assigns: name := expression", None
@@ -198,6 +199,9 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", f"no statement begins with '{word}'; a constraint has a label", f"phi name: {word} ... = ..."
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
     said = _OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
+    if after.startswith("(") and body == "statement" and not said and (not near or near[0] not in MODEL_WORDS):
+        label = f"{word[0].upper()}1: {word}(...) a -> b"
+        return "E113", f"no statement begins with '{word}'; an element has a label", label
     return "E113", f"no statement begins with '{word}'", said or (near[0] if near else None)
 
 
@@ -242,6 +246,8 @@ def expected(accepted: Collection[str], kind: str, text: str, before: str, word:
     shape = _SHAPES.get(word)
     if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
         shape = f"one name a statement: {_SHAPES.get(word, word + ' on = false')}"
+    if word == "trace" and text == "in":
+        shape = "the unit stands before the name: trace x in mm as pos"
     return "E113", said, _hint(kind, text, before, accepted) or shape
 
 
@@ -292,6 +298,8 @@ def _hint(kind: str, text: str, before: str, accepted: Collection[str]) -> str |
         return "bare numbers here: their units stand in the head of the table"
     if text in ("<", ">", "<=", ">=", "==", "!=") and "and" in accepted:
         return "comparisons do not chain: a < b and b < c"
+    if kind == "<name>" and "->" in accepted and before.isidentifier():
+        return f"{before} -> {text}"
     if before == "." and kind != "<name>":
         return "a number ends with a digit: 5.0"
     return None

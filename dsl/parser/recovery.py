@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 
-from sysdyn.dsl.parser import complaints, foreign
+from sysdyn.dsl.parser import complaints
 from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.parser.lexing import RESERVED, Bracket
@@ -97,6 +97,8 @@ class Recovery:
         unit = scanner.unit or (scanner.end, scanner.end)
         text = scanner.text
         word = complaints.quoted(text[scanner.start : scanner.end])
+        from sysdyn.dsl.parser import foreign
+
         help_, meant = foreign.glued(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
         self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token(), meant)
         return "<quantity>" if self.automaton.accepts("<quantity>") else "<number>"
@@ -146,6 +148,8 @@ class Recovery:
 
     def _complain(self, kind: str) -> None:
         """Report why the statement cannot be read."""
+        from sysdyn.dsl.parser import foreign
+
         automaton, scanner = self.automaton, self.scanner
         size, body = automaton.body()
         text = scanner.text[scanner.start : scanner.end]

@@ -53,6 +53,7 @@ BEND = 4.0
 LOOSE = 1e-5
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
+LARGEST = float(np.finfo(np.float64).max)
 
 
 FEW_STEPS, MANY_STEPS = 40, 150
@@ -138,7 +139,7 @@ Run = Callable[[float, float], Sampled]
 def apart(coarse: Sampled, fine: Sampled) -> Floats:
     """How far two runs' values are from each other [instants, quantities], within the time tolerance."""
     values, late = coarse.own
-    late = np.maximum(np.nan_to_num(late), np.nan_to_num(fine.late))
+    late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
     return np.asarray(np.fmax(np.abs(fine.values - values) - late, 0.0 * fine.values * values))
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.numerics.points import distinct
 
 MOST = 24
 """Instants at which runs are compared, at most twice that; of a long run this part of its steps, at most twice MANY."""
@@ -73,16 +74,16 @@ def known(instants: Floats, options: Options) -> Floats | None:
     if options.every is None:
         return None
     if instants.size >= FEW:
-        return np.unique([*instants[:: -(-instants.size // GRID)], instants[-1]])
+        return distinct(np.append(instants[:: -(-instants.size // GRID)], instants[-1]))
     span = options.t_end - options.t_start
-    return np.unique([*(options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0)), options.t_end])
+    return distinct(np.append(options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0), options.t_end))
 
 
 def common(stored: Floats, options: Options) -> Floats:
     """Instants of comparison [s] for a run that stored rows at these."""
-    found = np.unique(stored)
+    found = distinct(stored)
     stops = np.asarray([] if options.stops is None else options.stops, dtype=np.float64)
-    stops = np.unique(stops[np.isfinite(stops)])
+    stops = distinct(stops[np.isfinite(stops)])
     if stops.size:
         right = np.searchsorted(stops, found)
         near = np.minimum(
@@ -109,7 +110,7 @@ def beside(instants: Floats, one: Floats, two: Floats, span: float) -> NDArray[n
 
 def joined(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Ints]:
     """Instants with their kinds, those of comparison among them."""
-    every = np.unique(np.concatenate([instants, compared]))
+    every = distinct(np.concatenate([instants, compared]))
     found = np.zeros(every.size, dtype=np.int32)
     found[np.searchsorted(every, instants)] = kinds
     found[np.searchsorted(every, compared)] |= COMPARED

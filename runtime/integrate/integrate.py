@@ -470,7 +470,7 @@ class Integration:
             self.largest(),
             self.cpu,
             self.settler.core.contents.failures,
-            self.ledgers.balances(),
+            self.ledgers,
             self.happened(),
             self.run_.contents.beyond,
         )

@@ -12,6 +12,7 @@ from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.integrate.request import ON_UNDERLYING, STEP, TRACE
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
+from sysdyn.runtime.numerics.points import distinct
 from sysdyn.runtime.structure.structure import Structure
 from sysdyn.runtime.trace.trace import Parameter
 from sysdyn.values import dataclass
@@ -129,9 +130,9 @@ def instants(options: Options) -> tuple[Floats, Ints]:
             grid[-1] = t1
         wanted = np.concatenate([wanted, grid])
     # both ends are always there
-    wanted = np.unique(np.concatenate([wanted, [t0, t1]]))
+    wanted = distinct(np.concatenate([wanted, [t0, t1]]))
     if not options.sampled_at:
         return wanted, np.full(wanted.size, TRACE, dtype=np.int32)
     sampled = np.asarray(options.sampled_at, dtype=np.float64)
-    every = np.unique(np.concatenate([wanted, sampled]))
+    every = distinct(np.concatenate([wanted, sampled]))
     return every, (TRACE * np.isin(every, wanted) + STEP * np.isin(every, sampled)).astype(np.int32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Happened, Plan
-from sysdyn.runtime.integrate.ledgers import Balance
+from sysdyn.runtime.integrate.ledgers import Balance, Ledgers
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.values import dataclass
@@ -89,8 +89,8 @@ class Finished:
     """An integration that reached its end.
 
     magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
-    their expressions; cpu [s]; balances: of the ledgers; beyond: the largest unknown of a row within a step, in
-    magnitudes that it has at steps.
+    their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest unknown
+    of a row within a step, in magnitudes that it has at steps.
     """
 
     reached: float
@@ -99,6 +99,11 @@ class Finished:
     largest: Floats
     cpu: float
     unsettled: int
-    balances: tuple[Balance, ...] = ()
+    ledgers: Ledgers | None = None
     events: tuple[Happened, ...] = ()
     beyond: float = 0.0
+
+    @property
+    def balances(self) -> tuple[Balance, ...]:
+        """What came of each ledger."""
+        return () if self.ledgers is None else self.ledgers.balances()

@@ -215,6 +215,8 @@ class Runs:
         self._compare(rows, kind)
         assert self.writer is not None
         self.writer.append(traced)
+        if self.done is not None:
+            self.done[2].append(traced[:0])  # what it still has in memory comes to its file in time
         taken = rows[(kind & (TRACE | STEP)) > 0]
         if taken.size:
             kept = taken[self.watched(taken[:, 0], self._observed(taken))] if self.watched is not None else taken[:0]
@@ -270,8 +272,8 @@ class Runs:
         except BaseException:
             self._leave(integration, first)
             raise
-        self.writer.flush()
         if self.done is not None:
+            self.writer.flush()
             self.keeping.take(self.writer, self.done[2])
         self.done, self.finished = (finished, self.samples, self.writer), finished
         return finished

@@ -6,7 +6,6 @@ tenth of the tolerance that should do, is compared at the same instants, and its
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +23,8 @@ def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
     """`achieved` of these runs as a second one by another method leaves it: the larger of both estimates, not met where
     they are further apart than target [quantities] or the second run fails.
     """
+    import tempfile
+
     way: Way = replace(runs.way, method=OTHER[runs.method])
     law, wanted = LAWS[way.method], float(np.min(target, initial=1.0))
     tolerance = max(law.ratio * law.tolerance(wanted if wanted < 1.0 else 1e-4), law.finest)

@@ -181,7 +181,7 @@ class Resting:
         y = self._clean(own.x, problem)
         null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
         y = self._back(y, again, null)
-        state = ConsistentState(self.t, y, self.rates(y), (), own.residual, 0, ())
+        state = ConsistentState(self.t, y, self.rates(y), (), own.residual)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         largest = np.abs(null).max(axis=1, initial=0.0)
         free = tuple(self.system.name(int(k)) for k in np.flatnonzero(told & (largest > SAME)))

@@ -112,7 +112,7 @@ def pointer(array: NDArray[Any] | None) -> int | None:
 
 def reader(address: int, number: int) -> NDArray[np.float64]:
     """The core's doubles at an address as an array (a view)."""
-    return np.ctypeslib.as_array((c.c_double * number).from_address(address))
+    return np.frombuffer(memoryview((c.c_double * number).from_address(address))) if number else np.zeros(0)
 
 
 def _load() -> Any:

@@ -135,7 +135,8 @@ class Equations:
         """Unknowns of these kinds [unknowns]; read-only."""
         key = tuple(kinds)
         if key not in self._of_kinds:
-            self._of_kinds[key] = read_only(np.append(self._plain(key), np.isin(self._guesses, key)))
+            missed = np.array([kind in key for kind in self._guesses], dtype=bool)
+            self._of_kinds[key] = read_only(np.append(self._plain(key), missed))
         return self._of_kinds[key]
 
     def core(self, system: System, settled: System) -> lib.RowsOfStart:

@@ -28,6 +28,7 @@ from sysdyn.runtime.numerics.least_change import (
     least_residual,
     solve,
 )
+from sysdyn.runtime.numerics.points import distinct
 from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of, row_scale
 from sysdyn.values import dataclass
@@ -71,9 +72,8 @@ EXPLAINED = 0.1
 class ConsistentState:
     """y, yd [unknowns as written] at t; residual: largest scaled row.
 
-    moved: (name, guess, value, "asked for by ...") of written guesses that moved.  freedom: how many more
-    fixed values the state would take, guesses: names of the free unknowns among which.  strategy: the one of
-    STRATEGIES that found it (PERTURBED_STAGE); "" of a state that was not sought from guesses.
+    moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
+    found it (PERTURBED_STAGE); "" of a state that was not sought from guesses.
     """
 
     t: float
@@ -81,8 +81,6 @@ class ConsistentState:
     yd: Floats
     moved: tuple[tuple[str, float, float, str], ...]
     residual: float
-    freedom: int
-    guesses: tuple[str, ...]
     strategy: str = ""
 
     def for_form(self, system: System) -> tuple[Floats, Floats]:
@@ -393,7 +391,7 @@ def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
     """Labels of the constraint rows that an unknown stands in."""
     found: list[str] = []
     values = starter.jacobian(t, x)
-    hit = np.unique(starter.rows[(starter.columns == place) & (values != 0.0)])
+    hit = distinct(starter.rows[(starter.columns == place) & (values != 0.0)])
     for row in hit[~starter.unsaid[hit]]:
         label = starter.settled.row_label(int(row))
         base = label.kind.split("_")[0]
@@ -473,10 +471,15 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     return InconsistentStart(kind, float((scaled if kind == "stuck" else raw)[order[0]]), rows, candidates)
 
 
-def _freedom(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[int, tuple[str, ...]]:
-    """How many fixed values are missing, and the free unknowns that could take them (dense; else unknown: 0)."""
+def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...]]:
+    """How many more fixed values a state as found would take, and the names of the free unknowns among which (of small
+    models; else unknown: 0).
+    """
+    starter = Starter(system, remember=True)
+    x, t = np.concatenate([state.y, state.yd[starter.rates]]), state.t
     if x.size > 400:
         return 0, ()
+    free = np.append(~starter.given.fixed, np.ones(x.size - starter.n, dtype=bool))
     scale = starter.scale(t, x)
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(t, x) * scale[starter.columns])
@@ -524,9 +527,7 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     system.starter = starter if again else None
     starter.work.until = None  # a restart is limited by the clock of its run
     y, yd = starter.expand(best.x)
-    counted = Starter(system, remember=True) if starter.missed.size else starter
-    freedom, names = _freedom(counted, t0, best.x[: starter.first], free[: starter.first])
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     if best.x.size > LARGE:
         starter.forget()
-    return ConsistentState(t0, y, yd, moved, best.residual, freedom, names, strategy)
+    return ConsistentState(t0, y, yd, moved, best.residual, strategy)

@@ -16,6 +16,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import solve
+from sysdyn.runtime.numerics.points import normal
 from sysdyn.runtime.numerics.rank import TOLERANCE, least_squares
 from sysdyn.runtime.start.start import EXACT, ConsistentState
 from sysdyn.runtime.start.starter import Starter, weighted
@@ -101,7 +102,9 @@ def _reacting_places(system: System, idle: Ints) -> tuple[int, Longs, Ints, Ints
 
 def _of(system: System, kinds: tuple[str, ...], idle: Ints) -> tuple[Longs, Longs]:
     """Multipliers of those kinds but for the idle ones, and the places in the pattern of their reactions."""
-    multipliers = np.setdiff1d(np.flatnonzero(system.are(*kinds)), idle)
+    reacting = system.are(*kinds).copy()
+    reacting[idle] = False
+    multipliers = np.flatnonzero(reacting)
     pattern, mine = system.pattern, np.zeros(system.unknowns, dtype=bool)
     mine[multipliers] = True
     return multipliers, np.flatnonzero(mine[pattern.columns_of()] & system.of_groups("dynamics")[pattern.row])
@@ -223,9 +226,8 @@ def vanished(system: System, state: ConsistentState) -> Ints:
 
 
 def _directions(system: System, number: int) -> Floats:
-    """Seeded directions [number, 2 unknowns], always the same."""
-    shape = number, 2 * system.form.written
-    return system.once_if_small(("directions", number), lambda: np.random.default_rng(12).standard_normal(shape))
+    """Directions [number, 2 unknowns] without a pattern, always the same."""
+    return system.once_if_small(("directions", number), lambda: normal(number, 2 * system.form.written))
 
 
 def _reacting(system: System) -> tuple[Ints, Ints, int]:

@@ -1,7 +1,8 @@
 """Where the runs of one simulation keep their rows: in the trace's file, or in memory.
 
 In a file the first run streams into the trace itself; a finer run into a neighbour `.NAME.part` that takes its place
-when it is finished: whatever is killed, a readable trace stands at the path.
+when it is finished: whatever is killed, a readable trace stands at the path.  Of a finished run that a finer one
+follows at once, the last second waits in memory.
 """
 
 from __future__ import annotations
@@ -140,7 +141,7 @@ class Files:
 
     def writer(self, layout: Layout, first: bool) -> TraceWriter:
         """Of the next run; first: into the trace itself."""
-        return TraceWriter(self._target if first else self._part, layout)
+        return TraceWriter(self._target if first else self._part, layout, shown=first)
 
     def take(self, writer: Writer, before: Writer) -> None:
         """A finished run's file takes the trace's name; it keeps writing its last attributes to it."""

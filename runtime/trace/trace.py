@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import secrets
+import os
 import signal
 import threading
 import time
@@ -92,7 +92,8 @@ class TraceWriter:
     reader still has open: a copy of the visible one takes its place.
     """
 
-    def __init__(self, path: str | Path, layout: Layout) -> None:
+    def __init__(self, path: str | Path, layout: Layout, *, shown: bool = True) -> None:
+        """shown: the trace stands at its path at once, else with its first flush."""
         self.path, self._layout = Path(path), layout
         self._waiting: list[Floats] = []
         self._late: list[Floats] = []  # rows that the hidden store lacks
@@ -105,9 +106,10 @@ class TraceWriter:
             self.path = self.path.resolve()
             if self.path.exists() and not self.path.is_file():
                 raise OSError(f"{self.path} is no regular file")
-            self._token = secrets.token_hex(4)
-            self._visible = self._store("a")
-            self._publish(self._visible)
+            self._token = os.urandom(4).hex()
+            if shown:
+                self._visible = self._store("a")
+                self._publish(self._visible)
 
     def _store(self, which: str, like: Store | None = None) -> Store:
         return Store(self.path.with_name(f".{self.path.name}.{self._token}.{which}"), self._layout, like)
@@ -136,7 +138,7 @@ class TraceWriter:
     def flush(self) -> None:
         """All rows so far stand in the trace."""
         self._flushed = time.monotonic()
-        if self._waiting:
+        if self._waiting or self._visible is None:
             self._turn(None)
 
     def _turn(self, last: Mapping[str, Mapping[str, Any]] | None, events: Sequence[Happened] = ()) -> None:

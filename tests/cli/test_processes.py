@@ -67,10 +67,10 @@ def test_reader_that_goes_away(tmp_path):
 
 
 def imported(*arguments):
-    """Top-level modules that a command has imported."""
+    """Modules that a command has imported."""
     code = (
         "import sys; from sysdyn.cli.main import run; code = run(sys.argv[1:]);"
-        "print('\\n' + ' '.join(sorted({m.partition('.')[0] for m in sys.modules}))); sys.exit(code)"
+        "print('\\n' + ' '.join(sorted({m.partition('.')[0] for m in sys.modules} | {*sys.modules}))); sys.exit(code)"
     )
     ran = subprocess.run(
         [sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=120, check=True
@@ -101,6 +101,14 @@ def test_fmt_and_plot_import_what_they_need(tmp_path):
 @pytest.mark.parametrize("name", ["gallery/pendulum", "seed/rectifier_motor_crank", "benchmark/andrews"])
 def test_check_of_small_models_imports_no_algebra(name):
     assert not imported("check", str(ROOT / "models" / f"{name}.sd")) & {"scipy", "sympy", "matplotlib", "h5py"}
+
+
+def test_a_short_run_imports_nothing_for_a_handful_of_numbers(tmp_path):
+    model = str(ROOT / "models/book/dc_motor.sd")
+    run = "simulate", "-q", model, "-o", str(tmp_path / "x.h5")
+    imported(*run)  # compiles it
+    slow = {"numpy.ma", "numpy.random", "numpy.ctypeslib", "importlib.metadata", "scipy", "sympy"}
+    assert not imported(*run) & slow
 
 
 def test_check_of_200_unknowns_imports_no_algebra(tmp_path):

@@ -146,7 +146,7 @@ def test_accepted_points_stay_on_the_constraints(name):
     system, form = made(key, number)
     t, y, yd = point(system, form, VALUES[name], 0)
     span = 40.0 if key != "bead_rod" else 3.0  # the bead flies off like an exponential
-    start = ConsistentState(t, y, np.nan_to_num(yd), (), 0.0, 0, ())
+    start = ConsistentState(t, y, np.nan_to_num(yd), (), 0.0)
     request = Request(span, np.array([span]), every_step=False, index=1, rtol=1e-6, method="dopri")
     integration = Integration(system, start, request)
     integration.run(lambda rows: None)

@@ -206,6 +206,34 @@ scene drop of ball {
   trace h, s every 10 ms
 }
 """,
+    "road": """## A quarter car over a bump.
+table bump(x: m) -> mm linear clamp [
+  (0, 0), (1, 0), (1.2, 60), (1.8, 60), (2, 0)
+]
+
+model quarter_car {
+  param ms = 300 kg
+  param mu = 40 kg
+  param ks = 18 kN/m
+  param kt = 180 kN/m
+  param c = 1.2 kN.s/m
+  param v = 5 m/s
+  let road = bump(v*t)
+  coord zs, zu: translation
+  energy T* = 1/2*ms*zs'^2 + 1/2*mu*zu'^2
+  energy V = 1/2*ks*(zs - zu)^2 + 1/2*kt*(zu - road)^2
+  content D = 1/2*c*(zs' - zu')^2
+  init zs = 0 m
+  init zu = 0 m
+  init zs' = 0 m/s
+  init zu' = 0 m/s
+}
+
+scene drive of quarter_car {
+  time 0 s to 1 s
+  trace zs in mm, zu in mm, kt*(zu - road) in kN as tyre every 5 ms
+}
+""",
     "arm": """model arm {
   param m = 1 kg
   param l = 0.5 m
