@@ -43,11 +43,6 @@ COMMANDS = {
 }
 
 
-SELDOM = 20_000, 20, 50
-"""Objects made, and younger collections, between two collections of cycles: Python's own (700, 10, 10) takes a sixth
-of the CPU of a short command."""
-
-
 class Group(click.Group):
     """Knows its commands by name; imports `sysdyn.cli.commands.<name>_command` when it is called."""
 
@@ -93,22 +88,16 @@ def group() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-<<<<<<< HEAD
-    """Run the command line and exit with its code."""
-    keep()
-    sys.exit(run(arguments))
-=======
     """Run the command line and exit with its code.
 
     Most of what a command makes lives as long as it: cycles are looked for seldom, and not at its end.  The matrices of
     LAPACK are small: threads of its own cost a short command 40 ms, and change last digits.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    gc.set_threshold(*SELDOM)
+    keep()
     code = run(arguments)
     gc.freeze()
     sys.exit(code)
->>>>>>> wE
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
