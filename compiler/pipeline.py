@@ -39,7 +39,6 @@ from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.authors import shown, told
 from sysdyn.compiler.network.gathered import gathered
-from sysdyn.compiler.network.precedence import outermost
 from sysdyn.compiler.network.primal import Step, primal
 from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.compiler.network.reflection import reflect, relabelled

@@ -7,7 +7,6 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.starting import described
 from sysdyn.compiler.binding.certificate import certificate
-from sysdyn.runtime.model.description import element
 from sysdyn.runtime.start.start import freedom
 
 SHOWN = 60
