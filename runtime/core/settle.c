@@ -228,6 +228,8 @@ static double move_basic(sd_settle *settle, double *y, double *yd, double *state
 static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
     double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
+    /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
+    double bound = settle->system->scales > 0 ? FINE : CLOSE;
     int fresh = settle->ready != BASIS, failed = fresh && choose(settle, t, y, yd, 1);
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;
@@ -239,7 +241,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         state += pulled;
         double now = measure(settle, t, y, yd);
         failed = !isfinite(now) || state > still;
-        if (!failed && moved < SMALL && now > 0.5 * before && now <= (fresh ? CLOSE : FINE)) {
+        if (!failed && moved < SMALL && now > 0.5 * before && now <= (fresh ? bound : FINE)) {
             before = now; /* round-off is what is left */
             break;
         }
@@ -250,7 +252,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         before = now;
     }
     *best = before;
-    if (!failed && before <= fmax(CLOSE, settle->enough)) { /* near a law's flat place round-off leaves much */
+    if (!failed && before <= fmax(bound, settle->enough)) {
         settle->refused = 0;
         return 1;
     }
@@ -320,7 +322,7 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
             drag = moved;
             take(settle, y, yd, settle->x);
         }
-        if (!isfinite(now) || (m > 0 && now > 0.5 * before && now < (fresh ? CLOSE : FINE) && moved < SMALL))
+        if (!isfinite(now) || (now > 0.5 * before && now < (fresh && m > 0 ? CLOSE : FINE) && moved < SMALL))
             break;
         if (now > CONTRACTS * before && now > fmax(EXACT, settle->enough)) {
             failed = factorise(settle, t, y, yd);

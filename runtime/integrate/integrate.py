@@ -100,10 +100,11 @@ class Integration:
         contacts = request.events.contacts if request.events is not None else ()
         rated = bool(contacts) and "dynamics_rate" in system.description.blocks
         self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
-        # what leaves a flow open between contacts is shared by the least change; steep laws magnify what a basis leaves
-        if request.events is None and not system.form.scales:
+        # what leaves a flow open between contacts is shared by the least change
+        if request.events is None:
             sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
-            self.settler.by_basis(SLACK * request.tolerance if sums else 0.0)
+            # steep laws magnify what a basis leaves
+            self.settler.by_basis(SLACK * request.tolerance if sums and not system.form.scales else 0.0)
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         self._stepper()
         self._driver()
