@@ -16,7 +16,7 @@ from sysdyn.runtime.integrate.accuracy import LAWS, Achieved, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
 from sysdyn.runtime.integrate.runs import LONG, Runs, Samples, Way
 from sysdyn.runtime.integrate.second_opinion import confirmed
-from sysdyn.runtime.integrate.underlying import obstacle
+from sysdyn.runtime.integrate.underlying import rateless, underlying_form
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
@@ -165,14 +165,14 @@ def formed(
     """The system in the index form of the options, its index, warnings.  Raises NoSuchForm, ValueError."""
     form, index, warnings = choose_index(options.index, facts, options.method)
     system = written if form == "3" else written.another(form)
-    missing = obstacle(system, start) if form == "0" else ()
+    missing = underlying_form(system, start)[1] if form == "0" else ()
     if missing:
         still = sorted({name.rstrip("'") for name in missing if name.endswith("'")})[:3]
         remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""
         raise NoSuchForm(
             f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "
             "constraints and the gammas (coordinates without inertia; a balance without it would have to be "
-            "differentiated too, once where flows stand in it, twice where none does): "
+            "differentiated too): "
             f"{remedy}index 2 or 3 with bdf or radau"
         )
     return system, index, warnings
@@ -230,7 +230,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     if way.system.form.scales or written.left_out:
         return replace(way, reason="steep laws" if way.system.form.scales else "redundant constraints"), other
     system = written.another("0")
-    missing = obstacle(system, start)
+    missing = rateless(system, start)
     if missing:
         return replace(way, reason=f"no underlying equation: {missing[0]} has no rate"), other
     return Way("dopri", system, 1, "0", NOT_STIFF), way, other

@@ -10,7 +10,7 @@ from sysdyn.cli.run.starting import Started
 from sysdyn.compiler.binding.following import Following, following
 from sysdyn.compiler.binding.following import Group as Formulas
 from sysdyn.runtime.integrate.options import Options
-from sysdyn.runtime.integrate.underlying import Selection, Underlying
+from sysdyn.runtime.integrate.underlying import Accelerations, Selection, Underlying, underlying_form
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
@@ -57,6 +57,8 @@ def choose(prepared: Prepared, started: Started, index: str | None) -> Formed:
     options = Options(output="", t_start=t0, t_end=t0 + 1.0, index=wanted, redundancy=policy)
     written, state, facts = counted(started.system, started.state, started.facts, options)
     system, _, warnings = formed(written, state, facts, options)
+    if system.form.name == "0":
+        _refuse_massless(system, state)
     return Formed(prepared, written, system, state, facts, warnings)
 
 
@@ -109,6 +111,18 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
 def _slopes(system: System, state: ConsistentState, yd: Floats) -> Floats:
     """The slopes of all differential unknowns, those of momenta and their flows too."""
     return Underlying(system, np.ones(system.unknowns)).slopes(state.t, state.for_form(system)[0], yd)[1]
+
+
+def _refuse_massless(system: System, state: ConsistentState) -> None:
+    """NoSuchForm where flows without inertia are solved for: what is written out has every flow in its state."""
+    solved, _ = underlying_form(system, state)
+    flows = np.flatnonzero(Accelerations(solved).without_rate)
+    if flows.size:
+        names = ", ".join(system.name(int(k)) for k in flows[:3])
+        raise NoSuchForm(
+            f"{names} without inertia follow from balances and constraints, and the equation that is written out has "
+            "every flow in its state: index 1 or 2 (simulate takes index 0)"
+        )
 
 
 def _state(system: System, state: ConsistentState) -> State:

@@ -67,13 +67,15 @@ void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd)
         prepare(dopri);
     double x = (t - (dopri->t - dopri->h_used)) / dopri->h_used;
     for (int32_t i = 0; i < dopri->n; i++) {
-        double v = 0.0, d = 0.0;
+        double v = 0.0, d = 0.0, turn = 0.0; /* value, first and second derivative */
         for (int m = SD_DOPRI_DENSE - 1; m >= 0; m--) {
             v += dopri->f[m][i];
             if (m % 2 == 0) {
+                turn = turn * x + 2.0 * d;
                 d = d * x + v;
                 v *= x;
             } else {
+                turn = turn * (1.0 - x) - 2.0 * d;
                 d = d * (1.0 - x) - v;
                 v *= 1.0 - x;
             }
@@ -82,6 +84,6 @@ void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd)
         int32_t column = u->column[i];
         int integral = column >= 0 && !u->rate[column];
         y[i] = integral ? d : dopri->y[0][i] + v;
-        yd[i] = integral ? 0.0 : d;
+        yd[i] = integral ? turn / (dopri->h_used * dopri->h_used) : d;
     }
 }

@@ -41,7 +41,8 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
     sd_energy *energy = calloc(1, sizeof *energy);
     if (!energy)
         return NULL;
-    size_t m = (size_t)(extended > system->unknowns ? extended : system->unknowns) + 1;
+    size_t m = (size_t)(extended > system->unknowns ? extended : system->unknowns);
+    m = ((size_t)system->rows > m ? (size_t)system->rows : m) + 1;
     energy->memory = calloc((VECTORS + 4 * S) * m + 4 * (size_t)audited + 1, sizeof(double));
     if (!energy->memory) {
         free(energy);

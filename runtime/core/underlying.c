@@ -20,7 +20,8 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
     sd_underlying *u = calloc(1, sizeof *u);
     if (!u)
         return NULL;
-    size_t nnz = (size_t)system->entries + 1, n = (size_t)system->unknowns + 1;
+    size_t nnz = (size_t)system->entries + 1;
+    size_t n = (size_t)(system->rows > system->unknowns ? system->rows : system->unknowns) + 1;
     u->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * n, sizeof(double));
     if (!u->memory) {
         free(u);
@@ -90,14 +91,21 @@ static double correct(sd_underlying *u, double *y, double *yd)
     return sd_first_bad(u->solved, u->step) < 0 ? size : INFINITY;
 }
 
+/* q' = f: f may be among what is solved for */
+static int kinematics(const sd_underlying *u, const double *y, double *yd)
+{
+    for (int32_t i = 0; i < u->system->kinematics; i++)
+        yd[u->system->k_q[i]] = y[u->system->k_f[i]];
+    return SD_FINE;
+}
+
 int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
 {
     const sd_system *system = u->system;
     double before = 0.0;
     for (int32_t j = 0; u->direct && j < u->solved; j++)
         *(u->rate[j] ? &yd[u->unknown[j]] : &y[u->unknown[j]]) = 0.0;
-    for (int32_t i = 0; i < system->kinematics; i++)
-        yd[system->k_q[i]] = y[system->k_f[i]];
+    kinematics(u, y, yd);
     u->ready = 0;
     for (int m = 0; m < ITERATIONS; m++) {
         sd_residual(u->direct ? u->applied : u->system, t, y, yd, u->r);
@@ -115,10 +123,10 @@ int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
         if (!isfinite(size))
             return SD_NONFINITE;
         if (u->direct || size <= DBL_EPSILON)
-            return SD_FINE;
+            return kinematics(u, y, yd);
         double ratio = m > 0 ? size / before : 1.0;
         if (m > 0 && ratio < 1.0 && size * ratio <= u->tolerance * (1.0 - ratio))
-            return SD_FINE;
+            return kinematics(u, y, yd);
         if (m > 0 && ratio > SLOW)
             u->ready = 0;
         before = size;

@@ -8,6 +8,8 @@ empty): where coordinates without inertia are determined by constraints, and imp
 from __future__ import annotations
 
 import ctypes as c
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.structure.levels import undifferentiated
 from sysdyn.values import dataclass
 
 SMALL = 32
@@ -54,12 +57,14 @@ class Selection:
 
 
 def _solved_for(system: System) -> tuple[Ints, Ints, Ints]:
-    """Unknown [solved], column [unknowns], rate [solved] of a Selection."""
+    """Unknown [solved], column [unknowns], rate [solved] of a Selection; flows without a rate are solved for."""
     unknown = np.flatnonzero(~system.are("q")).astype(np.int32)
     column = np.full(system.unknowns, -1, dtype=np.int32)
     column[unknown] = np.arange(unknown.size)
-    rate = np.where(system.are("f", "p"), 2, np.where(system.are("s"), 1, 0)).astype(np.int32)[unknown]
-    return unknown, column, rate
+    rate = np.where(system.are("f", "p"), 2, np.where(system.are("s"), 1, 0)).astype(np.int32)
+    read = system.structural()[1] & (system.pattern.row < system.form.k_row.size + unknown.size)
+    rate[system.are("f") & ~system.differential(read.astype(float))] = 0
+    return unknown, column, rate[unknown]
 
 
 class _Parts:
@@ -86,9 +91,9 @@ class _Parts:
         self.position = self._rows(system, "phi")
         self.velocity = self._rows(system, "phi_rate", "psi", "momentum")
         self.displaced = np.zeros(system.rows, dtype=np.int32)
-        for planned in system.form.calls:
-            for k in system.description.rows_of("phi") if planned.block == "phi_acceleration" else ():
-                self.displaced[planned.to[k] : planned.to[k] + system.description.rows[k].size] = 1
+        for group, k, first in system.form.groups:
+            if group == "phi_acceleration":
+                self.displaced[first : first + system.description.rows[k].size] = 1
 
     def _rows(self, system: System, *blocks: str) -> lib.System | None:
         """Rows of constraints in the places of their derivatives; None where the model has none."""
@@ -98,6 +103,9 @@ class _Parts:
             for block in blocks
             if block in system.description.blocks and _DERIVED[block] in planned
         ]
+        if blocks == ("phi",):  # displacements meet constraints whose flows are solved for too
+            home = {k: first for group, k, first in system.form.groups if group == "phi_acceleration"}
+            found = [(block, replace(place, to=_at_home(place.to, home))) for block, place in found]
         if not found:
             return None
         calls = (lib.Call * len(found))()
@@ -111,6 +119,11 @@ class _Parts:
             call=c.addressof(calls),
             stop=system.core.stop,
         )
+
+
+def _at_home(to: Ints, home: Mapping[int, int]) -> Ints:
+    """A table of places with those of these families."""
+    return np.array([home.get(k, int(first)) for k, first in enumerate(to)], dtype=np.int32)
 
 
 class Accelerations:
@@ -129,7 +142,8 @@ class Accelerations:
         pattern, first = system.pattern, system.form.k_row.size
         columns = pattern.columns_of()
         in_y, in_rate = system.structural()
-        in_matrix = (pattern.row >= first) & (self._column[columns] >= 0)
+        counted = (pattern.row >= first) & (pattern.row < first + self._unknown.size)
+        in_matrix = counted & (self._column[columns] >= 0)
         of_rate = (self._rate > 0)[self._column[columns]]
         take = in_matrix & np.where(of_rate, in_rate, in_y)
         source, from_rate = np.flatnonzero(take).astype(np.int32), of_rate[take].astype(np.int32)
@@ -137,6 +151,13 @@ class Accelerations:
         start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
         rows = (pattern.row[take] - first).astype(np.int32)
         return in_matrix, source, from_rate, Pattern(number, number, start, rows)
+
+    @property
+    def without_rate(self) -> NDArray[np.bool_]:
+        """Flows that are solved for themselves [unknowns]."""
+        found = np.zeros(self.system.unknowns, dtype=bool)
+        found[self._unknown] = self._rate == 0
+        return found & self.system.are("f")
 
     def _algebraic(self) -> NDArray[np.bool_]:
         """Entries of the matrix whose unknown is no rate [entries]."""
@@ -176,7 +197,7 @@ class Accelerations:
 
 
 class Underlying(Accelerations):
-    """system: form "0"; magnitude [unknowns], kept and read by the core."""
+    """system: of `underlying_form`; magnitude [unknowns], kept and read by the core."""
 
     def __init__(self, system: System, magnitude: Floats) -> None:
         super().__init__(system)
@@ -252,6 +273,28 @@ class Underlying(Accelerations):
             lib.core.sd_underlying_free(self.core)
         if getattr(self, "linear", None):
             lib.core.sd_linear_free(self.linear)
+
+
+def underlying_form(system: System, state: ConsistentState) -> tuple[System, tuple[str, ...]]:
+    """What is solved for the slopes, and what it leaves undetermined at a state; system: form "0".
+
+    That system itself; where coordinates without inertia are in the way, one in which constraints stand as they are.
+    """
+    missing = obstacle(system, state)
+    kept = system.once("undifferentiated", lambda: undifferentiated(system)) if missing else None
+    if kept:
+        other = system.another("0/" + ",".join(map(str, kept)))
+        if not obstacle(other, state):
+            return other, ()
+    return system, missing
+
+
+def rateless(system: System, state: ConsistentState) -> tuple[str, ...]:
+    """What of form 0 has no rate at a state: flows solved for at each stage cost the explicit method its lead."""
+    massless = Accelerations(system).without_rate
+    if massless.any():
+        return tuple(system.name(int(k)) for k in np.flatnonzero(massless))
+    return obstacle(system, state)
 
 
 def obstacle(system: System, state: ConsistentState) -> tuple[str, ...]:

@@ -10,6 +10,8 @@ are nearly linear: an unknown of a steep law counts as it is.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
@@ -59,3 +61,15 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
     return Roles(test.astype(np.int32), power, state, differential, unique(system, jyd), idle)
+
+
+def without_rate(found: Roles, flows: NDArray[np.bool_]) -> Roles:
+    """The roles where these flows are solved for at each point: they carry nothing and are not tested."""
+    return replace(
+        found,
+        test=np.where(flows, -1, found.test).astype(np.int32),
+        state=found.state & ~flows,
+        differential=found.differential & ~flows,
+        smooth=found.smooth & ~flows,
+        idle=found.idle | flows,
+    )

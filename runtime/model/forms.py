@@ -8,6 +8,7 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
   2v    phi_rate in the place of phi
   1     phi_acceleration in the place of phi, psi_rate of psi
   0     as 1, momentum_rate in the place of momentum: linear in the slopes, what the underlying equation is made of
+  0/3,5 the same with the constraints of the row families 3 and 5 not differentiated (structure/levels.py)
   constraints   what holds between displacements, flows and momenta alone (no rows q' - f)
   settled   all rows that hold at a consistent point: as written and hidden (no rows q' - f)
   rated     the same and dynamics_rate: what has no inertia follows from the rate of its balance
@@ -71,6 +72,8 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
 FORMS["rated"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"))
 FORMS["start"] = (*FORMS["rated"], ("initial", "initial"))
 """form -> (block, group of rows it is added to); blocks a model lacks are skipped."""
+UNDERIVED = {"phi_acceleration": "phi_rate", "psi_rate": "psi"}
+"""Block of form 0 -> what stands in its place where it is not differentiated."""
 BARE = ("constraints", "settled", "rated", "start")
 """Forms without rows q' - f."""
 
@@ -106,6 +109,11 @@ class Form:
     k_f: Ints
     groups: tuple[tuple[str, int, int], ...]
     scales: tuple[Planned, ...]
+
+    @property
+    def base(self) -> str:
+        """The name without the constraints that are not differentiated."""
+        return self.name.partition("/")[0]
 
     def row_label(self, description: Description, row: int) -> RowLabel:
         """The author's label of a row."""
@@ -183,6 +191,28 @@ def _stabilised(rows: tuple[RowFamily, ...], home: str, first: dict[str, int]) -
     return np.array(places, dtype=np.int32)
 
 
+def _leveled(
+    calls: list[Planned], level: set[int], rows: tuple[RowFamily, ...], number: int
+) -> tuple[list[Planned], int]:
+    """The calls with constraints of these families as they are in the rows of their derivatives, and how many rows:
+    a block gives all its families, and those that are not wanted stand in rows behind the others, which nothing reads.
+    """
+    found: list[Planned] = []
+    for call in calls:
+        mine = [k for k in range(call.to.size) if call.to[k] >= 0]
+        if call.block not in UNDERIVED or not level & set(mine):
+            found.append(call)
+            continue
+        for block, kept in ((call.block, False), (UNDERIVED[call.block], True)):
+            to = call.to.copy()
+            for k in mine:
+                if (k in level) != kept:
+                    to[k] = number
+                    number += rows[k].size
+            found.append(Planned(block, call.at, to))
+    return found, number
+
+
 def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
     at, kind, extended = _layout(description)
@@ -200,7 +230,9 @@ def plan(description: Description, name: str) -> Form:
     scales: list[Planned] = []
     stabilised = name == "2" and "phi" in description.blocks
     normal = "phi_normal" if "phi_normal" in description.blocks else "phi_reaction"
-    for block, group in FORMS[name]:
+    base, _, kept = name.partition("/")
+    level = {int(k) for k in kept.split(",")} if kept else set[int]()
+    for block, group in FORMS[base]:
         if block not in description.blocks or (
             group in ("kinematics", "phi_rate") and name == "2" and not stabilised
         ):
@@ -222,6 +254,7 @@ def plan(description: Description, name: str) -> Form:
             calls.append(Planned(block, at, tables[group]))
             if block + SCALE in description.blocks:
                 scales.append(Planned(block + SCALE, at, tables[group]))
+    calls, number = _leveled(calls, level, description.rows, number)
     return Form(
         name=name,
         written=written,

@@ -36,7 +36,7 @@ def held_rows(description: Description, form: Form, left_out: LeftOut) -> tuple[
     for family, position in left_out:
         item = description.families[family]
         row = multiplier_row(description, family)
-        groups = _ROWS[form.name]
+        groups = _ROWS[form.base]
         for kind, at in ((item.kind, int(form.at[family])), ("nu", nu_place(description, form, family))):
             group = groups.get(kind) if kind != "nu" or item.kind == "kappa" else None
             if group is not None and at >= 0 and (group, row) in first:
@@ -88,7 +88,7 @@ def switch_rows(description: Description, form: Form) -> tuple[Longs, Longs, Lon
     for k, (family, position) in enumerate(description.switches.places):
         item = description.families[family]
         row = multiplier_row(description, family)
-        for group, kind in _HELD[form.name]:
+        for group, kind in _HELD[form.base]:
             place = nu_place(description, form, family) if kind == "nu" else int(form.at[family])
             if item.kind == ("kappa" if kind == "nu" else kind) and place >= 0 and (group, row) in first:
                 found.append((first[group, row] + position, place + position, k, int(rates.get(kind) == group)))

@@ -276,6 +276,11 @@ def lead_filter(form="lagrangian"):
     )
 
 
+def springs():
+    """A mass on two springs in series with nothing between them: the balance of y is one of positions."""
+    return small("x y", "f_x**2/2", "(q_x - q_y)**2/2 + q_y**2/2", initial={"q_x": (1, True), "f_x": (0, True)})
+
+
 def slider_crank(m1=1.0, m2=0.8, form="lagrangian"):
     """Seed system slider_crank: r = 1, l = 2, th = pi/4, om = 2."""
     a = np.sqrt(0.5)

@@ -148,8 +148,8 @@ def test_index_zero_takes_dopri_and_dopri_index_zero(tmp_path):
 
 
 def test_what_has_no_underlying_equation_is_refused(tmp_path):
-    with pytest.raises(NoSuchForm, match=r"coordinates without inertia.*: inertia on \w+"):
-        simulated(tmp_path, models.lead_filter(), index="0")
+    with pytest.raises(NoSuchForm, match="coordinates without inertia"):
+        simulated(tmp_path, models.springs(), index="0")
     with pytest.raises(NoSuchForm, match="index 2 was asked for"):
         simulated(tmp_path, models.pendulum(), method="dopri", index="2")
     # without inertia of its own, but determined by the constraint

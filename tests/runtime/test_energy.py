@@ -194,7 +194,7 @@ def test_counters_are_deterministic():
 
 def test_refusals(tmp_path):
     with pytest.raises(NoSuchForm, match="coordinates without inertia"):
-        simulated(tmp_path, models.lead_filter(), method="energy")
+        simulated(tmp_path, models.springs(), method="energy")
     with pytest.raises(NoSuchForm, match="method energy integrates the underlying equation"):
         simulated(tmp_path, models.pendulum(), method="energy", index="2")
     with pytest.raises(SolverFailure) as caught:

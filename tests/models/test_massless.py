@@ -1,0 +1,80 @@
+"""Coordinates without inertia on the underlying equation: resistors, capacitors and inductors at index 0."""
+
+import numpy as np
+import pytest
+from model_runs import FOUR, attempt, trace_of
+
+HEAD = """
+from std.electrical import resistor, capacitor, inductor
+model net {
+  node a, b: electrical
+"""
+SCENE = """
+}
+scene run of net { time 0 s to 3 s; accuracy 1e-9; trace C.e, L.f every 0.1 s }
+"""
+FILTER = "\n  ".join(
+    (
+        "  L: inductor(L = 1 H) a -> b",
+        "C: capacitor(C = 1 F) b -> ground",
+        "R: resistor(R = 2 ohm) b -> ground",
+        "S: resistor(R = 0.5 ohm) a -> ground",
+        "init C.e = 1 V",
+    )
+)
+
+
+@pytest.mark.parametrize("method", ["dopri", "energy"])
+@pytest.mark.parametrize("formulation", [*FOUR, "kane"])
+def test_a_loop_with_two_resistors(tmp_path, formulation, method):
+    """C u' = -u/R + f, L f' = -u - S f: f'' + f' + 5/4 f = 0 from f = 0, f' = -1; u = -f' - f/2."""
+    trace = trace_of(tmp_path, HEAD + FILTER + SCENE, scene="run", formulation=formulation, method=method)
+    assert trace.attributes["index"] == "0"
+    t = trace.time
+    f = -np.exp(-t / 2) * np.sin(t)
+    rate = -f / 2 - np.exp(-t / 2) * np.cos(t)
+    assert np.abs(trace["L.f"].values - f).max() < 2e-9
+    assert np.abs(trace["C.e"].values - (-rate - f / 2)).max() < 2e-9
+
+
+BRIDGE = "\n  ".join(
+    (
+        "  node c, d: electrical",
+        "C: capacitor(C = 0.5 F) a -> ground",
+        "R1: resistor(R = 1 ohm) a -> b",
+        "R2: resistor(R = 2 ohm) a -> c",
+        "R3: resistor(R = 3 ohm) b -> c",
+        "R4: resistor(R = 4 ohm) b -> ground",
+        "R5: resistor(R = 5 ohm) c -> d",
+        "L: inductor(L = 2 H) d -> ground",
+        "init C.e = 1 V",
+        "init L.f = 0.3 A",
+    )
+)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_bridge_of_resistors_between_two_stores(tmp_path, formulation):
+    """Its currents follow from Kirchhoff's laws alone; against the exponential of the state's matrix."""
+    trace = trace_of(tmp_path, HEAD + BRIDGE + SCENE, scene="run", formulation=formulation, method="dopri")
+    # efforts of b, c, d from those of a and the current f into d: conductances at b, c, d
+    left = np.array([[1 + 1 / 3 + 1 / 4, -1 / 3, 0], [-1 / 3, 1 / 2 + 1 / 3 + 1 / 5, -1 / 5], [0, -1 / 5, 1 / 5]])
+    right = np.array([[1, 0], [1 / 2, 0], [0, -1]])
+    efforts = np.linalg.solve(left, right)
+    drawn = np.array([1.5, 0]) - efforts[0] - efforts[1] / 2
+    matrix = np.stack([-drawn / 0.5, efforts[2] / 2.0])
+    rates, modes = np.linalg.eig(matrix)
+    part = np.linalg.solve(modes, [1.0, 0.3])
+    expected = np.real(modes @ (part[:, None] * np.exp(np.outer(rates, trace.time))))
+    assert np.abs(trace["C.e"].values - expected[0]).max() < 2e-9
+    assert np.abs(trace["L.f"].values - expected[1]).max() < 2e-9
+
+
+def test_what_would_need_rates_of_balances_says_so(tmp_path):
+    """Two capacitors on one node hold coordinates of their own in Lagrange's form: one effort, two balances of it."""
+    text = HEAD + FILTER + "\n  D: capacitor(C = 2 F) b -> ground" + SCENE
+    ran, report = attempt(tmp_path, text, scene="run", formulation="lagrangian", method="dopri")
+    assert ran is None
+    (found,) = [d for d in report if d.code == "E607"]
+    assert "a balance without it would have to be differentiated too): inertia on " in found.message
+    assert trace_of(tmp_path, text, scene="run", formulation="co_lagrangian", method="dopri").attributes["index"] == "0"
