@@ -346,6 +346,7 @@ SLIPS = [
     # a second first hour: a quarter car, an active filter, an oil cooler
     Slip("habits", "road", "bump(v*t)", "bump(v*t, 0 m)", "bump", "takes 1 argument,", r"bump\(x\)"),
     Slip("syntax", "road", "(1, 0), (1.2, 60)", "(1.2, 60), (1, 0)", "bump", "behind|increase", "order"),
+    Slip("syntax", "road", "(1.8, 60), (2, 0)", "(1.8, 60), (2)", "row", "one number", r"\(0, 0\)"),
     Slip("syntax", "road", "in kN as tyre", "as tyre in kN", "in", "expected", "unit stands before"),
     Slip("syntax", "road", "trace zs in mm", "output zs in mm", "output", "belongs", "trace"),
     Slip("habits", "filter", "Rb: resistor(R", "resistor(R", "resistor", "label", "R1: resistor"),
