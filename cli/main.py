@@ -15,6 +15,7 @@ from typing import Any
 import click
 from sysdyn import __version__
 from sysdyn.cli.streams import standing_streams
+from sysdyn.dsl.model.collecting import keep
 
 COMMANDS = {
     "check": "Check models: everything that needs no time integration.",
@@ -40,11 +41,6 @@ COMMANDS = {
     "trade": "Measure what accuracy costs, and name the cheapest setting.",
     "verify": "Compare the formulations and methods of a scene.",
 }
-
-
-SELDOM = 20_000, 20, 50
-"""Objects made, and younger collections, between two collections of cycles: Python's own (700, 10, 10) takes a sixth
-of the CPU of a short command."""
 
 
 class Group(click.Group):
@@ -98,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     LAPACK are small: threads of its own cost a short command 40 ms, and change last digits.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    gc.set_threshold(*SELDOM)
+    keep()
     code = run(arguments)
     gc.freeze()
     sys.exit(code)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,8 +37,10 @@ from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.network.along import along
-from sysdyn.compiler.network.precedence import outermost
+from sysdyn.compiler.network.authors import shown, told
+from sysdyn.compiler.network.gathered import gathered
 from sysdyn.compiler.network.primal import Step, primal
+from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.compiler.network.reflection import reflect, relabelled
 from sysdyn.compiler.network.stated import FOREIGN, as_elements
 from sysdyn.compiler.network.verify import verify_network
@@ -49,6 +51,7 @@ from sysdyn.compiler.program.emit_numpy import emit_numpy
 from sysdyn.compiler.program.program import Program
 from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import budget
+from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
@@ -75,7 +78,7 @@ class CompiledModel:
     """A model in one formulation: every stage's value, the generated text, and how long each stage took.
 
     family: nodes and branches of the formulation's family; network: the same in coordinates; energies: as said;
-    functions: as lowered, with T(p, q) in Hamilton's form.
+    functions: as lowered, with T(p, q) in Hamilton's form; written: the network before what is alike was gathered.
     """
 
     family: Network
@@ -89,9 +92,18 @@ class CompiledModel:
     notes: tuple[Diagnostic, ...]
     steps: tuple[Step, ...]
     timings: tuple[Timing, ...]
+    written: Network | None = None
 
     def bind(self, overrides: Overrides | None = None) -> Binding:
         """The numbers for one set of parameter values; never recompiles.  ModelError where they make no model."""
+        try:
+            return self._bound(overrides)
+        except ModelError:
+            if self.written is not None:  # at the author's places
+                _compiled(self.written, self.form.formulation, "numpy", integrating=True, traced=False).bind(overrides)
+            raise
+
+    def _bound(self, overrides: Overrides | None) -> Binding:
         binding = binding_.bind(self.network, self.energies, self.form, self.program, overrides)
         scene = self.network.scene
         at_times = frozenset(s.label for s in self.network.switches)
@@ -134,13 +146,20 @@ def compile_network(
     *,
     integrating: bool = True,
     traced: bool = False,
+    gather: bool = False,
 ) -> CompiledModel:
     """Lower a checked network; ModelError with everything the energies' rules found.
 
+    gather: what is written out by hand and alike as families (network/gathered.py).
     traced: where the text traces nothing, every coordinate and every dynamic variable is.
     """
-    with budget.drawn():
+    with at_rest(), budget.drawn():
         try:
+            families = gathered(network) if gather else network
+            if families is not network:
+                with suppress(ModelError):  # what is wrong is said of what the author wrote
+                    found = _compiled(families, formulation, backend, integrating=integrating, traced=traced)
+                    return _authored(found, network)
             return _compiled(network, formulation, backend, integrating=integrating, traced=traced)
         except budget.SpentError as spent:
             raise ModelError([spent.diagnostic(network.place)]) from spent
@@ -184,6 +203,14 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *found)
     return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
+
+
+def _authored(found: CompiledModel, written: Network) -> CompiledModel:
+    """What is said of gathered families in the words of the network as it was written."""
+    own = found.network.authors
+    notes = tuple(n for note in found.notes for n in told(note, own))
+    steps = tuple(Step(s.rule, shown(s.what, own), shown(s.became, own)) for s in found.steps)
+    return replace(found, notes=notes, steps=steps, written=written)
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from sysdyn.dsl.elaborate.scenes import SceneReader
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.network import Network, Parameter, Scene, nodes_read
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
@@ -108,7 +109,7 @@ def network(
     None where the report has errors, or N608: a network that lacks a part of the text is none, and where a statement
     could not be read only names and units are judged.  required: parameters and inputs must have values.
     """
-    with _deep(), budget.drawn():
+    with _deep(), at_rest(), budget.drawn():
         try:
             return _network(document, model, scene, report, settings, levels, required=required, outputs=outputs)
         except budget.SpentError as spent:

@@ -72,7 +72,9 @@ def compiled(
     prepared: Prepared | None = None
     if network is not None:
         network = replace(network, statics=(), expectations=(), goldens=())
-        prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend)
+        prepared = prepare(
+            network, inner, formulation=request.formulation, backend=request.backend, gather=False
+        )
     report.extend(inner if prepared else targets.unsupported(inner))
     return None if prepared is None else (target, replace(prepared, unasked=unasked))
 

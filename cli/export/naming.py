@@ -13,7 +13,9 @@ from sysdyn.cli.export.layout import Formed
 from sysdyn.cli.export.tables import Tables
 from sysdyn.compiler.binding.manifest import named, where
 from sysdyn.compiler.model.mirror import letter, spelled, word
-from sysdyn.runtime.model.description import BASE
+from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.runtime.model import description
+from sysdyn.runtime.model.description import BASE, Family, RowFamily
 from sysdyn.runtime.model.forms import nu_name
 
 
@@ -34,14 +36,23 @@ def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
         kind = letter(formulation, family.kind)
         name = spelled(formulation, family.name, family.kind)
         plain = {"kind": kind, "unit": form.families[k].unit, "differential": differential}
-        found.append({**named(name, family.shape), **plain, **(_at(place, family.size) if si else {})})
-        place += family.size
+        for own, size in _entries(name, family):
+            found.append({**own, **plain, **(_at(place, size) if si else {})})
+            place += size
     for k in system.description.families_of("kappa") if system.unknowns > system.form.written else ():
         family = families[k]
         plain = {"kind": "nu", "unit": _nu_unit(formed, k), "differential": False}
-        found.append({**named(nu_name(family.name), family.shape), **plain, **(_at(place, family.size) if si else {})})
-        place += family.size
+        for own, size in _entries(nu_name(family.name), family):
+            found.append({**own, **plain, **(_at(place, size) if si else {})})
+            place += size
     return found
+
+
+def _entries(name: str, family: Family) -> list[tuple[dict[str, Any], int]]:
+    """What says a family, and its size; one by one where the author wrote its elements so."""
+    if not family.elements:
+        return [(named(name, family.shape), family.size)]
+    return [({"name": family.named(k, name)}, 1) for k in range(family.size)]
 
 
 def _nu_unit(formed: Formed, kappa: int) -> str:
@@ -82,22 +93,25 @@ def rows(formed: Formed) -> list[dict[str, Any]]:
     if system.form.name == "0":
         for k, family in enumerate(families):
             if family.kind in ("q", "f", "p", "s"):
-                found.append({**_label(family.name, family.shape), "kind": "slope", **where(form.families[k].place)})
+                found += _labels(family.name, family, "slope", form.families[k].place)
         return found
     for k, family in enumerate(families):
         if family.kind == "q" and system.form.k_row.size:
-            found.append({**_label(family.name, family.shape), "kind": "kinematic", **where(form.families[k].place)})
+            found += _labels(family.name, family, "kinematic", form.families[k].place)
     for group, k, _ in system.form.groups:
         row = form.rows[k]
-        shape = system.description.rows[k].shape
         kind = word(formulation, group if group in BASE else row.kind)
-        found.append({**_label(row.label, shape), "kind": kind, **where(row.place)})
+        found += _labels(row.label, system.description.rows[k], kind, row.place)
     return found
 
 
-def _label(name: str, shape: tuple[tuple[int, int], ...]) -> dict[str, Any]:
-    said = named(name, shape)
-    return {"label": said.pop("name"), **said}
+def _labels(name: str, family: Family | RowFamily, kind: str, place: Place | None) -> list[dict[str, Any]]:
+    """Entries of the rows of a family: one, or one for each element that the author wrote."""
+    if not family.elements:
+        said = named(name, family.shape)
+        return [{"label": said.pop("name"), **said, "kind": kind, **where(place)}]
+    each = (description.named(name, family.shape, family.elements, k) for k in range(family.size))
+    return [{"label": label, "kind": kind, "file": file, "line": line} for label, file, line in each]
 
 
 def outputs(tables: Tables) -> list[dict[str, Any]]:

@@ -96,7 +96,9 @@ def _prepared(request: Request, network: Network, report: Report, stages: Stages
     """Compiled, with the compiler's own stages."""
     made: Stages = []
     with _timed("formulation, build and load", made):
-        prepared = prepare(network, report, formulation=request.formulation, backend=request.backend, traced=True)
+        prepared = prepare(
+            network, report, formulation=request.formulation, backend=request.backend, traced=True, gather=False
+        )
     if prepared is not None:
         own = [(t.stage, t.wall, t.cpu) for t in prepared.compiled.timings]
         stages += own

@@ -7,7 +7,6 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.starting import described
 from sysdyn.compiler.binding.certificate import certificate
-from sysdyn.runtime.model.description import element
 from sysdyn.runtime.start.start import freedom
 
 SHOWN = 60
@@ -72,7 +71,7 @@ def start(study: Study) -> str:
         for k in range(family.size):
             if family.kind != "audit" and position < state.y.size and len(rows) <= SHOWN:
                 rate = f"{state.yd[position]:.6g}" if np.isfinite(state.yd[position]) else "–"
-                rows.append([escape(element(family.name, family.shape, k)), f"{state.y[position]:.6g}", rate])
+                rows.append([escape(family.named(k)), f"{state.y[position]:.6g}", rate])
             position += 1
     more = '<p class="soft">…</p>' if len(rows) > SHOWN else ""
     values = table(("unknown", "value", "rate"), rows[:SHOWN], left=(0,)) + more

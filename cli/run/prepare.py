@@ -17,6 +17,7 @@ from sysdyn.compiler.formulations import choose
 from sysdyn.compiler.network.pruning import Removal, pruned
 from sysdyn.compiler.pipeline import CompiledModel, compile_network
 from sysdyn.compiler.program import build
+from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import ModelError, Place, Report
 from sysdyn.runtime.model import carrier
@@ -68,6 +69,7 @@ class Prepared:
         }
 
 
+@at_rest()
 def prepare(
     network: Network,
     report: Report,
@@ -76,10 +78,12 @@ def prepare(
     backend: str = "c",
     traced: bool = False,
     prune: bool = False,
+    gather: bool = True,
 ) -> Prepared | None:
     """Compile and bind a network; None where the report says why not.
 
     traced: a run is asked, which traces every coordinate where the text traces nothing.
+    gather: what is written out by hand and alike may be lowered as families: not where the equations are to be read.
     prune: leave out what the scene does not need; that the rest is well-formed is judged of the whole all the same.
     formulation None: the scene's, else auto.  A missing C compiler is reported as a note and NumPy takes over.
     """
@@ -96,7 +100,7 @@ def prepare(
     if found:
         return None
     try:
-        compiled, made, backend = _compiled(network, chosen, backend, report, traced)
+        compiled, made, backend = _compiled(network, chosen, backend, report, traced, gather)
         binding = compiled.bind()
     except ModelError as error:
         report.extend(error.diagnostics)
@@ -120,17 +124,17 @@ def _well_formed(network: Network, report: Report) -> bool:
 
 
 def _compiled(
-    network: Network, formulation: str, backend: str, report: Report, traced: bool
+    network: Network, formulation: str, backend: str, report: Report, traced: bool, gather: bool
 ) -> tuple[CompiledModel, Carrier, str]:
     if backend == "c":
-        compiled = compile_network(network, formulation, "c", traced=traced)
+        compiled = compile_network(network, formulation, "c", traced=traced, gather=gather)
         try:
             return compiled, carrier.load(compiled.library()), "c"
         except build.BuildError as error:  # none there, or one that cannot build (no headers, no room)
             first = error.output.strip().splitlines()[:1]
             said = ": ".join([str(error), *first])
             report.note("N609", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
-    compiled = compile_network(network, formulation, "numpy", traced=traced)
+    compiled = compile_network(network, formulation, "numpy", traced=traced, gather=gather)
     return compiled, carrier.load(module_of(compiled.text)), "numpy"
 
 

@@ -6,6 +6,7 @@ A scalar has one entry under its name.  A family has one entry for all its eleme
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding
@@ -13,6 +14,7 @@ from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.model.integers import Index, Reference
 from sysdyn.compiler.model.mirror import letter, spelled
 from sysdyn.compiler.model.parameters import Extents
+from sysdyn.compiler.network.authors import Authors, owner
 from sysdyn.compiler.program.program import Pattern, Program
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.units import Unit
@@ -26,8 +28,8 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
     return {
         "branches": [program.scalars.index(k.branch) for k in form.kinks if k.slide],
         "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches],
-        "families": [_family(f) for f in form.families],
-        "rows": [_row(r) for r in form.rows],
+        "families": [_family(f) | _elements(f.name, network.authors) for f in form.families],
+        "rows": [_row(r) | _elements(r.label, network.authors) for r in form.rows],
         "blocks": {name: {"kernels": [_kernel(k) for k in patterns]} for name, patterns in program.patterns},
     }
 
@@ -35,6 +37,12 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
 def _family(family: Unknowns) -> dict[str, Any]:
     plain = {"name": family.name, "kind": family.kind, "owner": family.owner, "unit": family.unit}
     return {**plain, "nominal": None, **where(family.place)}
+
+
+def _elements(name: str, authors: Authors) -> dict[str, Any]:
+    """[name, file, line] of each element of a gathered family, from index 0 on."""
+    family = owner(name, authors)
+    return {} if family is None else {"elements": [[n, p.file, p.start[0]] for n, p in authors[family]]}
 
 
 def _row(row: Equations) -> dict[str, Any]:
@@ -85,12 +93,12 @@ def manifest(
         "scene": scene,
         "formulation": form.formulation,
         "index": index,
-        "unknowns": _unknowns(form, program, binding),
-        "rows": _rows(form, binding),
+        "unknowns": _unknowns(form, program, binding, network.authors),
+        "rows": _rows(form, binding, network.authors),
         "parameters": [
             {"name": p.name, "unit": p.unit.text, "value": _plain(_in_unit(binding.values[p.name], p.unit))}
             for p in network.parameters
-            if p.name not in branches
+            if p.name not in branches and not p.name.startswith("#")
         ],
         "structure": structure(form, program, network),
     }
@@ -122,7 +130,16 @@ def _head(name: str) -> tuple[str, str, str]:
     return head, ".", tail
 
 
-def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[dict[str, Any]]:
+def _each(name: str, box: Extents, authors: Authors) -> list[dict[str, Any]]:
+    """The entry of a family, or those of the elements of a gathered one."""
+    family = owner(name, authors)
+    if family is None:
+        return [named(name, box)]
+    tail = re.sub(r"^\.\d+", "", name[len(family) :])
+    return [{"name": authors[family][k][0] + tail} for k in range(box[0][0], box[0][1] + 1)]
+
+
+def _unknowns(form: DescriptorForm, program: Program, binding: Binding, authors: Authors) -> list[dict[str, Any]]:
     moving = {
         column.family
         for name, patterns in program.patterns
@@ -134,22 +151,25 @@ def _unknowns(form: DescriptorForm, program: Program, binding: Binding) -> list[
         if family.kind != "audit":
             moves = family.kind == "q" or k in moving
             plain = {"kind": letter(form.formulation, family.kind), "unit": family.unit, "differential": moves}
-            found.append({**named(spelled(form.formulation, family.name, family.kind), binding.shapes[k]), **plain})
+            name = spelled(form.formulation, family.name, family.kind)
+            found += [{**own, **plain} for own in _each(name, binding.shapes[k], authors)]
     return found
 
 
-def _rows(form: DescriptorForm, binding: Binding) -> list[dict[str, Any]]:
+def _rows(form: DescriptorForm, binding: Binding, authors: Authors) -> list[dict[str, Any]]:
     """Rows of the form as written: q' = f first, then the equations in their order."""
     found = []
     for k, family in enumerate(form.families):
         if family.kind == "q":
-            found.append({**_label(family.name, binding.shapes[k]), "kind": "kinematic", **where(family.place)})
+            found += _labels(family.name, binding.shapes[k], "kinematic", family.place, authors)
     for k, row in enumerate(form.rows):
         if row.block in ("dynamics", "momentum", "phi", "psi", "gamma", "lambda"):
-            found.append({**_label(row.label, binding.row_shapes[k]), "kind": row.kind, **where(row.place)})
+            found += _labels(row.label, binding.row_shapes[k], row.kind, row.place, authors)
     return found
 
 
-def _label(name: str, box: Extents) -> dict[str, Any]:
-    said = named(name, box)
-    return {"label": said.pop("name"), **said}
+def _labels(name: str, box: Extents, kind: str, place: Place | None, authors: Authors) -> list[dict[str, Any]]:
+    """Entries of rows."""
+    family, said = owner(name, authors), _each(name, box, authors)
+    places = [place] if family is None else [p for _, p in authors[family][box[0][0] : box[0][1] + 1]]
+    return [{"label": own.pop("name"), **own, "kind": kind, **where(p)} for own, p in zip(said, places, strict=True)]

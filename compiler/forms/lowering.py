@@ -174,15 +174,15 @@ class _Lowering:
             if c.name in self.carriers:
                 declare(Equations("momentum", c.name, c.name, "momentum", c.units["p"], c.place))
         for kind in ("phi", "psi", "gamma"):
-            names = dict.fromkeys(row.name for row in self.model.of_kind(kind))
-            for name in names:
-                rows = [row for row in self.model.of_kind(kind) if row.name == name]
+            offset = {o.label for o in self.model.offsets} if kind == "phi" else set[str]()
+            for name, rows in _by_name(self.model.of_kind(kind)).items():
                 rate = all(self._has_rate(row) for row in rows)
                 unit = self.model.labels[name]
-                unit = f"{unit}.s" if kind == "phi" and any(o.label == name for o in self.model.offsets) else unit
+                unit = f"{unit}.s" if name in offset else unit
                 declare(Equations(kind, name, name, kind, unit, rows[0].place, rate))
+        said = _by_name(self.model.of_kind("lambda"))
         for s in self.model.states:
-            rows = [row for row in self.model.of_kind("lambda") if row.name == s.name]
+            rows = said.get(s.name, [])
             place = rows[0].place if rows else s.place
             declare(Equations("lambda", s.name, s.name, "lambda", f"{s.units['s']}/s", place))
 
@@ -287,3 +287,11 @@ class _Lowering:
         self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
         if row.kind == "phi":
             self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))
+
+
+def _by_name(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """Rows by their label, in their order."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row.name, []).append(row)
+    return found

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.network.influence import Link, Quantity
-from sysdyn.dsl.model.network import Branch, Network
+from sysdyn.dsl.model.network import Branch, Network, Shape
 
 STORES = frozenset(("kinetic", "potential", "dissipator"))
 
@@ -25,17 +25,17 @@ def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quan
         for q in link.joined:
             touched.setdefault(q, []).append(link)
     dead: list[frozenset[Quantity]] = []
+    shapes = {n.name: n.shape for n in network.nodes}
     for b in network.branches:
         if len(touched["b", b.name]) == 1 and ("b", b.name) not in read:
-            dead += [frozenset({("b", b.name), end}) for end in _ends(network, b, touched, read)][:1]
+            dead += [frozenset({("b", b.name), end}) for end in _ends(network, shapes, b, touched, read)][:1]
     return dead
 
 
 def _ends(
-    network: Network, b: Branch, touched: dict[Quantity, list[Link]], read: set[Quantity]
+    network: Network, shapes: dict[str, Shape], b: Branch, touched: dict[Quantity, list[Link]], read: set[Quantity]
 ) -> Iterator[Quantity]:
-    """End nodes of the branch that nothing else touches or reads."""
-    shapes = {n.name: n.shape for n in network.nodes}
+    """End nodes of the branch that nothing else touches or reads; shapes: of all nodes."""
     balanced = "flow" if b.domain.common == "effort" else "effort"
     allowed = STORES | {"effort", "flow"} - {balanced}
     names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]

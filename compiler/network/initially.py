@@ -8,22 +8,19 @@ from sysdyn.dsl.model.expression import Node, both, compare, conditional, const,
 from sysdyn.dsl.model.network import Initial
 
 
-def initially(initials: Sequence[Initial], at: tuple[Node, ...]) -> tuple[Node, bool] | None:
-    """The value, and whether every statement that may hold there is fixed; None where none can hold.
+def initially(initials: Sequence[Initial], at: tuple[Node, ...]) -> Node | None:
+    """The value; None where no statement can hold, zero where none does.
 
-    Statements are those of one family, their indices constants, loop variables, or these and an offset.  Zero where
-    none holds; a fixed one counts before a guess, a later one before an earlier one.
+    Statements are those of one family, of which no two are about one element (`precedence`); their indices are
+    constants, loop variables, or these and an offset.
     """
-    value: Node = const(0.0)
-    fixed: list[bool] = []
-    for initial in sorted(initials, key=lambda i: i.fixed):
+    value: Node | None = None
+    for initial in initials:
         found = _there(initial, at)
-        if found is None:
-            continue
-        tests, own = found
-        fixed.append(initial.fixed)
-        value = conditional(both(*tests), own, value) if tests else own
-    return (value, all(fixed)) if fixed else None
+        if found is not None:
+            tests, own = found
+            value = conditional(both(*tests), own, value or const(0.0)) if tests else own
+    return value
 
 
 def _there(initial: Initial, at: tuple[Node, ...]) -> tuple[list[Node], Node] | None:

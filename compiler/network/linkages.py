@@ -9,6 +9,7 @@ start chooses.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -31,8 +32,8 @@ def with_linkages(network: Network) -> Network:
     kinetic = [b for b in network.branches if b.kind == "kinetic" and b.domain.common == "effort"]
     stores = [b for b in kinetic if b.minus is not None]
     parameters: dict[str, Parameter] = {}
-    names = [b.name for b in network.branches]
-    looped = [b for b in _in_loops(stores, Sizes(network)) if names.count(b.name) == 1]
+    statements = Counter(b.name for b in network.branches)
+    looped = [b for b in _in_loops(stores, Sizes(network)) if statements[b.name] == 1]
     for branch in looped:
         begun = _momentum(branch, given.get(branch.name, ()))
         if begun is not None:
@@ -150,5 +151,4 @@ def _momentum(branch: Branch, initials: Sequence[Initial]) -> Node | None:
         here = dict(zip(branch.at, initial.target.args, strict=True))
         value = ex.substitute(ex.substitute(held, here), {mark: initial.value})
         found.append(replace(initial, value=value))
-    said = initially(found, branch.at)
-    return None if said is None else said[0]
+    return initially(found, branch.at)

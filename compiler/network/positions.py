@@ -259,7 +259,7 @@ class _Contents:
             for t in (b.plus, b.minus):
                 if t.node is not None and self._point(t) not in guess:
                     found = initially(self.said.get((t.node, "nq"), ()), t.at)
-                    guess[self._point(t)] = (ex.const(0.0), UNWRITTEN) if found is None else (found[0], 1.0)
+                    guess[self._point(t)] = (ex.const(0.0), UNWRITTEN) if found is None else (found, 1.0)
                     for known in itertools.islice(self._fixed(t, {}), 1):
                         forest.join(self._point(t), None, known.value)
             for initial in self.said.get((b.name, "bq"), ()):
@@ -287,8 +287,7 @@ class _Contents:
         """The initial position of a terminal over the branch's loops, as far as it is written."""
         if terminal is None or terminal.node is None:
             return None
-        found = initially(self.said.get((terminal.node, "nq"), ()), terminal.at)
-        return None if found is None else found[0]
+        return initially(self.said.get((terminal.node, "nq"), ()), terminal.at)
 
     def fixed(self) -> Iterator[Initial]:
         """Contents of the elements of loops between places whose positions are known."""

@@ -67,7 +67,7 @@ def pruned(network: Network) -> tuple[Network, tuple[Removal, ...]]:
         if gone:
             removals += _parts(network, found, kept, gone)
             network = _without(network, found, gone)
-        found = links(network)
+            found = links(network)
         dead = dead_branches(network, found, asked)
         if not dead:
             break

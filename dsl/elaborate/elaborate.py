@@ -6,6 +6,8 @@ it.  What a later issue builds is reported as N608 with its place, and the rest 
 
 from __future__ import annotations
 
+from itertools import groupby
+
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.instances import Instances
 from sysdyn.dsl.elaborate.parts import flatten
@@ -63,14 +65,16 @@ class Elaborator(Instances):
         for space, body in self.bodies:
             with self.entering(space):
                 self.each([s for s in body if isinstance(s[0], syntax.Law)], self.law)
-        for pending in self.pending:
-            with self.entering(pending.space):
-                try:
-                    pending.resolve()
-                except SeveralError as several:
-                    self.resolver.spread(several, pending.span)
-                except Failed:
-                    continue
+        for _, group in groupby(self.pending, key=lambda pending: id(pending.space)):
+            own = list(group)
+            with self.entering(own[0].space):
+                for pending in own:
+                    try:
+                        pending.resolve()
+                    except SeveralError as several:
+                        self.resolver.spread(several, pending.span)
+                    except Failed:
+                        continue
         for space, _ in self.bodies:
             with self.entering(space):
                 self.lawless(space)

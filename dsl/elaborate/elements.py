@@ -185,8 +185,9 @@ class Elements(Connections):
 
     def _hidden(self, value: syntax.Expr, own: dict[str, Typed], name: str) -> None:
         """W101: an element's own variable hides an outer name in its law."""
-        for node in walk(value):
-            if isinstance(node, syntax.Name) and node.name in own and self.scope.symbols.get(node.name) is not None:
+        hidden = {name for name in own if self.scope.symbols.get(name) is not None}
+        for node in walk(value) if hidden else ():
+            if isinstance(node, syntax.Name) and node.name in hidden:
                 what = {"e": "effort", "f": "flow", "q": "displacement", "p": "momentum"}[node.name[0]]
                 message = f"'{node.name}' in the law of '{name}' is the element's own {what}; it hides the outer name"
                 self.report.warning(

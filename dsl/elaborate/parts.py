@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -108,7 +108,7 @@ class Frame:
         """Carry out statements in their loops; what fails has been reported."""
         for statement, loops in statements:
             try:
-                with self.inside(loops):
+                with self.inside(loops) if loops else nullcontext():
                     self.in_parts(lambda s=statement: do(s), statement.span)  # type: ignore[misc]
             except Failed:  # what it would have declared is not reported again where it is used
                 for decl in declared(statement):

@@ -553,6 +553,8 @@ def derivative(root: Node, by: Node) -> Node:
     """Partial derivative of root by one node, all other unknowns held."""
     if by not in variables(root) and by.op in ("var", "time"):
         return const(0.0)
+    if root.op == "sum" and by in root.args and not any(a.args for a in root.args):
+        return const(root.data[1][root.args.index(by)])
     return differential(root, {by: const(1.0)})
 
 

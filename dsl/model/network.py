@@ -7,6 +7,8 @@ A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import field
 from typing import Any
 
 from sysdyn.dsl.model.expression import Node, is_const, topological
@@ -425,6 +427,7 @@ class Network:
     events: tuple[Event, ...] = ()
     switches: tuple[Switch, ...] = ()
     levels: tuple[LevelChoice, ...] = ()
+    authors: Mapping[str, tuple[tuple[str, Place], ...]] = field(default_factory=dict)  # elements of gathered families
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
 
 

@@ -93,6 +93,7 @@ class Context:
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
         self.constraints: dict[str, list[Constraint]] = {}
+        self._quantities: dict[tuple[int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number and unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}
         self._applied: dict[tuple[syntax.Function, tuple[Node, ...]], Node | None] = {}  # functions to arguments
         self._active: list[Definition] = []
@@ -272,7 +273,10 @@ class Context:
 
     def wanted(self, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
         """A scalar of one dimension; otherwise code with message (its {} is what was found)."""
-        value = self.scalar(expression)
+        return self.fitting(self.scalar(expression), expression, dimension, code, message)
+
+    def fitting(self, value: Typed, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
+        """The same of a value found before."""
         if value.dimension is not None and value.dimension != dimension:
             help_ = self.missing(value.dimension, dimension, expression)
             said = message if value.dimension else message.replace("in {}", "{}")

@@ -48,12 +48,13 @@ def law_of(
     """Classify `side = value`; wanted: the kind that the author named (None in a component's law)."""
     dimension = branch_dimension(branch.domain, side)
     message = f"law of '{branch.name}': {side} is in {dim.show(dimension)}, the law in {{}}"
-    found = context.scalar(value).dimension
+    read = context.scalar(value)
+    found = read.dimension
     other = [s for s in "efqp" if found and found == branch_dimension(branch.domain, s) and s != side]
     if other and found != dimension and wanted is None and context.bare(value) is None:
         said = message.format(dim.show(found))
         raise context.fail("E208", said, value.span, help=f"{other[0]} = ..., which is in {dim.show(found)}")
-    node = context.wanted(value, dimension, "E208", message)
+    node = context.fitting(read, value, dimension, "E208", message)
     own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
     others = sorted(set(own) - {side})
     if side in own or len(others) > 1:

@@ -51,6 +51,11 @@ class Names(Context):
 
     def _quantity(self, e: syntax.Quantity) -> Value:
         """A number with its unit, in SI."""
+        key = id(self.scope), e.text, e.unit.text
+        known_ = self._quantities.get(key)
+        if known_ is not None:
+            self._looks_like_division(e)
+            return known_[1]
         unit = read_unit(e.unit, self.scope, self.source, self.report)
         if unit is None:
             raise Failed
@@ -59,7 +64,10 @@ class Names(Context):
             raise self.fail("E201", "degC is no unit of a quantity: its zero is not 0 K", e.span, help=help_)
         self._looks_like_division(e)
         value = e.value if unit.scale == 1 else float(Fraction(e.text) * unit.scale)
-        return Typed(ex.const(value), unit.dimension)
+        found = Typed(ex.const(value), unit.dimension)
+        if "$" not in e.unit.text:
+            self._quantities[key] = self.scope, found
+        return found
 
     def _looks_like_division(self, e: syntax.Quantity) -> None:
         """W201: the last unit has the name and the dimension of a variable in sight."""

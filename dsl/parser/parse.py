@@ -6,8 +6,7 @@ block, and a `Broken` node stands where the statement was.
 
 from __future__ import annotations
 
-import gc
-
+from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
 from sysdyn.dsl.parser.recovery import Recovery
 from sysdyn.dsl.text.decoding import MAX_BYTES
@@ -28,13 +27,8 @@ def parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
     refused = _refused(source)
     if refused is not None:
         return File(source, (), (), Span(0, len(source.text))), (refused,)
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
+    with at_rest():
         return _parse(source)
-    finally:
-        if collecting:
-            gc.enable()
 
 
 def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:

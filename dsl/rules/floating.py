@@ -59,6 +59,7 @@ def _loose(model: Elaborator) -> list[tuple[str, ...]]:
 
     def root(name: str) -> str:
         while parent[name] != name:
+            parent[name] = parent[parent[name]]
             name = parent[name]
         return name
 

@@ -151,6 +151,8 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
     if len(own) != 1:
         return
     slope = ex.derivative(branch.law, own[0])
+    if slope.op == "const" and not slope.data < 0.0:
+        return
     if any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
         return
     bound = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}

@@ -29,6 +29,8 @@ def passivity(network: Network, known: Values, report: Report) -> None:
 
 
 def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
+    if law.op == "sum" and law.data[0] == 0.0 and len(law.args) == 1 and law.args[0].op == "var":
+        return  # R*f
     nodes = ex.topological([law])
     own = [n for n in nodes if n.op == "var"]
     if len(own) != 1 or own[0].data[0] != branch.name or any(n.op in ("time", "table") for n in nodes):

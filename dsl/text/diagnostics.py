@@ -97,6 +97,7 @@ class Report:
 
     def __init__(self, diagnostics: Iterable[Diagnostic] = ()) -> None:
         self._found: dict[Diagnostic, None] = dict.fromkeys(diagnostics)
+        self._sorted: tuple[int, tuple[Diagnostic, ...]] = 0, ()  # how many they were, and these
 
     def add(self, diagnostic: Diagnostic) -> None:
         """Add one diagnostic (an error gets the general remedy where it has none); an equal one changes nothing."""
@@ -112,6 +113,7 @@ class Report:
     def retold(self, tell: Callable[[Iterable[Diagnostic]], Iterable[Diagnostic]]) -> None:
         """Tell what was found in another way, in the same order."""
         self._found = dict.fromkeys(tell(self._found))
+        self._sorted = 0, ()
 
     def error(
         self,
@@ -142,10 +144,13 @@ class Report:
         """Everything found: by file (in the order of their first finding), errors before warnings before notes, by
         class (1 names and text, 2 units, ...: what others follow from comes first), then place.
         """
-        files: dict[str, int] = {}
-        for item in self._found:
-            files.setdefault("" if item.place is None else item.place.file, len(files))
-        return tuple(_told_once(sorted(self._found, key=lambda item: _order(item, files))))
+        if self._sorted[0] != len(self._found):
+            files: dict[str, int] = {}
+            for item in self._found:
+                files.setdefault("" if item.place is None else item.place.file, len(files))
+            found = tuple(_told_once(sorted(self._found, key=lambda item: _order(item, files))))
+            self._sorted = len(self._found), found
+        return self._sorted[1]
 
     @property
     def failed(self) -> bool:

@@ -13,5 +13,14 @@ def children(node: object) -> Iterator[object]:
         child = getattr(node, name)
         for part in child if isinstance(child, tuple) else (child,):
             for item in part if isinstance(part, tuple) else (part,):
-                if type(item).__module__.startswith(_SYNTAX):
+                if _is_syntax(type(item)):
                     yield item
+
+
+_KNOWN: dict[type, bool] = {}
+
+
+def _is_syntax(kind: type) -> bool:
+    if kind not in _KNOWN:
+        _KNOWN[kind] = kind.__module__.startswith(_SYNTAX)
+    return _KNOWN[kind]

@@ -388,7 +388,7 @@ def departures(system: System) -> list[tuple[str, str]]:
     if found is None:
         return []
     parts = ((found.stepped.sums.place, DEFINED), (found.stepped.sums.unread, UNREAD))
-    names = [family.name for family in system.description.families]
+    names = [f.name if not f.elements else f"{f.named(0)} .." for f in system.description.families]
     return [
         (f"{names[k]} ({number} of {system.description.families[k].size})", why)
         for places, why in parts

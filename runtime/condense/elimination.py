@@ -15,6 +15,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.condense.composition import ranges
 from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.forms import FORMS
 from sysdyn.runtime.model.system import System
@@ -26,6 +27,8 @@ Longs = NDArray[np.int64]
 HEALTHY = 1e-7
 """Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less."""
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
+LONGEST = 12
+"""Definitions one after the other: through more of them the rest would read everything (a chain of scalars)."""
 PREFERRED = ("kappa", "mu", "e", "f")
 """Kinds in the order in which they are defined by rows that could define more than one."""
 
@@ -124,6 +127,9 @@ class _Search:
         self.entry = np.argsort(self.rows, kind="stable")
         self.defined, self.free = np.zeros(system.unknowns, dtype=bool), np.ones(system.rows, dtype=bool)
         self.reads: dict[int, set[int]] = {}
+        self.readers: dict[int, set[int]] = {}
+        self.below: dict[int, int] = {}
+        self.above: dict[int, int] = {}
         self.read: set[int] = set()
         self.parts: list[tuple[int, Longs]] = []
         spans = [(first, first + system.description.rows[family].size) for _, family, first in system.form.groups]
@@ -154,14 +160,37 @@ class _Search:
         chosen = self._candidates(family, span)
         if not chosen.size:
             return
-        self.defined[self.columns[chosen]] = True
-        self.free[self.rows[chosen]] = False
         entries = self.entry[self.start[span[0]] : self.start[span[1]]]
         taken = entries[np.isin(self.rows[entries], self.rows[chosen])]
         others = set(self.of[taken].tolist()) - {family}
-        self.reads.setdefault(family, set()).update(others)
+        below = 1 + max((self.below[k] for k in others if k in self.reads), default=0)
+        if below + self.above.get(family, 0) > LONGEST:
+            return
+        self._deepened(family, others, below)
+        self.defined[self.columns[chosen]] = True
+        self.free[self.rows[chosen]] = False
         self.read |= others
         self.parts.append((family, chosen))
+
+    def _deepened(self, family: int, others: set[int], below: int) -> None:
+        """below[k]: definitions that k is made of one after the other, its own with them; above[k]: those that it is
+        part of.
+        """
+        self.reads.setdefault(family, set()).update(others)
+        for k in others:
+            self.readers.setdefault(k, set()).add(family)
+        work = [(family, below)]
+        while work:
+            k, depth = work.pop()
+            if depth > self.below.get(k, 0):
+                self.below[k] = depth
+                work += [(r, depth + 1) for r in self.readers.get(k, ())]
+        work = [(k, self.above.get(family, 0) + 1) for k in others]
+        while work:
+            k, depth = work.pop()
+            if depth > self.above.get(k, 0):
+                self.above[k] = depth
+                work += [(r, depth + 1) for r in self.reads.get(k, ())]
 
     def _depths(self) -> dict[int, int]:
         """How many definitions a family is defined through, one after the other."""
@@ -185,7 +214,7 @@ class _Search:
         pivot = pivot[np.lexsort((self.columns[pivot], depth))]
         row = self.rows[pivot]
         count = self.start[row + 1] - self.start[row]
-        entry = self.entry[np.repeat(self.start[row] - (np.cumsum(count) - count), count) + np.arange(count.sum())]
+        entry = self.entry[ranges(self.start[row], count)]
         entry = entry[~np.isin(entry, pivot)]
         start = np.concatenate([[0], np.cumsum(count - 1)])
         return Elimination(self.columns[pivot], row, pivot, start, entry, unread)

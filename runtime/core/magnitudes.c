@@ -1,23 +1,11 @@
 #include "magnitudes.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define SWEEPS 8
 #define SMALL 1e-3      /* of the largest coefficient of its row and kind: it proposes much, and is asked last */
 #define NOTHING 1e-280  /* less is no magnitude */
-
-/* the larger, or what is no number */
-static double larger(double a, double b)
-{
-    return a >= b || isnan(a) ? a : b;
-}
-
-static double smaller(double a, double b)
-{
-    return a <= b || isnan(a) ? a : b;
-}
 
 /* small [entries] := 1 where a coefficient is small beside the largest of its row and kind; line [rows]: room.  Entries of
  * a kind lie beside each other, for unknowns do. */
@@ -82,7 +70,7 @@ int sd_propagate(const sd_balance *m, const double *size, const double *excited,
         memcpy(line, excited, rows * sizeof *line);
         for (int32_t e = 0; e < m->entries; e++)
             if (size[e] > 0.0)
-                line[m->row[e]] = larger(line[m->row[e]], size[e] * found[m->column[e]]);
+                line[m->row[e]] = sd_larger(line[m->row[e]], size[e] * found[m->column[e]]);
         /* small coefficients are asked only where no other is left */
         int leads = 0;
         for (int32_t e = 0; e < m->entries && !leads; e++)
@@ -97,15 +85,15 @@ int sd_propagate(const sd_balance *m, const double *size, const double *excited,
             if (leads && small[e])
                 continue;
             double proposed = line[m->row[e]] / size[e];
-            best[c] = flags & SD_LARGEST ? larger(best[c], proposed) : smaller(best[c], proposed);
+            best[c] = flags & SD_LARGEST ? sd_larger(best[c], proposed) : sd_smaller(best[c], proposed);
         }
         if (flags & SD_CAPPED) {
             memset(known, 0, (size_t)m->kinds * sizeof *known);
             for (size_t k = 0; k < n; k++)
-                known[m->kind[k]] = larger(known[m->kind[k]], found[k]);
+                known[m->kind[k]] = sd_larger(known[m->kind[k]], found[k]);
             for (size_t k = 0; k < n; k++)
                 if (known[m->kind[k]] > 0.0)
-                    best[k] = smaller(best[k], known[m->kind[k]]);
+                    best[k] = sd_smaller(best[k], known[m->kind[k]]);
         }
         int changed = 0;
         open = 0;
@@ -141,9 +129,9 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const in
     int failed = sd_propagate(m, jacobian, residual, rated, flags, scale);
     /* unknowns of y are no less than a thousandth of their like */
     for (int32_t k = 0; k < first; k++)
-        most[member[k]] = larger(most[member[k]], scale[k]);
+        most[member[k]] = sd_larger(most[member[k]], scale[k]);
     for (int32_t k = 0; k < first; k++) {
-        scale[k] = larger(scale[k], SMALL * most[member[k]]);
+        scale[k] = sd_larger(scale[k], SMALL * most[member[k]]);
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     }
     failed |= sd_propagate(m, jacobian, residual, NULL, flags, scale);
@@ -190,7 +178,7 @@ int sd_row_sizes(sd_system *system, double t, int32_t points, int32_t extended, 
     for (int32_t k = 0; k < points; k++, size += sizes) {
         sd_jacobian(system, t, y + (size_t)k * (size_t)extended, yd, jy, jy + system->entries);
         for (int32_t e = 0; e < entries; e++)
-            size[of[e]] = larger(size[of[e]], fabs(jy[entry[e]]));
+            size[of[e]] = sd_larger(size[of[e]], fabs(jy[entry[e]]));
     }
     free(jy);
     return 0;

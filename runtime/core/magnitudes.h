@@ -7,7 +7,20 @@
 
 #include "assembly.h"
 
+#include <math.h>
 #include <stdint.h>
+
+/* the larger, or what is no number */
+static inline double sd_larger(double a, double b)
+{
+    return a >= b || isnan(a) ? a : b;
+}
+
+/* the smaller, or what is no number */
+static inline double sd_smaller(double a, double b)
+{
+    return a <= b || isnan(a) ? a : b;
+}
 
 /* Rows of a matrix by its entries; depends on the structure alone, shared by threads. */
 typedef struct sd_balance {

@@ -23,6 +23,9 @@
 #define WITHIN -0.183
 #define FINEST 5e-12       /* of the estimate: less is round-off */
 #define FEWER 3            /* failures of Newton's in a step from which on each takes stages away */
+#define LENGTHS 2          /* of a step that are tried before corrections are shortened, which is dearer */
+#define PRESSED 1e-3       /* of the longest step: one that must be shorter before a steep law, no length will do */
+#define REGAIN 1.2         /* growth of the growth that steep laws leave a step behind a failure of Newton's */
 #define SHORTENED 50       /* steps of three stages after one that needed shortened corrections */
 #define AWHILE 2           /* steps accepted before the number of stages changes again */
 #define CHANGED 1.2        /* what another one must be worth beside the present one */
@@ -249,6 +252,9 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->h = fmin(radau->fixed_h > 0.0 ? radau->fixed_h : h, radau->h_max);
     radau->h_used = radau->h_before = 0.0;
     radau->error_accepted = 0.0;
+    radau->growth = GROWTH;
+    radau->longest = 0.0;
+    radau->pressed = 0;
     radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
     leave_below(radau, radau->linear->idle ? LEAST_PIVOT : 0.0);
     radau->theta = 1.0;
@@ -706,6 +712,10 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     double next = h / ratio;
     if (radau->rejected)
         next = fmin(next, h);
+    radau->longest = fmax(radau->longest, h);
+    radau->growth = troubled ? 1.0 : radau->growth * REGAIN;
+    if (radau->system->scales > 0 && !radau->pressed) /* where they bend, the estimate says nothing of Newton's reach */
+        next = fmin(next, fmin(radau->growth, GROWTH) * h);
     radau->since++;
     if (!(radau->fixed_h > 0.0))
         next = choose(radau, next, error, iterations, troubled);
@@ -791,8 +801,9 @@ int sd_radau_step(sd_radau *radau)
             radau->theta = 0.0; /* one iteration: the Jacobian is good enough */
             cause = iterate(radau, failures > 1 || leap == 1, &iterations, &retry);
         }
+        radau->pressed |= radau->h < PRESSED * radau->longest && radau->h < 0.5 * left;
         int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
-        if (stuck && leap != 1 && radau->system->scales > 0) {
+        if (stuck && leap != 1 && (failures >= LENGTHS || radau->pressed) && radau->system->scales > 0) {
             if (radau->method != sd_radau_methods) /* shortened corrections of more stages are dear */
                 radau->since = 0;
             radau->method = sd_radau_methods;

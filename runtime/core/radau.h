@@ -62,6 +62,9 @@ typedef struct sd_radau {
     double tolerance;         /* 0.1 rtol^(2/3) */
     double strict[SD_METHODS]; /* what the estimate of each method counts beside the first one's */
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
+    double growth;            /* of the next step at most where laws are steep */
+    double longest;           /* step accepted */
+    int32_t pressed;          /* a steep law lets no length of step do: corrections are shortened at once */
     int32_t ready, old_jacobian, rejected;
     const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */
     int32_t since;                                  /* steps accepted since the method changed */

@@ -17,31 +17,12 @@
 #define QUIET 1e-9      /* efforts below this part of (largest energy) / q are round-off, and flows of their like */
 #define TINY (DBL_MIN * 1e30) /* less is no magnitude */
 
-/* the larger, or what is no number */
-static double larger(double a, double b)
-{
-    return a >= b || isnan(a) ? a : b;
-}
-
-static double smaller(double a, double b)
-{
-    return a <= b || isnan(a) ? a : b;
-}
-
-static int finite_all(int32_t n, const double *x)
-{
-    for (int32_t k = 0; k < n; k++)
-        if (!isfinite(x[k]))
-            return 0;
-    return 1;
-}
-
 /* most [kinds] := the largest of each kind and unit */
 static void group_largest(const sd_balance *b, const double *x, double *most)
 {
     memset(most, 0, (size_t)b->kinds * sizeof *most);
     for (int32_t k = 0; k < b->unknowns; k++)
-        most[b->kind[k]] = larger(most[b->kind[k]], x[k]);
+        most[b->kind[k]] = sd_larger(most[b->kind[k]], x[k]);
 }
 
 int sd_relaxed(const sd_system *system, const int32_t *order, int32_t rungs, const double *rung, const double *jy,
@@ -52,7 +33,7 @@ int sd_relaxed(const sd_system *system, const int32_t *order, int32_t rungs, con
         far[k] = tau * fabs(yd[k]);
         still &= yd[k] == 0.0;
     }
-    if (still || !finite_all(entries, jy) || !finite_all(entries, jyd))
+    if (still || sd_first_bad(entries, jy) >= 0 || sd_first_bad(entries, jyd) >= 0)
         return 0;
     double *memory = calloc(2 * (size_t)rows + (size_t)n + (size_t)entries + 1, sizeof(double));
     sd_linear *linear = sd_linear_new(n, system->column, system->row, order);
@@ -79,7 +60,7 @@ int sd_relaxed(const sd_system *system, const int32_t *order, int32_t rungs, con
         }
     }
     for (int32_t i = 0; i < n; i++)
-        far[i] = isfinite(moved[i]) ? smaller(moved[i], far[i]) : far[i];
+        far[i] = isfinite(moved[i]) ? sd_smaller(moved[i], far[i]) : far[i];
     sd_linear_free(linear);
     free(memory);
     return 0;
@@ -90,7 +71,7 @@ static double time_scale(const sd_sizing *s, const sd_system *system, double spa
                          const double *yd, double *size, double *most)
 {
     const sd_balance *b = s->balance;
-    double found = smaller(PART * span, quick), least = INFINITY;
+    double found = sd_smaller(PART * span, quick), least = INFINITY;
     for (int32_t k = 0; k < b->unknowns; k++)
         size[k] = fabs(y[k]);
     group_largest(b, size, most);
@@ -99,14 +80,14 @@ static double time_scale(const sd_sizing *s, const sd_system *system, double spa
         size[k] = most[b->kind[k]];
         /* values that are nothing beside what their rate makes of them are round-off */
         if ((s->kind[k] & SD_STATE) && size[k] > FRESH * rate * found && rate > 0.0)
-            least = smaller(least, size[k] / rate);
+            least = sd_smaller(least, size[k] / rate);
     }
     found = least < found ? least : found;
     least = INFINITY;
     for (int32_t k = 0; k < system->kinematics; k++) {
         double q = size[system->k_q[k]], rate = fabs(yd[system->k_f[k]]);
         if (q > 0.0 && rate > 0.0)
-            least = smaller(least, sqrt(q / rate));
+            least = sd_smaller(least, sqrt(q / rate));
     }
     return least < found ? least : found;
 }
@@ -118,7 +99,7 @@ static void own_entries(const sd_sizing *s, int which, const double *value, doub
     memset(own, 0, (size_t)b->unknowns * sizeof *own);
     for (int32_t k = 0; k < s->owns[which]; k++) {
         int32_t e = s->own[which][k], c = b->column[e];
-        own[c] = larger(own[c], fabs(value[e]));
+        own[c] = sd_larger(own[c], fabs(value[e]));
     }
 }
 
@@ -134,7 +115,7 @@ static void compliance(const sd_sizing *s, const double *jy, const double *jyd, 
     for (int32_t k = 0; k < n; k++)
         if ((s->kind[k] & SD_MOMENTUM) && s->partner[k] >= 0) {
             int32_t f = s->partner[k];
-            inertia[f] = larger(inertia[f], other[k] > 0.0 ? one[f] / other[k] : 0.0);
+            inertia[f] = sd_larger(inertia[f], other[k] > 0.0 ? one[f] / other[k] : 0.0);
         }
     own_entries(s, 1, jy, one); /* stiffness */
     memset(plain, 0, (size_t)b->kinds * sizeof *plain);
@@ -178,19 +159,19 @@ static void known_sizes(const sd_sizing *s, const sd_system *system, const doubl
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns;
     for (int32_t k = 0; k < n; k++)
-        known[k] = larger(fabs(y[k]), moves[k]);
+        known[k] = sd_larger(fabs(y[k]), moves[k]);
     group_largest(b, known, most);
     for (int32_t k = 0; k < system->kinematics; k++) { /* rates that are round-off */
         int32_t f = system->k_f[k];
-        if (fabs(y[f]) < QUIET * larger(known[f], GROUP * most[b->kind[f]]))
+        if (fabs(y[f]) < QUIET * sd_larger(known[f], GROUP * most[b->kind[f]]))
             moves[system->k_q[k]] = 0.0;
     }
     for (int32_t k = 0; k < n; k++)
-        known[k] = larger(fabs(y[k]), moves[k]) / divisor[k];
+        known[k] = sd_larger(fabs(y[k]), moves[k]) / divisor[k];
     group_largest(b, known, most);
     for (int32_t k = 0; k < n; k++) {
-        double largest = divisor[k] * most[b->kind[k]], own = larger(fabs(y[k]), moves[k]);
-        known[k] = fabs(y[k]) > NOTHING * largest ? own : larger(own, GROUP * largest);
+        double largest = divisor[k] * most[b->kind[k]], own = sd_larger(fabs(y[k]), moves[k]);
+        known[k] = fabs(y[k]) > NOTHING * largest ? own : sd_larger(own, GROUP * largest);
         known[k] = s->nominal[k] > 0.0 ? s->nominal[k] : known[k];
     }
 }
@@ -200,10 +181,10 @@ static void efforts(const sd_sizing *s, const double *found, const double *row, 
 {
     double most = 0.0;
     for (int32_t k = 0; k < s->efforts; k++)
-        most = larger(most, row[s->effort[k]] * found[s->moved[k]]);
+        most = sd_larger(most, row[s->effort[k]] * found[s->moved[k]]);
     for (int32_t k = 0; k < s->efforts; k++) {
         double q = found[s->moved[k]];
-        excited[s->effort[k]] = larger(excited[s->effort[k]], QUIET * most / (q > 0.0 ? q : INFINITY));
+        excited[s->effort[k]] = sd_larger(excited[s->effort[k]], QUIET * most / (q > 0.0 ? q : INFINITY));
     }
 }
 
@@ -230,7 +211,7 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
     }
     memcpy(row, excited, (size_t)b->rows * sizeof *row);
     for (int32_t e = 0; e < b->entries; e++)
-        row[b->row[e]] = larger(row[b->row[e]], size[e] * kept[b->column[e]]);
+        row[b->row[e]] = sd_larger(row[b->row[e]], size[e] * kept[b->column[e]]);
     efforts(s, found, row, excited);
     failed |= sd_propagate(b, size, excited, NULL, SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++)
@@ -305,11 +286,11 @@ int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const
         return -1;
     group_largest(b, met, most);
     for (int32_t k = 0; k < b->unknowns; k++)
-        found[k] = larger(met[k], GROUP * most[b->kind[k]]);
+        found[k] = sd_larger(met[k], GROUP * most[b->kind[k]]);
     flows(system, span, found, most + b->kinds);
     for (int32_t k = 0; k < b->unknowns; k++) {
         int free_ = (s->kind[k] & SD_STATE) && s->nominal[k] == 0.0;
-        found[k] = free_ ? smaller(larger(found[k], NOISE * magnitude[k]), magnitude[k]) : magnitude[k];
+        found[k] = free_ ? sd_smaller(sd_larger(found[k], NOISE * magnitude[k]), magnitude[k]) : magnitude[k];
     }
     free(most);
     return 0;

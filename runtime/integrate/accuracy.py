@@ -1,6 +1,6 @@
 """An accuracy asked for, met by an estimate of the global error.
 
-A draft is followed by a run at the tolerance that should do, a fifth or a tenth of the draft's or, where that took many
+A draft is followed by a run at the tolerance that should do, a seventh or a tenth of it or, where the draft took many
 steps, less, and both are compared at instants of the draft's own rows; a run behind them at instants of the last one's.
 With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
 measured over three runs, at most what the method's law credits.  Where the estimate misses what was asked, a finer run

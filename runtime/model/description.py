@@ -6,6 +6,7 @@ hands on a `Description`: unknown families, row families, blocks with their kern
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
@@ -59,6 +60,19 @@ def element(name: str, shape: Shape, position: int) -> str:
     return f"{name}[{', '.join(reversed(index))}]"
 
 
+Elements = Sequence[tuple[str, str, int]]
+"""Name, file and line of each element, from index 0 on, of a family whose elements the author wrote one by one."""
+
+
+def named(name: str, shape: Shape, elements: Elements, position: int) -> tuple[str, str, int]:
+    """What the element of a family is called, and where it stands ("", 0: where the family does)."""
+    if not elements:
+        return element(name, shape, position), "", 0
+    own, file, line = elements[shape[0][0] + position]
+    _, _, tail = name.partition("#")  # v1#.multiplier, C1#.2'
+    return own + re.sub(r"^\.\d+", "", tail), file, line
+
+
 @dataclass(frozen=True, slots=True)
 class Family:
     """Unknowns of one name.  owner: coordinate (q f p) or constraint label (kappa mu)."""
@@ -69,11 +83,16 @@ class Family:
     unit: str
     nominal: float | None
     shape: Shape
+    elements: Elements = ()
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
         return count(self.shape)
+
+    def named(self, position: int, name: str = "") -> str:
+        """What an element is called; name: instead of the family's own."""
+        return named(name or self.name, self.shape, self.elements, position)[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +113,7 @@ class RowFamily:
     fixed: bool
     written: bool
     content: bool
+    elements: Elements = ()
 
     @property
     def size(self) -> int:
@@ -102,7 +122,8 @@ class RowFamily:
 
     def at(self, position: int) -> RowLabel:
         """The label of one row."""
-        return RowLabel(element(self.label, self.shape, position), self.kind, self.file, self.line)
+        name, file, line = named(self.label, self.shape, self.elements, position)
+        return RowLabel(name, self.kind, file or self.file, line or self.line)
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +244,7 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
         fixed=bool(value.get("fixed", True)),
         written=bool(value.get("written", True)),
         content=bool(value.get("content", False)),
+        elements=value.get("elements", ()),
     )
 
 
@@ -238,6 +260,7 @@ def _family(value: Mapping[str, Any], shape: Shape) -> Family:
         unit=str(value.get("unit") or "1"),
         nominal=None if not nominal else abs(float(nominal)),
         shape=shape,
+        elements=value.get("elements", ()),
     )
 
 

@@ -17,7 +17,7 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.runtime.model.description import BASE, SCALE, Description, Ints, RowFamily, element
+from sysdyn.runtime.model.description import BASE, SCALE, Description, Ints, RowFamily
 from sysdyn.runtime.model.failures import ContractError, RowLabel
 from sysdyn.values import dataclass
 
@@ -123,14 +123,15 @@ class Form:
 
 def unknown_name(description: Description, form: Form, place: int) -> str:
     """Name of the unknown at a place of y."""
-    for k, family in enumerate(description.families):
-        if family.kind != "audit" and form.at[k] <= place < form.at[k] + family.size:
-            return element(family.name, family.shape, place - int(form.at[k]))
+    for k in reversed(np.flatnonzero(form.at <= place).tolist() if place < form.written else []):
+        family = description.families[k]
+        if family.kind != "audit" and place < form.at[k] + family.size:
+            return family.named(place - int(form.at[k]))
     place -= form.written
     for k in description.families_of("kappa"):
         family = description.families[k]
         if place < family.size:
-            return element(nu_name(family.name), family.shape, place)
+            return family.named(place, nu_name(family.name))
         place -= family.size
     raise ContractError(f"there is no unknown {place} behind the multipliers nu")
 

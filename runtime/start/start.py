@@ -291,8 +291,7 @@ def _nearer(
     # rows of what is small beside the largest of its kind hold to the round-off that full matrices make of that
     largest = starter.largest_alike(np.maximum(problem.scale, np.abs(x)))
     scale = np.maximum(problem.scale, FLOOR * largest)
-    measure = starter.by_content if starter.balanced else starter.weights_by
-    weight = np.where(state, measure(t, x, scale), WEIGHT["following"] * scale / largest)
+    weight = np.where(state, starter.by_content(t, x, scale), WEIGHT["following"] * scale / largest)
     problem = replace(problem, scale=scale, weight=weight)
     levels = state & starter.written, state & ~starter.written
     aim = in_order(problem, x, levels)

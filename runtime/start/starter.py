@@ -326,7 +326,11 @@ class Starter:
         return all(f.owner in owners for f in self.system.description.families if f.kind == "f")
 
     def by_content(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """Weights of guesses: contents of one unit are measured alike, flows by their momenta."""
+        """Weights of guesses: contents of one unit are measured alike, flows by their momenta; in Kane's form, whose
+        balances are shared, by magnitudes.
+        """
+        if not self.balanced:
+            return self.weights_by(t, x, scale)
         families, form = self.system.description.families, self.system.form
         flows = {f.owner: form.at[k] for k, f in enumerate(families) if f.kind == "f"}
         own = np.full(self.system.rows, -1, dtype=np.int64)

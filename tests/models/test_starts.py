@@ -68,15 +68,15 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]} | {PERTURBED_STAGE}
 
 
-OPEN: dict[str, set[int]] = {"scalar": set(), "arrays": {52, 174}}
-"""Networks whose starts still differ, of those that were tried."""
+HARD = {"scalar": (), "arrays": (52, 174, 233)}
+"""Networks whose starts once differed: a fixed value of one element beside a guess over its range."""
 
 
-@pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("arrays", 180)])
+@pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("arrays", 500)])
 def test_random_networks_partly_said_begin_with_the_contents_of_the_closed_form(sort, number):
     """In all formulations; what is fixed in contradiction has no start in any."""
-    seeds = range(number if os.environ.get("SYSDYN_LONG") else 9 if sort == "scalar" else 4)
+    seeds = (*range(number if os.environ.get("SYSDYN_LONG") else 9 if sort == "scalar" else 4), *HARD[sort])
     verdicts = {seed: judged(seed, sort) for seed in seeds}
     differ = {seed: verdict for seed, verdict in verdicts.items() if verdict not in {"agree", "refused"}}
-    assert set(differ) <= OPEN[sort], differ
+    assert not differ
     assert [*verdicts.values()].count("agree") > 0.75 * len(verdicts)

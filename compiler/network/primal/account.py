@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from sysdyn.compiler.network.primal.balances import MULTIPLIER, ZERO, Balances
 from sysdyn.compiler.network.primal.bounds import Box
-from sysdyn.compiler.network.primal.series import Series
+from sysdyn.compiler.network.primal.series import Member, Series
 from sysdyn.dsl.model.network import Network
 from sysdyn.values import dataclass
 
@@ -32,9 +32,12 @@ def _displacements(network: Network) -> Iterator[Step]:
 
 
 def _classes(classes: Series) -> Iterator[Step]:
+    members: dict[str, list[Member]] = {}
+    for m in classes.members:
+        members.setdefault(m.coordinate, []).append(m)
     for coordinate in classes.coordinates:
-        members = [m for m in classes.members if m.coordinate == coordinate.name]
-        names = [("-" if m.sign < 0 else "") + _shown(m.element.name, m.box) for m in members]
+        own = members.get(coordinate.name, ())
+        names = [("-" if m.sign < 0 else "") + _shown(m.element.name, m.box) for m in own]
         yield Step("P2", f"branches {', '.join(names)}", f"coordinate {coordinate.name}: one flow")
 
 

@@ -189,10 +189,15 @@ class Likeness:
 
     def find(self, cell: Cell) -> tuple[Cell, int]:
         """The group's representative, and the sense relative to it."""
-        sign = 1
+        path = []
         while cell in self._parent:
-            cell, step = self._parent[cell]
+            above, step = self._parent[cell]
+            path.append((cell, step))
+            cell = above
+        sign = 1
+        for below, step in reversed(path):
             sign *= step
+            self._parent[below] = cell, sign
         return cell, sign
 
     def collapsed(self, cell: Cell, axis: Key, k: int) -> bool:
@@ -214,7 +219,8 @@ class Likeness:
             if (right[0], right[1]) < (left[0], left[1]):
                 left, right = right, left
             self._parent[right] = left, of_left * of_right * sign
-            self._collapsed = {(left if root == right else root, axis, k) for root, axis, k in self._collapsed}
+            if self._collapsed:
+                self._collapsed = {(left if root == right else root, axis, k) for root, axis, k in self._collapsed}
 
     def _unite(self, links: Sequence[Link]) -> None:
         """Equals first, then runs inside cells, then what reaches from cell to cell."""

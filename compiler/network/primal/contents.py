@@ -156,9 +156,9 @@ class Contents:
         return substitute(self.reader.at_piece(found, piece, initial.target.args), {mark: initial.value})
 
     def start(self, name: str, at: tuple[Node, ...]) -> Node:
-        """The initial content of a store: what the last statement about it says (before all guesses), else 0."""
+        """The initial content of a store: what the statement about it says, else 0."""
         value: Node = const(0.0)
-        for initial, box, content in sorted(self._given.get(name, []), key=lambda g: g[0].fixed):
+        for initial, box, content in self._given.get(name, []):
             loops = [loop.index for loop in initial.loops]
             places = [self.reader.sizes.affine(a, loops, initial.place) for a in initial.target.args]
             pairs = zip(places, at, strict=True)

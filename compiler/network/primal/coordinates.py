@@ -19,6 +19,7 @@ from sysdyn.compiler.network.primal.contents import Contents, at_stores
 from sysdyn.compiler.network.primal.incidence import Element, Incidence
 from sysdyn.compiler.network.primal.laws import Laws, laws
 from sysdyn.compiler.network.primal.potentials import Potentials
+from sysdyn.compiler.network.primal.precedence import foremost
 from sysdyn.compiler.network.primal.reading import Book, Piece, Reader
 from sysdyn.compiler.network.primal.series import Series, series
 from sysdyn.compiler.network.primal.unsaid import measured
@@ -43,7 +44,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     book = Book(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
     book.sticking = _sticking(network)
     reader = Reader(sizes, book)
-    initials = tuple(at_stores(network, incidence, reader))
+    initials = foremost(tuple(at_stores(network, incidence, reader)), network.branches, sizes)
     contents = Contents(reader, classes.members, initials, network.branches)
     guesses, stores = measured(network, initials, sizes, reader, reflected=reflected)
     found = replace(

@@ -150,17 +150,20 @@ class Incidence:
         self.boxes: dict[str, Box] = {}
         self.cells: dict[str, tuple[NodeCell, ...]] = {}
         self.sizes = sizes
+        self._contacts: dict[str, list[tuple[Element, int, Contact]]] = {}
+        for e in self.elements:
+            for k, c in enumerate(e.ends):
+                self._contacts.setdefault(c.node, []).append((e, k, c))
         for family in network.nodes:
             if family.domain.common == "effort":
                 self._add(family.name, family, sizes.box(family.shape, family.place))
         for domain in dict.fromkeys(e.branch.domain for e in self.elements if e.branch.domain.common == "effort"):
-            if any(c.node == ground(domain) for e in self.elements for c in e.ends):
+            if ground(domain) in self._contacts:
                 self._add(ground(domain), NodeFamily(ground(domain), (), domain, domain.place), ())
 
     def _add(self, name: str, family: NodeFamily, box: Box) -> None:
         self.boxes[name] = box
-        contacts = [(e, k, c) for e in self.elements for k, c in enumerate(e.ends) if c.node == name]
-        reaches = [(e, k, tuple(a.over(e.ranges) for a in c.at)) for e, k, c in contacts]
+        reaches = [(e, k, tuple(a.over(e.ranges) for a in c.at)) for e, k, c in self._contacts.get(name, ())]
         for e, _, reach in reaches:
             if not box_holds(box, reach):
                 at = ", ".join(f"{i.first.value}..{i.last.value}" for i in reach)

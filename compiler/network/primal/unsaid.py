@@ -65,20 +65,19 @@ def _over(node: Node, loops: Sequence[Loop], sizes: Sizes, b: Branch) -> Box:
 def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """Guesses of the contents of a statement's elements: by the text, and zero where it guesses nothing.
 
-    Left out is what it guesses in words that tell no content; a fixed one stays anyway.
+    Left out is what it guesses in words that tell no content; where a content is fixed, zero is one guess like another.
     """
+    within, told = ranges_of(b.loops, sizes, b.place), list[Ranges]()
+    for initial in (i for i in initials if _guesses(i, b)):
+        found = meeting(initial, b.at, within, sizes)
+        if found is None:
+            continue
+        told.append(found[0])
+        content = held_at(b, initial.target.data[1], found[1])
+        if content is not None:
+            yield replace(initial, value=content, loops=narrowed(b.loops, found[0]))
     zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
-    left = [ranges_of(b.loops, sizes, b.place)]
-    for initial in reversed([i for i in initials if _guesses(i, b)]):  # the last statement counts
-        there: list[Ranges] = []
-        for ranges in left:
-            found = meeting(initial, b.at, ranges, sizes)
-            there += [ranges] if found is None else beside(ranges, [found[0]])
-            content = None if found is None else held_at(b, initial.target.data[1], found[1])
-            if found is not None and content is not None:
-                yield replace(initial, value=content, loops=narrowed(b.loops, found[0]))
-        left = there
-    yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in left)
+    yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in beside(within, told))
 
 
 def _guesses(i: Initial, b: Branch) -> bool:

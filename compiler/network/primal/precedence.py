@@ -1,0 +1,94 @@
+"""Initial values of one unknown said at several places: each element keeps the statement that goes before the others.
+
+What stands further outside goes before (language, 11, 34): a scene's statement replaces the model's, the model's that
+of a component inside.  At one depth a fixed value goes before a guess, a later guess before an earlier one; two fixed
+values both stay, since they may contradict each other.  Content and effort of one potential store are one statement,
+momentum and flow of one kinetic store or coordinate too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.overlaps import beside, meeting, narrowed, ranges_of
+from sysdyn.dsl.model.network import Branch, Initial, Network
+
+_SAME = {"p": "f", "np": "nf"}
+_OF_STORE = {("potential", "be"): "bq", ("kinetic", "bp"): "bf"}
+
+_Key = tuple[str, str]
+_Ranked = tuple[int, Initial]
+"""A statement with its place in the order of the text."""
+
+
+def outermost(network: Network) -> Network:
+    """The network with every initial value that another replaces left out, element by element."""
+    return replace(network, initials=foremost(network.initials, network.branches, Sizes(network)))
+
+
+def foremost(initials: Sequence[Initial], branches: Sequence[Branch], sizes: Sizes) -> tuple[Initial, ...]:
+    """The initial values that no other replaces, cut where others are about a part of their elements."""
+    kinds = {b.name: b.kind for b in branches}
+    said: dict[_Key, list[_Ranked]] = {}
+    for k, initial in enumerate(initials):
+        if _of_an_unknown(initial):
+            said.setdefault(_key(initial, kinds), []).append((k, initial))
+    if all(len(found) == 1 for found in said.values()):
+        return tuple(initials)
+    books = {key: _Statements(found, sizes) for key, found in said.items()}
+    kept: list[Initial] = []
+    for k, initial in enumerate(initials):
+        book = books[_key(initial, kinds)] if _of_an_unknown(initial) else None
+        kept += [initial] if book is None else _left(initial, book.before((k, initial)), sizes)
+    return tuple(kept)
+
+
+def _of_an_unknown(initial: Initial) -> bool:
+    return initial.target.op == "var" and not initial.target.data[2]
+
+
+def _key(initial: Initial, kinds: Mapping[str, str]) -> _Key:
+    name, kind, _ = initial.target.data
+    return name, _SAME.get(kind) or _OF_STORE.get((kinds.get(name, ""), kind), kind)
+
+
+class _Statements:
+    """Those of one family; what names one element by itself is found by its indices."""
+
+    def __init__(self, found: Sequence[_Ranked], sizes: Sizes) -> None:
+        self.sizes = sizes
+        self.running = [item for item in found if item[1].loops]
+        self.single: dict[tuple[int, ...], list[_Ranked]] = {}
+        for item in found:
+            if not item[1].loops:
+                self.single.setdefault(self._indices(item[1]), []).append(item)
+
+    def _indices(self, initial: Initial) -> tuple[int, ...]:
+        return tuple(self.sizes.bound(a, initial.place).value for a in initial.target.args)
+
+    def before(self, one: _Ranked) -> list[Initial]:
+        """The statements that go before one where they are about its elements."""
+        single = [item for items in self.single.values() for item in items]
+        near = single if one[1].loops else self.single[self._indices(one[1])]
+        above = [other for k, other in (*self.running, *near) if _rank(k, other) < _rank(*one)]
+        return [other for other in above if not one[1].fixed or other.depth < one[1].depth]
+
+
+def _rank(k: int, initial: Initial) -> tuple[int, bool, int]:
+    return initial.depth, not initial.fixed, -k
+
+
+def _left(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
+    """What no statement that goes before is about."""
+    if not others:
+        yield initial
+        return
+    within = ranges_of(initial.loops, sizes, initial.place)
+    holes = [m[0] for other in others if (m := meeting(other, initial.target.args, within, sizes))]
+    if not initial.loops:
+        yield from () if holes else (initial,)
+        return
+    for rest in beside(within, holes):
+        yield replace(initial, loops=narrowed(initial.loops, rest))
