@@ -361,5 +361,6 @@ SLIPS = [
     Slip("misspelt", "tanks", "temperature(T =", "temperature(theta =", "theta", "no parameter", r"\bT\b"),
     Slip("habits", "tanks", "init c.e =", "init c.T =", "T", "member", r"\bc\.e"),
     Slip("domains", "tanks", "water, room: heat", "water, room: thermal", "water", "thermal", "heat", "c: capacity"),
+    Slip("units", "tanks", "R: dissipator(e = 1e6 Pa.s/m^3*f)", "R: flow(q = 1 l/s)", "q", r"m\^3/s", "f = "),
     Slip("habits", "tanks", "dissipator(e = 1e6", "dissipator(1e6", "1e6", "positional", "e = 1e6"),
 ]
