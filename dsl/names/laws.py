@@ -51,9 +51,10 @@ def law_of(
     read = context.scalar(value)
     found = read.dimension
     other = [s for s in "efqp" if found and found == branch_dimension(branch.domain, s) and s != side]
-    if other and found != dimension and wanted is None and context.bare(value) is None:
+    meant = wanted[0] if wanted in ("effort", "flow") else None if wanted else next(iter(other), None)
+    if meant in other and found != dimension and context.bare(value) is None:
         said = message.format(dim.show(found))
-        raise context.fail("E208", said, value.span, help=f"{other[0]} = ..., which is in {dim.show(found)}")
+        raise context.fail("E208", said, value.span, help=f"{meant} = ..., which is in {dim.show(found)}")
     node = context.fitting(read, value, dimension, "E208", message)
     own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
     others = sorted(set(own) - {side})

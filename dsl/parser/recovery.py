@@ -158,6 +158,9 @@ class Recovery:
         bracket = self._open_bracket(kind)
         if kind == "<fault>" and scanner.fault == "text":
             self._error(("E112", "the text that begins with this '\"' is not closed on its line", '"'), self._token())
+        elif word == "table" and text == ")" and automaton.accepts(","):
+            row = "a row of a table holds its arguments and the value: one number is no row"
+            self._error(("E113", row, "(0, 0), (1, 2)"), self._token())
         elif bracket is not None:
             self._not_closed(bracket)
         elif (slip := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:

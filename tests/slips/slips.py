@@ -346,6 +346,7 @@ SLIPS = [
     # a second first hour: a quarter car, an active filter, an oil cooler
     Slip("habits", "road", "bump(v*t)", "bump(v*t, 0 m)", "bump", "takes 1 argument,", r"bump\(x\)"),
     Slip("syntax", "road", "(1, 0), (1.2, 60)", "(1.2, 60), (1, 0)", "bump", "behind|increase", "order"),
+    Slip("syntax", "road", "(1.8, 60), (2, 0)", "(1.8, 60), (2)", "row", "one number", r"\(0, 0\)"),
     Slip("syntax", "road", "in kN as tyre", "as tyre in kN", "in", "expected", "unit stands before"),
     Slip("syntax", "road", "trace zs in mm", "output zs in mm", "output", "belongs", "trace"),
     Slip("habits", "filter", "Rb: resistor(R", "resistor(R", "resistor", "label", "R1: resistor"),
@@ -360,5 +361,6 @@ SLIPS = [
     Slip("misspelt", "tanks", "temperature(T =", "temperature(theta =", "theta", "no parameter", r"\bT\b"),
     Slip("habits", "tanks", "init c.e =", "init c.T =", "T", "member", r"\bc\.e"),
     Slip("domains", "tanks", "water, room: heat", "water, room: thermal", "water", "thermal", "heat", "c: capacity"),
+    Slip("units", "tanks", "R: dissipator(e = 1e6 Pa.s/m^3*f)", "R: flow(q = 1 l/s)", "q", r"m\^3/s", "f = "),
     Slip("habits", "tanks", "dissipator(e = 1e6", "dissipator(1e6", "1e6", "positional", "e = 1e6"),
 ]
