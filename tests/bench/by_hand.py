@@ -1,4 +1,4 @@
-"""What netlists written line by line cost: python tests/bench/handwritten.py [--lines N ...] [NAME ...]
+"""What netlists written line by line cost: python tests/bench/by_hand.py [--lines N ...] [NAME ...]
 
 CPU seconds and largest resident memory, imports and C compiler included, of `check` and of the text to its first step
 (`simulate --max-steps 1`); NAME: ladder chain mesh stages power_grid (tests/models/handwritten.py), all where none.
