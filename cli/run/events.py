@@ -12,7 +12,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Event, Switch
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Happened, Kink, Plan, Relation, Sampled, When
-from sysdyn.runtime.model.description import RowFamily, element
+from sysdyn.runtime.model.description import RowFamily
 from sysdyn.runtime.model.system import System
 
 ZENO = 8
@@ -50,7 +50,7 @@ class _Planner:
     def __init__(self, prepared: Prepared, system: System) -> None:
         self.prepared, self.system = prepared, system
         description = system.description
-        names = [element(r.name, r.shape, k) for r in _rows(system) for k in range(r.size)]
+        names = [r.named(k) for r in _rows(system) for k in range(r.size)]
         self.row = {name: k for k, name in enumerate(names)}
         self.unknown = {
             (f.owner, f.kind): int(system.form.at[k]) for k, f in enumerate(description.families) if f.kind in "sf"

@@ -13,6 +13,7 @@ from itertools import islice, product
 
 from sysdyn.compiler.model.energies import EnergyModel, Family, Quantity
 from sysdyn.compiler.model.parameters import Parameters
+from sysdyn.compiler.network.authors import Authors, owner, shown
 from sysdyn.dsl.model.expression import const, var
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic
@@ -23,7 +24,7 @@ MOST = 1000
 
 def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
     """The model with a stored quantity for each coordinate and each dynamic variable."""
-    parameters = Parameters(network, {})
+    parameters, own = Parameters(network, {}), network.authors
     found: list[Quantity] = []
     notes: list[Diagnostic] = []
     kinds = [(c, model.mirror.coordinate, "q") for c in model.coordinates] + [(s, "s", "s") for s in model.states]
@@ -31,13 +32,18 @@ def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[Ene
         box = parameters.extents(family.shape)
         number = math.prod(last - first + 1 for first, last in box)
         if number > MOST:
-            text = f"nothing is traced: of the {number} elements of {family.name} the first {MOST} are"
-            notes.append(Diagnostic("N608", text, family.place, f"trace {family.name}[...] in the scene"))
-        found += islice(_elements(family, kind, family.units[unit], box), MOST)
+            whole, one = shown(f"{family.name}[0..{number - 1}]", own), shown(f"{family.name}[0]", own)
+            whole, one = (whole, one) if owner(family.name, own) else (family.name, f"{family.name}[...]")
+            text = f"nothing is traced: of the {number} elements of {whole} the first {MOST} are"
+            notes.append(Diagnostic("N608", text, family.place, f"trace {one} in the scene"))
+        found += islice(_elements(family, kind, family.units[unit], box, own), MOST)
     return replace(model, quantities=(*found, *model.quantities)), tuple(notes)
 
 
-def _elements(family: Family, kind: str, unit: str, box: tuple[tuple[int, int], ...]) -> Iterator[Quantity]:
+def _elements(
+    family: Family, kind: str, unit: str, box: tuple[tuple[int, int], ...], authors: Authors
+) -> Iterator[Quantity]:
     for at in product(*(range(first, last + 1) for first, last in box)):
         name = f"{family.name}[{', '.join(map(str, at))}]" if at else family.name
+        name = shown(name, authors)
         yield Quantity(name, var(family.name, kind, *(const(k) for k in at)), True, unit, family.place)

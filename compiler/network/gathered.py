@@ -241,7 +241,7 @@ class _Families:
     def moved(self, root: Node) -> Node:
         """An expression with elements of families for what stands by itself."""
         change = {}
-        for n in variables(root):
+        for n in sorted(variables(root), key=lambda n: n.number):
             if n.op == "var" and n.data[1][0] in "nb" and n.data[0] in self.at and not n.args:
                 family, k = self.at[n.data[0]]
                 change[n] = var(family, n.data[1], const(k), order=n.data[2])

@@ -19,7 +19,7 @@ from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.origin import Origin
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Description, Floats, Ints, element
+from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
@@ -467,4 +467,4 @@ class Runs:
 
 def _observed_names(description: Description) -> tuple[str, ...]:
     rows = [description.rows[k] for k in description.rows_of("observe")]
-    return tuple(element(row.name, row.shape, k) for row in rows for k in range(row.size))
+    return tuple(row.named(k) for row in rows for k in range(row.size))

@@ -120,6 +120,10 @@ class RowFamily:
         """Number of rows."""
         return count(self.shape)
 
+    def named(self, position: int, name: str = "") -> str:
+        """What a row is called; name: instead of the family's own."""
+        return named(name or self.name, self.shape, self.elements, position)[0]
+
     def at(self, position: int) -> RowLabel:
         """The label of one row."""
         name, file, line = named(self.label, self.shape, self.elements, position)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.model.description import Description, Floats, element
+from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.values import dataclass
 
@@ -69,8 +69,8 @@ def columns_of(description: Description) -> tuple[Column, ...]:
         row = description.rows[k]
         for position in range(row.size):
             if row.stored:
-                name = element(row.name, row.shape, position).replace("/", "\u2215")
-                label = element(row.label or row.name, row.shape, position)
+                name = row.named(position).replace("/", "\u2215")
+                label = row.named(position, row.label)
                 found.append(Column(name, place, row.unit, label, row.rate))
             place += 1
     return tuple(found)

@@ -4,14 +4,19 @@ import re
 
 import numpy as np
 import pytest
-from handwritten import chain, ladder, mesh, stages
+from handwritten import chain, ladder, mesh, power_grid, stages
 from sysdyn.api import simulate
+from sysdyn.cli.run.prepare import Prepared, module_of
 from sysdyn.compiler.network import gathered as gathered_
 from sysdyn.compiler.network.gathered import gathered
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl import load
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.model.expression import fresh
+from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.dsl.text.source import SourceText
+from sysdyn.runtime.condense.condensed import condensed
+from sysdyn.runtime.model import carrier
+from sysdyn.runtime.model.system import System
 
 NETLISTS = {
     "ladder": ladder(70),
@@ -75,3 +80,65 @@ def test_what_is_said_is_said_of_the_lines_of_the_text(name):
 def said(note):
     """A note without the order of the terms of a row, which is that of the making."""
     return note.code, note.place.start, sorted(re.findall(r"[\w.]+", note.message))
+
+
+def test_one_text_of_c_for_any_number_of_lines(effort):
+    """Families and equations do not grow with a chain; what a line costs does not either (counted, not timed)."""
+
+    def made(n):
+        with fresh():
+            return compile_network(network(ladder(n)), gather=True)
+
+    short, few = effort(lambda: made(100))
+    long, many = effort(lambda: made(200))
+    assert len(long.form.families) == len(short.form.families)
+    assert len(long.program.routines) == len(short.program.routines)
+    one, other = (re.sub(r"[\d.e]+", "0", made.text) for made in (short, long))
+    assert one == other  # but for lines in comments, and the numbers of both ends
+    assert (many - few) / 300 < 2500  # lines of Python a line of text, from its characters to C
+
+
+def test_what_stands_in_no_row_is_lowered_as_it_is_written(tmp_path):
+    """A grid of buses joined at random runs; each unknown keeps its name."""
+    found = network(power_grid(40))
+    model = compile_network(found, gather=True)
+    names = {u["name"] for u in model.manifest(model.bind())["unknowns"]}
+    assert {f"bus{k}.multiplier" for k in range(40)} & names
+    assert not any("#" in name for name in names)
+    text = power_grid(40)
+    assert np.isfinite(run(tmp_path, text.replace("to 5 ms", "to 500 us"), "grid", backend="numpy")).all()
+
+
+def test_a_chain_of_scalars_leaves_no_full_matrix():
+    """Definitions through one another are not followed without end: terms grow with the unknowns, not their square."""
+
+    def terms(n):
+        model = compile_network(network(ladder(n)), backend="numpy")
+        binding = model.bind()
+        arrays = Prepared.arrays_of(binding)
+        system = System(model.manifest(binding), arrays, carrier.load(module_of(model.text)))
+        zero = np.zeros(system.unknowns)
+        found = condensed(system, 0.0, zero, zero)
+        return found.stepped._composition.source.size
+
+    few, many = terms(200), terms(400)
+    assert many < 2.5 * few
+
+
+def test_what_nothing_traces_is_traced_under_its_own_name(tmp_path):
+    text = re.sub(r"; trace .* }", " }", ladder(70))
+    file = tmp_path / "n.sd"
+    file.write_text(text)
+    trace = simulate(file, output=tmp_path / "n.h5", unmet="warn", backend="numpy", until="1 us")
+    assert {"C1", "C17", "R2", "C70"} <= set(trace.names)
+    assert not any("#" in name for name in trace.names)
+
+
+def test_a_wrong_number_is_told_of_its_element():
+    text = stages(26)
+    found = compile_network(network(text), gather=True)
+    assert found.network.authors
+    with pytest.raises(ModelError) as wrong:
+        found.bind({"Ci9.C": 0.0})
+    (said_,) = wrong.value.diagnostics
+    assert (said_.code, said_.message) == ("E605", "the law of Ci9 cannot be inverted: Ci9.C is zero")
