@@ -254,7 +254,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->error_accepted = 0.0;
     radau->growth = GROWTH;
     radau->longest = 0.0;
-    radau->pressed = 0;
+    radau->pressed = radau->balances;
     radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
     leave_below(radau, radau->linear->idle ? LEAST_PIVOT : 0.0);
     radau->theta = 1.0;

@@ -64,6 +64,7 @@ typedef struct sd_radau {
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
     double growth;            /* of the next step at most where laws are steep */
     double longest;           /* step accepted */
+    int32_t balances;         /* balances are steep: in rates, whose round-off grows as steps shrink */
     int32_t pressed;          /* a steep law lets no length of step do: corrections are shortened at once */
     int32_t ready, old_jacobian, rejected;
     const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */

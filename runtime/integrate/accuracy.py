@@ -13,6 +13,7 @@ early and grows.  Two runs that took the same steps say nothing: a third takes s
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class Law:
     gain, power: most runs' estimates stay below gain * tolerance^power; credit: largest power with which the finer
     run's error is believed to be smaller; finest: the smallest tolerance that makes sense; growth: power of the steps
     that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors;
-    ratio: of the tolerances of the first two runs.
+    ratio: of the tolerances of the first two runs; loosest: tolerance of a draft.
     """
 
     gain: float
@@ -76,6 +77,7 @@ class Law:
     finest: float
     growth: float = 0.0
     ratio: float = 0.1
+    loosest: float = LOOSEST
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
@@ -92,6 +94,14 @@ LAWS = {
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
 }
+STEEP = replace(LAWS["radau"], loosest=1e-3)
+"""Of radau where laws are steep: Newton holds its steps more than a loose tolerance does (transistor: 1e-2 and 1e-3 are
+equally far off)."""
+
+
+def law_of(method: str, *, steep: bool) -> Law:
+    """What follows from the tolerance of a method on a model."""
+    return STEEP if steep and method == "radau" else LAWS[method]
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +241,7 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
     longest = STRETCH * LONGEST
     for smaller in RETRIED[:-1]:
         try:
-            return run(min(max(smaller * tolerance, law.finest) / law.ratio, LOOSEST), longest)
+            return run(min(max(smaller * tolerance, law.finest) / law.ratio, law.loosest), longest)
         except SolverFailure as failure:
             if _limited(failure) or failure.cause == "stiff":
                 raise

@@ -104,8 +104,8 @@ class Integration:
         contacts = request.events.contacts if request.events is not None else ()
         rated = bool(contacts) and "dynamics_rate" in system.description.blocks
         self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
-        # what leaves a flow open between contacts is shared by the least change
-        if request.events is None:
+        # the least change shares what is left open: flows between contacts, potentials where all laws at a node are faint
+        if request.events is None and not self._steep_balances:
             sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
             # steep laws magnify what a basis leaves
             self.settler.by_basis(SLACK * request.tolerance if sums and not system.form.scales else 0.0)
@@ -183,7 +183,7 @@ class Integration:
         if request.method == "bdf":
             method.max_order = request.max_order
         elif request.method == "radau":
-            method.stages = first
+            method.stages, method.balances = first, int(self._steep_balances)
         else:
             method.patience = request.stiff_steps
         if request.method == "energy":
@@ -194,6 +194,10 @@ class Integration:
             self._project = self._settler("constraints", np.ones(self.system.form.written, dtype=bool))
             method.project = self._project.address
         self.method.start(self.start.t, self.y, self.yd)
+
+    @property
+    def _steep_balances(self) -> bool:
+        return any(scale.block == "dynamics_scale" for scale in self.system.form.scales)
 
     def _tell(self, method: Any) -> None:
         """What the method is told of each unknown that it steps: tolerance, magnitude, roles."""

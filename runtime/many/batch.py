@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import accuracy
-from sysdyn.runtime.integrate.accuracy import LAWS, LOOSEST, STRETCH
+from sysdyn.runtime.integrate.accuracy import STRETCH, Law, law_of
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
@@ -144,11 +144,11 @@ class Batch:
         self.system, self.start = way.system, start
         self.columns = tuple(column.name for column in self.runs.columns)
         self._thin = np.ascontiguousarray([] if thin is None or keep != TRACES else thin, dtype=np.int32)
-        law = LAWS[way.method]
+        law = law_of(way.method, steep=bool(way.system.form.scales))
         self._targets = self._wanted()
         finest = float(np.min(self._targets, initial=1.0))
         tolerance = law.tolerance(finest if finest < 1.0 else 1e-4)
-        draft = min(max(tolerance, law.finest) / law.ratio, LOOSEST)
+        draft = min(max(tolerance, law.finest) / law.ratio, law.loosest)
         fine = max(min(tolerance, law.ratio * draft), law.finest)
         longest = FREELY if free and way.method == "dopri" and keep == END else LONGEST
         try:
@@ -160,9 +160,9 @@ class Batch:
         self._measure(longest, law, draft, fine)
         self._claims(claims)
         self.core.keep = keep
-        self._loosen(law.power)
+        self._loosen(law)
 
-    def _loosen(self, power: float) -> None:
+    def _loosen(self, law: Law) -> None:
         """Tolerances as loose as the nominal run lets them be, with a margin for the others.
 
         What a run's estimate then misses costs it a finer run, never its promise.
@@ -172,9 +172,9 @@ class Batch:
         if found.state[0] != DONE:
             return
         over = float(found.estimate[0]) / float(np.min(self._targets, initial=1.0))
-        factor = float(np.clip((MARGIN / max(over, 1e-9)) ** (1.0 / power), 1.0, LOOSER))
+        factor = float(np.clip((MARGIN / max(over, 1e-9)) ** (1.0 / law.power), 1.0, LOOSER))
         tolerance = self.core.tolerance
-        factor = max(min(factor, LOOSEST / tolerance[0]), 1.0)
+        factor = max(min(factor, law.loosest / tolerance[0]), 1.0)
         tolerance[0], tolerance[1] = factor * tolerance[0], factor * tolerance[1]
 
     def _kept(self, array: Any) -> int | None:

@@ -268,7 +268,7 @@ class Radau(c.Structure):
         ("strict", _D * 3),
         *[(name, _D) for name in ["t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
         *[(name, _D) for name in ["error_accepted", "theta", "state_size", "growth", "longest"]],
-        *[(name, _I) for name in ["pressed", "ready", "old_jacobian", "rejected"]],
+        *[(name, _I) for name in ["balances", "pressed", "ready", "old_jacobian", "rejected"]],
         *[(name, _P) for name in ["method", "used"]],
         *[(name, _I) for name in ["since", "hold", "creeping"]],
         *[(name, _P) for name in ["phi", "yd", "last", "before"]],

@@ -30,13 +30,16 @@ TIMING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One command's integration.  cpu: cpu_integrate_s, the least of all repetitions; estimate: None where none."""
+    """One command's integration.  cpu: cpu_integrate_s, the least of all repetitions; estimate: None where none; steps:
+    of all its runs; rtol: of the last one.
+    """
 
     cpu: float
     estimate: float | None
     met: bool
     steps: int
     method: str
+    rtol: float
     time: np.ndarray
     values: dict[str, np.ndarray]
     nominal: dict[str, float]
@@ -94,9 +97,9 @@ class Bench:
         keep = np.append(np.diff(instants) > 0.0, True)
         columns = {name: np.asarray(trace[name])[keep] for name in trace.names}
         nominal = {name: float(trace[name].nominal) for name in trace.names}
-        steps = outcome.statistics["steps"]
+        steps, rtol = outcome.statistics["steps"], float(trace.attributes["rtol"])
         return Measured(
-            cpu, outcome.error_estimate, outcome.met, steps, outcome.method, instants[keep], columns, nominal
+            cpu, outcome.error_estimate, outcome.met, steps, outcome.method, rtol, instants[keep], columns, nominal
         )
 
 
