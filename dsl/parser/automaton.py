@@ -84,6 +84,21 @@ _TABLE_GOTOS = _Gotos()
 _TABLE_RULES = _actions()
 
 
+def action_of(state: int, kind: str) -> int | None:
+    """A state to shift to, or below 0 a rule, or None where a terminal does not fit."""
+    return _TABLE_ROWS[state].get(kind)
+
+
+def rule_of(action: int) -> tuple[str, int, Build | None, bool, tuple[tuple[int, bool], ...]]:
+    """Left side, length, function (None: a list), whether it hands on its child, children of the rule of an action."""
+    return _TABLE_RULES[-1 - action]
+
+
+def goto_of(state: int, left: str) -> int | None:
+    """The state behind a left side."""
+    return _TABLE_GOTOS[state].get(left)
+
+
 class Automaton:
     """The stack of one parse: states, and for each its value, span and depth of nesting."""
 

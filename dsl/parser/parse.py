@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
+from sysdyn.dsl.parser.patterns import Patterns
 from sysdyn.dsl.parser.recovery import Recovery
 from sysdyn.dsl.text.decoding import MAX_BYTES
 from sysdyn.dsl.text.diagnostics import Diagnostic
@@ -34,7 +35,7 @@ def parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
 def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
     """Run the automaton to the end of the text."""
     automaton = Automaton(source)
-    recovery = Recovery(automaton)
+    recovery, patterns = Recovery(automaton), Patterns(automaton)
     scanner = automaton.scanner
     while not automaton.finished:
         kind = recovery.checked(scanner.read(automaton.row))
@@ -44,6 +45,8 @@ def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
             recovery.too_deep()
         elif automaton.overflow:
             recovery.too_long()
+        else:
+            patterns.follow(kind)
     tree = File(source, automaton.values[-1], tuple(scanner.comments), Span(0, len(source.text)))
     return tree, automaton.notes.report.diagnostics
 

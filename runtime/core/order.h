@@ -18,8 +18,8 @@ int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const 
 int32_t sd_peel(int32_t rows, int32_t columns, int32_t entries, const int32_t *row, const int32_t *column,
                 const double *value, double least, int32_t *peeled);
 
-/* A maximum matching of rows and columns (Duff, ACM Trans. Math. Softw. 7, 1981, with a look ahead): matched [columns] := row
- * of each column, -1 where none is left for it.  Returns how many are matched; -1: no memory */
-int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *matched);
+/* A maximum matching of rows and columns: matched [columns] := row of each column, -1 where none is left for it; looks: entries
+ * looked at, of the order of those of the pattern for lines and nets.  Returns how many are matched; -1: no memory */
+int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *matched, int64_t *looks);
 
 #endif

@@ -323,7 +323,8 @@ def _unmatched(pattern: Pattern) -> NDArray[np.float64]:
     Round-off makes pivots of what is singular by structure: a line of 20000 sections passes for regular by its values.
     """
     matched = np.zeros(pattern.unknowns, dtype=np.int32)
-    places = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(matched)
+    looks = np.zeros(1, dtype=np.int64)
+    places = (lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(matched), lib.pointer(looks))
     if lib.core.sd_match(pattern.rows, pattern.unknowns, *places) < 0:
         raise MemoryError
     return np.asarray(matched < 0, dtype=np.float64)

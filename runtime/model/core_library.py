@@ -176,7 +176,7 @@ def _load() -> Any:
         "sd_linear_z_pivoted": (_P, [_P]),
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P]),
         "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P]),
-        "sd_match": (_I, [_I, _I, _P, _P, _P]),
+        "sd_match": (_I, [_I, _I, _P, _P, _P, _P]),
         "sd_peel": (_I, [_I, _I, _I, _P, _P, _P, _D, _P]),
         "sd_propagate": (c.c_int, [_P, _P, _P, _P, _I, _P]),
         "sd_excitation": (_D, [_P, _D, _D, _P, _P, _P, _I, _D, _P]),

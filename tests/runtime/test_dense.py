@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array, diags_array, eye_array, kron
+from scipy.sparse import coo_array, csc_array, diags_array, eye_array, kron
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
@@ -80,11 +80,30 @@ def test_matchings_are_as_large_as_can_be():
         m, n = random.integers(1, 25, 2)
         a = csc_array((random.random((m, n)) < random.uniform(0.02, 0.3)).astype(float))
         column, row, found = a.indptr.astype(np.int32), a.indices.astype(np.int32), np.zeros(n, dtype=np.int32)
-        number = lib.core.sd_match(m, n, *map(lib.pointer, (column, row, found)))
+        number = lib.core.sd_match(m, n, *map(lib.pointer, (column, row, found, np.zeros(1, dtype=np.int64))))
         assert number == (maximum_bipartite_matching(a.tocsr(), perm_type="row") >= 0).sum()
         there = np.flatnonzero(found >= 0)
         assert np.unique(found[there]).size == there.size == number
         assert (a.toarray()[found[there], there] != 0.0).all()
+
+
+@pytest.mark.parametrize("kind", ["line", "grid", "backwards", "random"])
+def test_a_matching_looks_at_each_entry_a_few_times(kind):
+    """Chains in which each column could drive the one before it from its row: one search through all of them each."""
+    random, n = np.random.default_rng(2), 40_000
+    a = {
+        "line": lambda: diags_array([1.0] * 3, offsets=[-1, 0, 1], shape=(n, n)),
+        "grid": lambda: grid(200),
+        "backwards": lambda: diags_array([1.0] * 2, offsets=[0, 1], shape=(n, n)).tocsc()[::-1],
+        "random": lambda: coo_array((np.ones(2 * n), random.integers(0, n, (2, 2 * n))), shape=(n, n)),
+    }[kind]()
+    a = csc_array(a)
+    a.sum_duplicates()
+    looks, found = np.zeros(1, dtype=np.int64), np.zeros(n, dtype=np.int32)
+    arrays = a.indptr.astype(np.int32), a.indices.astype(np.int32), found, looks
+    number = lib.core.sd_match(n, n, *map(lib.pointer, arrays))
+    assert number == (maximum_bipartite_matching(a.tocsr(), perm_type="row") >= 0).sum()
+    assert looks[0] < 12 * a.nnz
 
 
 def test_rows_that_are_peeled_are_independent():
