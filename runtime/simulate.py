@@ -233,7 +233,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     system = written.another("0")
     missing = rateless(system, start)
     if missing:
-        return replace(way, reason=f"no underlying equation: {missing[0]} has no rate"), other
+        return replace(way, reason=f"no explicit equation for {missing[0]}"), other
     return Way("dopri", system, 1, "0", NOT_STIFF), way, other
 
 

@@ -33,7 +33,8 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
     """Report why there is no start."""
     where = place_of(prepared, error.rows[0]) if error.rows else prepared.network.place
     names = ", ".join(dict.fromkeys(r.label for r in error.rows)) or ", ".join(error.names)
-    related = [Related("this value is fixed", place_of(prepared, c)) for c in error.candidates]
+    fixed_at = dict.fromkeys(place_of(prepared, c) for c in error.candidates)  # a line may fix several
+    related = [Related("this value is fixed", place) for place in fixed_at]
     if where.source is not prepared.network.place.source and related:  # the law of an element of a library
         related, where = [*related[1:], Related(f"the law of {names}", where)], related[0].place
     match error.kind:

@@ -61,7 +61,7 @@ def start(
             facts = structure(system, state)
             implicit = undetermined(system, state)
     except InconsistentStart as error:
-        inconsistent(prepared, t0, error, report)
+        _refused(prepared, t0, error, report)
         return None
     except NotFiniteError:
         _steep(prepared, report)
@@ -79,6 +79,19 @@ def start(
         report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
     _statics(prepared, system, state, facts, report)
     return Started(system, state, facts)
+
+
+def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:
+    """Report why there is no start; of gathered elements at the lines of the author, as `compile_network` does."""
+    if prepared.compiled.written is not None:
+        found = Report()
+        one_by_one = prepare(
+            prepared.network, Report(), formulation=prepared.formulation, backend="numpy", gather=False
+        )
+        if one_by_one is not None and start(one_by_one, t0, found) is None:
+            report.extend(found)
+            return
+    inconsistent(prepared, t0, error, report)
 
 
 def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None:

@@ -9,8 +9,10 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, Place
 
 Authors = Mapping[str, tuple[tuple[str, Place], ...]]
 """Name and place of each element of a family; a family's name ends in #."""
-_NAME = re.compile(r"([^\s,()*/+-]+#)(?:\.\d+)?(\(0\))?(?:\[(?:(i)(?: ([+-]) (\d+))?|(\d+)(?:\.\.(\d+))?)\])?")
-"""A family with what follows: (0), [i], [i - 1], [3], [3..7]."""
+_NAME = re.compile(
+    r"(?<![^\s,()*/+-])([^\s,()*/+-]+#)(?:\.\d+)?(\(0\))?(?:\[(?:(i)(?: ([+-]) (\d+))?|(\d+)(?:\.\.(\d+))?)\])?"
+)
+"""A family with what follows: (0), [i], [i - 1], [3], [3..7]; looked for where a word begins, once in each."""
 _OVER = re.compile(r" for i in (\d+)\.\.(\d+)$")
 Piece = tuple[str, tuple[tuple[str, Place], ...], int]
 """A text, or the elements of which the one so far behind i stands there."""

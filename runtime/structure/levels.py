@@ -80,10 +80,10 @@ class _Rows:
 
     def unmatched(self) -> set[int]:
         """Equations on the alternating paths of those for which no unknown is left."""
-        reached, owner = self._reached(), dict[int, int]()
+        reached, owner, matched = self._reached(), dict[int, int](), dict[int, int]()
         failed: set[int] = set()
         for equation in range(len(reached)):
-            failed |= _augmented(equation, reached, owner)
+            failed |= _augmented(equation, reached, owner, matched)
         return failed
 
     def differentiate(self, failed: set[int]) -> bool:
@@ -99,8 +99,11 @@ class _Rows:
         return tuple(sorted({int(k) for k in self.family[(self.level == 0) & (self.family >= 0)]}))
 
 
-def _augmented(equation: int, reached: list[list[int]], owner: dict[int, int]) -> set[int]:
-    """Matches one more equation along the shortest path; where there is none, the equations that were met."""
+def _augmented(equation: int, reached: list[list[int]], owner: dict[int, int], matched: dict[int, int]) -> set[int]:
+    """Matches one more equation along the shortest path; where there is none, the equations that were met.
+
+    owner: the equation of each matched unknown, matched: the unknown of each equation.
+    """
     came: dict[int, int] = {}  # unknown -> the equation from which it was met
     ahead = [equation]
     for here in ahead:
@@ -109,19 +112,21 @@ def _augmented(equation: int, reached: list[list[int]], owner: dict[int, int]) -
                 continue
             came[unknown] = here
             if unknown not in owner:
-                _exchange(unknown, equation, came, owner)
+                _exchange(unknown, equation, came, owner, matched)
                 return set()
             ahead.append(owner[unknown])
     return set(ahead)
 
 
-def _exchange(unknown: int, equation: int, came: dict[int, int], owner: dict[int, int]) -> None:
+def _exchange(
+    unknown: int, equation: int, came: dict[int, int], owner: dict[int, int], matched: dict[int, int]
+) -> None:
     """Each equation of the path takes the unknown at which it was left."""
-    met = set(came.values())
-    before = {other: own for own, other in owner.items() if other in met}
     while True:
         here = came[unknown]
-        owner[unknown] = here
+        before = matched.get(here)
+        owner[unknown], matched[here] = here, unknown
         if here == equation:
             return
-        unknown = before[here]
+        assert before is not None
+        unknown = before

@@ -149,3 +149,18 @@ def test_a_wrong_number_is_told_of_its_element():
         found.bind({"Ci9.C": 0.0})
     (said_,) = wrong.value.diagnostics
     assert (said_.code, said_.message) == ("E605", "the law of Ci9 cannot be inverted: Ci9.C is zero")
+
+
+def test_initial_values_that_contradict_each_other_are_told_at_their_own_lines(tmp_path, monkeypatch):
+    """Beside a family's statements one more: its element is named, not the family's first."""
+    monkeypatch.setattr(gathered_, "LEAST", 16)
+    text = ladder(16, begun=True).replace("\n}\n\nscene", "\n  init R12.f = 3 mA\n}\n\nscene")
+    assert gathered(network(text)).authors
+    (tmp_path / "n.sd").write_text(text)
+    with pytest.raises(ModelError) as refused:
+        simulate(tmp_path / "n.sd", output=tmp_path / "n.h5", backend="numpy")
+    found = next(d for d in refused.value.diagnostics if d.code == "E903")
+    assert "'C12'" in found.message
+    assert "#" not in f"{found.message} {found.help}"
+    lines = text.splitlines()
+    assert "init R12.f" in [lines[r.place.start[0] - 1].strip()[:10] for r in found.related]
