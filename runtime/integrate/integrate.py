@@ -104,7 +104,7 @@ class Integration:
         contacts = request.events.contacts if request.events is not None else ()
         rated = bool(contacts) and "dynamics_rate" in system.description.blocks
         self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
-        # the least change shares what is left open: flows between contacts, potentials where all laws at a node are faint
+        # the least change shares what is open: flows between contacts, potentials where all laws at a node are faint
         if request.events is None and not self._steep_balances:
             sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
             # steep laws magnify what a basis leaves
