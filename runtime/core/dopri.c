@@ -13,6 +13,8 @@
 #define FAILURES 12      /* of slopes in one step */
 #define BOUNDARY 6.1     /* of h |lambda|: where the region of stability ends */
 #define STIFF 15         /* steps at the boundary that show stiffness */
+#define SOON 8           /* the same where the end is FAR times further than patience lasts */
+#define FAR 10.0
 #define SMOOTH 6         /* steps inside it that show the contrary */
 #define REFUSED 50       /* steps refused beyond those taken: kinks that the method cannot cross with its order */
 
@@ -227,7 +229,8 @@ static int is_stiff(sd_dopri *dopri)
     } else if (++dopri->smooth == SMOOTH) {
         dopri->stiff = 0;
     }
-    return dopri->stiff >= STIFF && (dopri->t_end - dopri->t) / dopri->h > dopri->patience;
+    double steps = (dopri->t_end - dopri->t) / dopri->h;
+    return dopri->stiff >= (steps > FAR * dopri->patience ? SOON : STIFF) && steps > dopri->patience;
 }
 
 /* the new point, and the next step's size */
