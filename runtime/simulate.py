@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.integrate.accuracy import Achieved, control, law_of
+from sysdyn.runtime.integrate.accuracy import Achieved, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
 from sysdyn.runtime.integrate.runs import LONG, Runs, Samples, Way
 from sysdyn.runtime.integrate.second_opinion import confirmed
@@ -123,8 +123,7 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
 
 
 def _achieved(runs: Runs, options: Options, *, doubted: bool = False) -> Achieved:
-    law = law_of(runs.method, steep=bool(runs.system.form.scales))
-    return control(runs.sampled, _targets(runs, options), law, doubted=doubted, first=options.first)
+    return control(runs.sampled, _targets(runs, options), runs.way.law, doubted=doubted, first=options.first)
 
 
 def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:

@@ -26,8 +26,8 @@ from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.pieces import Pieces
 from sysdyn.runtime.integrate.request import LONGEST, ON_UNDERLYING, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import Segment, segments
-from sysdyn.runtime.integrate.underlying import Accelerations, Underlying, underlying_form
-from sysdyn.runtime.integrate.unknown_roles import Roles, roles, without_rate
+from sysdyn.runtime.integrate.underlying import Underlying
+from sysdyn.runtime.integrate.unknown_roles import Roles, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model import core_structures as structures
 from sysdyn.runtime.model.description import Floats, Ints
@@ -88,8 +88,7 @@ class Integration:
         self.roles: Roles = origin.roles
         self.underlying: Underlying | None = None
         if request.method in ON_UNDERLYING:
-            self._solved, _ = underlying_form(system, start)
-            self.roles = without_rate(self.roles, Accelerations(self._solved).without_rate)
+            self._solved, self.roles = origin.explicit
         self._carries, self._resolved = self.roles.state, np.zeros(system.unknowns)
         # a tolerance below what round-off leaves open is one that no step meets
         self._least = origin.least / max(request.rtol, 1e-15)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.metric import light
-from sysdyn.runtime.integrate.unknown_roles import Roles, roles
+from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
+from sysdyn.runtime.integrate.unknown_roles import Roles, roles, without_rate
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import magnitudes, unresolved
 from sysdyn.runtime.model.system import System
@@ -25,7 +26,7 @@ class Origin:
     """
 
     def __init__(self, system: System, start: ConsistentState, index: int) -> None:
-        self.system, self.t = system, start.t
+        self.system, self.start, self.t = system, start, start.t
         self.y, self.rate = start.for_form(system)
         self.jy, self.jyd = system.jacobian(start.t, self.y, self.rate)
         self.yd = np.where(system.differential(self.jyd), self.rate, 0.0)
@@ -33,6 +34,7 @@ class Origin:
         self.least = np.where(system.are("q", "f"), UNRESOLVED * unresolved(system, self.y, self.jy), 0.0)
         self._sized: tuple[float, tuple[Floats, float]] | None = None
         self._light: NDArray[np.bool_] | None = None
+        self._explicit: tuple[System, Roles] | None = None
         self.kept: Roles | None = None
         """Roles of what is left where unknowns leave the runs (condense/)."""
 
@@ -49,6 +51,14 @@ class Origin:
         if self._light is None:
             self._light = light(self.system, self.jy, self.jyd)
         return self._light
+
+    @property
+    def explicit(self) -> tuple[System, Roles]:
+        """What is solved for the slopes, and the roles where flows without a rate are solved for too; of form "0"."""
+        if self._explicit is None:
+            solved, _ = underlying_form(self.system, self.start)
+            self._explicit = solved, without_rate(self.roles, Accelerations(solved).without_rate)
+        return self._explicit
 
     def weighted(self) -> None:
         """The entries of the Jacobian anew: its rows q' - f have other factors."""

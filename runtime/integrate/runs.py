@@ -72,6 +72,11 @@ class Way:
     name: str
     reason: str = ""
 
+    @property
+    def law(self) -> accuracy.Law:
+        """How its errors follow its tolerance."""
+        return accuracy.law_of(self.method, steep=bool(self.system.form.scales))
+
 
 @dataclass(frozen=True, slots=True)
 class Samples:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from sysdyn.runtime.integrate.accuracy import Achieved, difference, law_of
+from sysdyn.runtime.integrate.accuracy import Achieved, difference
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.integrate.runs import Runs, Way
 from sysdyn.runtime.model.description import Floats
@@ -26,8 +26,7 @@ def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
     import tempfile
 
     way: Way = replace(runs.way, method=OTHER[runs.method])
-    law = law_of(way.method, steep=bool(way.system.form.scales))
-    wanted = float(np.min(target, initial=1.0))
+    law, wanted = way.law, float(np.min(target, initial=1.0))
     tolerance = max(law.ratio * law.tolerance(wanted if wanted < 1.0 else 1e-4), law.finest)
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
         options = replace(runs.options, output=Path(folder) / "second.h5", watch=None)

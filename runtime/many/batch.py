@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import accuracy
-from sysdyn.runtime.integrate.accuracy import STRETCH, Law, law_of
+from sysdyn.runtime.integrate.accuracy import STRETCH, Law
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
@@ -144,7 +144,7 @@ class Batch:
         self.system, self.start = way.system, start
         self.columns = tuple(column.name for column in self.runs.columns)
         self._thin = np.ascontiguousarray([] if thin is None or keep != TRACES else thin, dtype=np.int32)
-        law = law_of(way.method, steep=bool(way.system.form.scales))
+        law = way.law
         self._targets = self._wanted()
         finest = float(np.min(self._targets, initial=1.0))
         tolerance = law.tolerance(finest if finest < 1.0 else 1e-4)
