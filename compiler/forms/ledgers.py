@@ -20,6 +20,7 @@ from sysdyn.compiler.forms.efforts import Effort
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, local_variables, summands
 from sysdyn.dsl.model.expression import Node, add, const, derivative, is_const, scale, var, variables
+from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 
@@ -136,17 +137,11 @@ def _varying(entry: Entry) -> Entry | None:
 
 def _parts(model: EnergyModel, entries: Sequence[Entry]) -> dict[str, str]:
     """The first coordinate of each coordinate's part."""
-    head = {c.name: c.name for c in model.coordinates}
-
-    def find(name: str) -> str:
-        while head[name] != name:
-            head[name] = head[head[name]]
-            name = head[name]
-        return name
+    parts = Joined[str]()
 
     def join(names: Sequence[str]) -> None:
         for name in names[1:]:
-            head[find(name)] = find(names[0])
+            parts.join(names[0], name)
 
     kinds = (model.mirror.coordinate, model.mirror.rate)
     for row in model.rows:
@@ -159,7 +154,7 @@ def _parts(model: EnergyModel, entries: Sequence[Entry]) -> dict[str, str]:
         owners += entry.owners
     for owners in statements.values():
         join(owners)
-    return {name: find(name) for name in head}
+    return {c.name: parts.first(c.name) for c in model.coordinates}
 
 
 def _of_states(model: EnergyModel) -> Iterator[Ledger]:

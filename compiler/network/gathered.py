@@ -10,12 +10,14 @@ each element of a family, so that nothing else shows.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.along import rewritten
 from sysdyn.compiler.network.skeleton import Shaped, filled, shaped
 from sysdyn.dsl.model.expression import Node, add, const, index, param, substitute, var, variables
+from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Initial, Loop, Network, NodeFamily, Parameter, Terminal
 from sysdyn.dsl.model.units import Unit, si
 from sysdyn.dsl.text.diagnostics import Place
@@ -59,7 +61,7 @@ def gathered(network: Network) -> Network:
 def _free(network: Network) -> set[str]:
     """Scalar branches between nodes that nothing but expressions names."""
     held = {name for c in network.couplings for name in (c.first, c.second)} | {s.element for s in network.switches}
-    held |= {n for n, count in _counted(b.name for b in network.branches) if count > 1}
+    held |= {n for n, count in Counter(b.name for b in network.branches).items() if count > 1}
     return {
         b.name
         for b in network.branches
@@ -69,16 +71,9 @@ def _free(network: Network) -> set[str]:
     }
 
 
-def _counted(names: Iterable[str]) -> Iterable[tuple[str, int]]:
-    found: dict[str, int] = {}
-    for name in names:
-        found[name] = found.get(name, 0) + 1
-    return found.items()
-
-
 def _sites(network: Network, shapes: dict[str, Shaped]) -> dict[str, Site]:
     """Where each node stands: among those of its connected part that ends of the same branches touch."""
-    parts = _Parts()
+    parts = Joined[str]()
     touched: dict[str, list[tuple[object, ...]]] = {}
     for b in network.branches:
         names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
@@ -99,29 +94,6 @@ def _sites(network: Network, shapes: dict[str, Shaped]) -> dict[str, Site]:
         found[node.name] = family, size.get(family, 0)
         size[family] = size.get(family, 0) + 1
     return {name: site for name, site in found.items() if size[site[0]] >= RUN}
-
-
-class _Parts:
-    """Connected parts, grounds apart."""
-
-    def __init__(self) -> None:
-        self._head: dict[str, str] = {}
-
-    def first(self, name: str) -> str:
-        """The name that stands for a part."""
-        path = []
-        while name in self._head:
-            path.append(name)
-            name = self._head[name]
-        for below in path:
-            self._head[below] = name
-        return name
-
-    def join(self, a: str, b: str) -> None:
-        """What is joined is one part."""
-        a, b = self.first(a), self.first(b)
-        if a != b:
-            self._head[b] = a
 
 
 def _runs(network: Network, shapes: dict[str, Shaped], sites: dict[str, Site]) -> Iterator[_Run]:

@@ -20,6 +20,7 @@ from sysdyn.compiler.network.primal.overlaps import count, ranges_of
 from sysdyn.compiler.network.primal.rings import closes, family
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Network, Parameter, Shape, State
 
 
@@ -107,13 +108,7 @@ def _shape(branch: Branch) -> Shape:
 
 def _in_loops(stores: Sequence[Branch], sizes: Sizes) -> list[Branch]:
     """Stores of parts of the network in which a loop of them is closed, by families of nodes."""
-    part: dict[str, str] = {}
-
-    def root(name: str) -> str:
-        while part.setdefault(name, name) != name:
-            name = part[name]
-        return name
-
+    parts = Joined[str]()
     ends = {id(b): tuple(family(b, t) for t in (b.plus, b.minus)) for b in stores}
     within: dict[str, int] = {}
     beside: dict[str, int] = {}
@@ -125,14 +120,12 @@ def _in_loops(stores: Sequence[Branch], sizes: Sizes) -> list[Branch]:
             continue
         for end in (one, other):
             beside[end] = beside.get(end, 0) + count(ranges_of(b.loops, sizes, b.place))
-        if root(one) == root(other):
+        if not parts.join(one, other):
             closed.add(one)
-        else:
-            part[root(one)] = root(other)
     # a chain within a family closes a loop with another one, or with two ways out of it
     closed |= {name for name, number in within.items() if number > 1 or beside.get(name, 0) > 1}
-    roots = {root(name) for name in closed}
-    return [b for b in stores if root(ends[id(b)][0]) in roots]
+    found = {parts.first(name) for name in closed}
+    return [b for b in stores if parts.first(ends[id(b)][0]) in found]
 
 
 def _momentum(branch: Branch, initials: Sequence[Initial]) -> Node | None:

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Expectation, Observation
 from sysdyn.dsl.text.diagnostics import Place, Report
 
@@ -55,28 +56,22 @@ def _effort(node: Node) -> str | None:
 def _loose(model: Elaborator) -> list[tuple[str, ...]]:
     """Families of nodes of common effort, by parts of the network that nothing joins to ground."""
     parts = model.parts
-    parent = {n.name: n.name for n in parts.nodes if n.domain.common == "effort"} | {"": ""}
-
-    def root(name: str) -> str:
-        while parent[name] != name:
-            parent[name] = parent[parent[name]]
-            name = parent[name]
-        return name
-
+    names = dict.fromkeys([*(n.name for n in parts.nodes if n.domain.common == "effort"), ""])
+    joined = Joined[str]()
     for branch in parts.branches:
         ends = _ends(branch)
-        if all(e in parent for e in ends):
-            parent[root(ends[0])] = root(ends[1])
+        if all(e in names for e in ends):
+            joined.join(*ends)
     tied = [c.expression for c in parts.constraints] + [e.expression for e in parts.energies]
     tied += [n for w in parts.works for n in (w.effort, w.on)]
     for node in ex.topological(tied):
         family = _effort(node)
-        if family in parent and family is not None:
-            parent[root(family)] = root("")
+        if family in names and family is not None:
+            joined.join(family, "")
     groups: dict[str, list[str]] = {}
-    for name in parent:
-        groups.setdefault(root(name), []).append(name)
-    return [tuple(names) for names in groups.values() if "" not in names]
+    for name in names:
+        groups.setdefault(joined.first(name), []).append(name)
+    return [tuple(part) for part in groups.values() if "" not in part]
 
 
 def _ends(branch: Branch) -> tuple[str, str]:

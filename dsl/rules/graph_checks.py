@@ -9,6 +9,7 @@ from dataclasses import replace
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Place, Report
@@ -74,19 +75,12 @@ def _mentioned(model: Elaborator) -> frozenset[str]:
 def _loops_of_sources(model: Elaborator, report: Report) -> None:
     """E411: sources that fix one quantity twice: effort sources between common-effort nodes, flow sources dually."""
     groups: dict[tuple[str, str], Branch] = {}
-    parent: dict[object, object] = {}
-
-    def root(x: object) -> object:
-        while parent.setdefault(x, x) is not x and parent[x] != x:
-            x = parent[x]
-        return x
-
+    joined = Joined[tuple[str, str | None, tuple[Node, ...]]]()
     for branch in model.parts.branches:
         if branch.kind != branch.domain.common or branch.loops or branch.plus is None or branch.minus is None:
             continue
         ends = [(branch.domain.name, t.node, t.at) for t in (branch.plus, branch.minus)]
-        a, b = (root(e) for e in ends)
-        if a == b:
+        if not joined.join(*ends):
             what = "effort" if branch.kind == "effort" else "flow"
             others = [g.name for (kind, _), g in groups.items() if kind == branch.domain.name]
             message = (
@@ -94,7 +88,6 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
             )
             place = replace(branch.place, element=branch.name)
             report.error("E411", message, place)
-        parent[a] = b
         groups[branch.domain.name, branch.name] = branch
     _cutsets(model, report)
 
