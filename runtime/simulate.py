@@ -30,6 +30,9 @@ from sysdyn.values import dataclass
 
 NOT_STIFF = "not stiff"
 """Why method auto stays with the explicit method."""
+SMALL = 100
+"""Unknowns up to which steep laws are the bdf's: where they turn, Newton's method holds the steps of any method, and a
+step of the bdf is the cheapest; of larger systems factors and rows are dear, and radau takes the fewest steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,18 +135,23 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     Lightly damped oscillations hold the bdf of orders 3 to 5, which are not A-stable, to steps of the fastest of them:
     a line of 10000 sections takes it 25 times the work of radau.  Stability holds the dopri where a model is stiff.
     """
-    doubted = False
+    doubted, steep, missed = False, bool(runs.system.form.scales), None
     while True:
-        runs.patience = LONG if runs.method == "bdf" and others else None
+        runs.patience = LONG if runs.method == "bdf" and others and not steep else None
         try:
-            return _achieved(runs, options, doubted=doubted)
+            achieved = _achieved(runs, options, doubted=doubted)
+            if achieved.met or not (steep and others):
+                return achieved
+            missed, why = achieved, f"{runs.method} does not reach the accuracy"
         except SolverFailure as failure:
             limited = failure.cause == "max_steps" and runs.most_steps == options.max_steps
             if limited or failure.cause in ("max_wall", "memory") or not others:
-                raise
-            doubted = failure.cause not in ("max_steps", "stiff")
-            runs.take(replace(others[0], reason=_left(runs.method, failure)))
-            others = others[1:]
+                if missed is None or not runs.done:
+                    raise
+                return replace(missed, error_estimate=None, below_round_off=False)
+            doubted, why = failure.cause not in ("max_steps", "stiff"), _left(runs.method, failure)
+        runs.take(replace(others[0], reason=why))
+        others = others[1:]
 
 
 def counted(
@@ -227,8 +235,11 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
         return replace(way, reason=f"index {way.name} was asked for"), other
     if options.events and not options.events.bends:
         return replace(way, reason="events"), other
-    if way.system.form.scales or written.left_out:
-        return replace(way, reason="steep laws" if way.system.form.scales else "redundant constraints"), other
+    if way.system.form.scales:
+        steep = replace(way, reason="steep laws")
+        return (replace(other, reason="steep laws"), way) if way.system.unknowns <= SMALL else (steep, other)
+    if written.left_out:
+        return replace(way, reason="redundant constraints"), other
     system = written.another("0")
     missing = rateless(system, start)
     if missing:

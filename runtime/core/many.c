@@ -11,11 +11,10 @@
 #define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
 #define SAFETY 2.5
 #define AIM 2.0
-#define LEFT 0.3
+#define LEFT 0.1
 #define SLOWEST 0.75
 #define STRETCH 1.5
 #define SHORT 60
-#define FAR 1e-2
 #define UNSEEN 100.0
 #define SHORT_CREDIT 0.75
 #define FIRST_DROP 1e-2
@@ -392,9 +391,9 @@ static int parted(const sd_many *many, const sd_pass *pass, const sd_samples *co
     return 0;
 }
 
-static double shrink(double power, double step)
+static double shrink(double power, double step, double far)
 {
-    double ratio = fmax(pow(10.0, -power * step), pow(FAR, power));
+    double ratio = fmax(pow(10.0, -power * step), pow(far, power));
     return SAFETY * ratio / (1.0 - ratio);
 }
 
@@ -452,7 +451,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             double credit = taken >= SHORT ? many->credit : fmin(many->credit, SHORT_CREDIT);
             if (before >= 0.0 && over > 0.0 && isfinite(before))
                 power = fmax(0.3, fmin(1.0, log10(before / over) / step_before));
-            part = shrink(power < 0.0 ? credit : fmin(power, credit), step);
+            part = shrink(power < 0.0 ? credit : fmin(power, credit), step, many->far);
         }
         *estimate = apart * part;
         if (over * part <= 1.0 && !(next > LOOSE && parted(many, &many->passes[1], last, there))) {

@@ -40,7 +40,7 @@ WORTH = 0.3
 SHORT, SHORT_CREDIT = 60, 0.75
 """Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
 FIRST_DROP = 1e-2
-AIM, LEFT = 2.0, 0.3
+AIM, LEFT = 2.0, 0.1
 """How far below what was asked the next run aims, and the most that is left of its tolerance."""
 SLOWEST = 0.75
 """The least power with which errors are taken to fall when the next tolerance is chosen."""
@@ -68,7 +68,8 @@ class Law:
     gain, power: most runs' estimates stay below gain * tolerance^power; credit: largest power with which the finer
     run's error is believed to be smaller; finest: the smallest tolerance that makes sense; growth: power of the steps
     that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors;
-    ratio: of the tolerances of the first two runs; loosest: tolerance of a draft.
+    ratio: of the tolerances of the first two runs; loosest: tolerance of a draft; most: steps with which the gain
+    grows; far: of the tolerance of the run before, beyond which nothing more is credited.
     """
 
     gain: float
@@ -78,10 +79,12 @@ class Law:
     growth: float = 0.0
     ratio: float = 0.1
     loosest: float = LOOSEST
+    most: int = MANY_STEPS
+    far: float = FAR
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
-        gain = self.gain * (min(max(steps, FEW_STEPS), MANY_STEPS) / FEW_STEPS) ** self.growth
+        gain = self.gain * (min(max(steps, FEW_STEPS), self.most) / FEW_STEPS) ** self.growth
         return float(np.clip((wanted / gain) ** (1.0 / self.power), self.finest, COARSEST))
 
 
@@ -94,14 +97,18 @@ LAWS = {
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
 }
-STEEP = replace(LAWS["radau"], loosest=1e-3)
-"""Of radau where laws are steep: Newton holds its steps more than a loose tolerance does (transistor: 1e-2 and 1e-3 are
-equally far off)."""
+STEEP = {
+    # Newton holds its steps more than a loose tolerance does (transistor: 1e-2 and 1e-3 are equally far off)
+    "radau": replace(LAWS["radau"], loosest=1e-3),
+    # its error is 0.02 to 0.45 of steps times tolerance, however many steps: rectifiers, diodes, transistors
+    "bdf": Law(40.0, 0.87, 0.75, 2e-14, growth=1.0, ratio=0.1, loosest=1e-4, most=10_000, far=3e-3),
+}
+"""Where laws are steep."""
 
 
 def law_of(method: str, *, steep: bool) -> Law:
     """What follows from the tolerance of a method on a model."""
-    return STEEP if steep and method == "radau" else LAWS[method]
+    return STEEP.get(method, LAWS[method]) if steep else LAWS[method]
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,11 +212,11 @@ def parted(coarse: Sampled, fine: Sampled) -> bool:
     return bool((away & (np.abs(values[0]) > fine.noise)).any())
 
 
-def _shrink(power: float, step: float) -> float:
-    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger; beyond FAR
+def _shrink(power: float, step: float, far: float) -> float:
+    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger; beyond `far`
     nothing more is credited.
     """
-    ratio = max(10.0 ** (-power * step), FAR**power)
+    ratio = max(10.0 ** (-power * step), far**power)
     return float(SAFETY * ratio / (1.0 - ratio))
 
 
@@ -270,7 +277,7 @@ class _Estimate:
                 self._power = float(np.clip(np.log10(over_before / over) / step_before, 0.3, 1.0))
         if shrink is None:
             credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, SHORT_CREDIT)
-            shrink = _shrink(credit if self._power is None else min(self._power, credit), step)
+            shrink = _shrink(credit if self._power is None else min(self._power, credit), step, self.law.far)
         self._before = over, step
         self.over, self.apart = over * shrink, apart * shrink
         return apart
@@ -303,7 +310,7 @@ def control(
     number = 1
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
-    tolerance = max(min(tolerance, law.ratio * last.tolerance), FAR * last.tolerance, law.finest)
+    tolerance = max(min(tolerance, law.ratio * last.tolerance), law.far * last.tolerance, law.finest)
     while number < RUNS:
         number += 1
         now = _finer(run, last, tolerance, longest, law, compared=bool(np.isfinite(estimate.over)))

@@ -365,7 +365,7 @@ class Batch:
         many.units, many.known = len(units), int(runs.common is not None)
         asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
         many.late = min(accuracy.TIMING, accuracy.SHARE * asked) * span
-        many.power, many.credit, many.finest = law.power, law.credit, law.finest
+        many.power, many.credit, many.finest, many.far = law.power, law.credit, law.finest, law.far
         many.tolerance[0], many.tolerance[1] = draft, fine
         many.max_steps = min(options.max_steps or 2**62, 2**62)
         many.energy = allowed(options)

@@ -622,7 +622,7 @@ class Many(c.Structure):
         ("passes", Pass * 2),
         *[(name, _P) for name in ["column", "target", "unit", "unit_of"]],
         *[(name, _I) for name in ["units", "known"]],
-        *[(name, _D) for name in ["late", "power", "credit", "finest"]],
+        *[(name, _D) for name in ["late", "power", "credit", "finest", "far"]],
         ("tolerance", _D * 2),
         ("max_steps", _L),
         ("energy", _D),
