@@ -22,6 +22,7 @@
 #define MUCH 0.3
 #define BEND 4.0
 #define LOOSE 1e-5
+#define TAME 1e-6
 #define ROUND_OFF (64.0 * DBL_EPSILON)
 #define NOTHING 1e-12    /* of the largest of the same unit: what is left of a zero (model/scales.py) */
 #define GROUP 1e-3       /* of the largest of its like: the least magnitude of a zero */
@@ -454,7 +455,8 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             part = shrink(power < 0.0 ? credit : fmin(power, credit), step, many->far);
         }
         *estimate = apart * part;
-        if (over * part <= 1.0 && !(next > LOOSE && parted(many, &many->passes[1], last, there))) {
+        int away = next > LOOSE && parted(many, &many->passes[1], last, there);
+        if (over * part <= 1.0 && !away) {
             if (!balanced(many, many->passes[1].run->ledgers))
                 return SD_MANY_ENERGY;
             int32_t at = 0;
@@ -476,6 +478,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         double drop = pow(1.0 / fmax(AIM * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
         tolerance = next;
         next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, LEFT)) * next, many->finest);
+        next = away ? fmin(next, TAME) : next;
         longest /= STRETCH;
         sd_samples *swap = last;
         if (many->known) {

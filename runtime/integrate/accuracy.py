@@ -51,7 +51,9 @@ TIMING, SHARE = 1e-9, 1e-3
 """Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
 PARTED, MUCH = 10.0, 0.3
 BEND = 4.0
-LOOSE = 1e-5
+LOOSE, TAME = 1e-5, 1e-6
+"""At tolerances above the first two runs may have run away alike (Robertson's falls through zero); the second is tried
+next where they have, or where Newton's failures say so before."""
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 LARGEST = float(np.finfo(np.float64).max)
@@ -118,7 +120,7 @@ class Sampled:
     is zero to round-off; between [instants]: between an event of this run and the same one of the run before it; late
     [instants, quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep
     front no more is asked; there: values and late at instants of its own, for the run behind it (None: those are the
-    same).
+    same); strained: Newton failed so often that the tolerance says little of its steps.
     """
 
     tolerance: float
@@ -129,6 +131,7 @@ class Sampled:
     between: NDArray[np.bool_] | None = None
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
+    strained: bool = False
 
     @property
     def own(self) -> tuple[Floats, Floats | float]:
@@ -311,6 +314,7 @@ def control(
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
     tolerance = max(min(tolerance, law.ratio * last.tolerance), law.far * last.tolerance, law.finest)
+    tolerance = min(tolerance, TAME) if last.strained else tolerance
     while number < RUNS:
         number += 1
         now = _finer(run, last, tolerance, longest, law, compared=bool(np.isfinite(estimate.over)))
@@ -319,12 +323,13 @@ def control(
         apart = estimate.compare(last, now)
         if now.steps == last.steps and apart < ROUND_OFF:
             return _shifted(run, now, target, number)
-        if estimate.over <= 1.0 and not (doubted and number == 2) and not parted(last, now):
+        away = parted(last, now)
+        if estimate.over <= 1.0 and not (doubted and number == 2) and not away:
             return _achieved(estimate.apart, True, number, now.tolerance)
         last, longest = now, longest / STRETCH
         if now.tolerance <= 1.01 * law.finest:
             break
-        tolerance = estimate.next_tolerance(now.tolerance)
+        tolerance = min(estimate.next_tolerance(now.tolerance), TAME if away else 1.0)
     return _achieved(estimate.apart, False, number, last.tolerance)
 
 

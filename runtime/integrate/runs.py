@@ -29,6 +29,8 @@ from sysdyn.values import dataclass
 
 LONG = 1000
 """Steps of the bdf after which method auto tries radau."""
+STRAINED = 0.5
+"""Part of its steps in which Newton may fail; of steep laws it does at any tolerance."""
 HELD = 100
 """Steps that a dopri which stability holds may still have to take before method auto tries another."""
 STIFF = 1e5
@@ -396,9 +398,10 @@ class Runs:
         span = self.options.t_end - self.options.t_start
         assert self.compared_at is not None
         between = beside(self.compared_at, jumps if last is None else last, jumps, span)
-        steps = finished.statistics.steps
+        counted = finished.statistics
+        strained = counted.newton_failures > STRAINED * counted.steps and not self.system.form.scales
         late = self._late(rows) if instants is not None else 0.0
-        found = Sampled(tolerance, values, sizes, steps, noise, between, late, there)
+        found = Sampled(tolerance, values, sizes, counted.steps, noise, between, late, there, strained)
         self.samplings = (*self.samplings[-1:], found)
         return found
 
