@@ -13,7 +13,6 @@ early and grows.  Two runs that took the same steps say nothing: a third takes s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,18 +98,15 @@ LAWS = {
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
 }
-STEEP = {
-    # Newton holds its steps more than a loose tolerance does (transistor: 1e-2 and 1e-3 are equally far off)
-    "radau": replace(LAWS["radau"], loosest=1e-3),
-    # its error is 0.02 to 0.45 of steps times tolerance, however many steps: rectifiers, diodes, transistors
-    "bdf": Law(40.0, 0.87, 0.75, 2e-14, growth=1.0, ratio=0.1, loosest=1e-4, most=10_000, far=3e-3),
-}
-"""Where laws are steep."""
+STEEP = Law(40.0, 0.87, 0.75, 2e-14, growth=1.0, ratio=0.1, loosest=1e-4, most=10_000, far=3e-3)
+"""Of the bdf where laws are steep: its error is 0.02 to 0.45 of steps times tolerance, however many steps (rectifiers,
+diodes, transistors).
+"""
 
 
 def law_of(method: str, *, steep: bool) -> Law:
     """What follows from the tolerance of a method on a model."""
-    return STEEP.get(method, LAWS[method]) if steep else LAWS[method]
+    return STEEP if steep and method == "bdf" else LAWS[method]
 
 
 @dataclass(frozen=True, slots=True)
