@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define SAFETY 0.9
+#define BOLD 2.0         /* of the first step: what it may be longer than for a coefficient of 1 */
 #define GROWTH 6.0       /* of the step at most; it shrinks to 1/3 at most */
 #define SHRINK 0.333
 #define MEMORY 0.03      /* exponent of the last step's error (PI control) */
@@ -116,10 +117,10 @@ void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd
     set_weights(dopri);
     double span = dopri->t_end - t;
     double change = dopri->tested ? dopri->rtol * sqrt(squares(dopri, dopri->yd, NULL) / dopri->tested) : 0.0;
-    if (!(h > 0.0)) { /* (h y'/y)^8 within tolerance */
-        h = 1e-2 * span;
+    if (!(h > 0.0)) { /* (h y'/y)^8 within tolerance, but for a coefficient that is small */
+        h = 0.1 * span;
         if (isfinite(change) && change > 0.0)
-            h = fmin(h, pow(dopri->rtol, 0.125) / change);
+            h = fmin(h, BOLD * pow(dopri->rtol, 0.125) / change);
         h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
     }
     dopri->h = fmin(dopri->fixed_h > 0.0 ? dopri->fixed_h : h, dopri->h_max);
