@@ -28,6 +28,8 @@ from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
+NO_FURTHER = 1.0 + 1e-9
+"""Of the instant at which a method stopped: another that stops there says nothing new."""
 NOT_STIFF = "not stiff"
 """Why method auto stays with the explicit method."""
 SMALL = 100
@@ -148,6 +150,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     """
     doubted, steep = False, bool(runs.system.form.scales)
     missed: Achieved | None = None
+    stopped: SolverFailure | None = None
     while True:
         runs.patience = LONG if runs.method == "bdf" and others and not steep else None
         try:
@@ -159,10 +162,13 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
         except SolverFailure as failure:
             limited = failure.cause == "max_steps" and runs.most_steps == options.max_steps
             if limited or failure.cause in ("max_wall", "memory") or not others:
-                if missed is None or not runs.done:
-                    raise
-                return missed
+                if missed is not None and runs.done:
+                    return missed
+                if stopped is not None and failure.time <= NO_FURTHER * stopped.time:
+                    raise stopped from None
+                raise
             doubted, why = failure.cause not in ("max_steps", "stiff"), _left(runs.method, failure)
+            stopped = failure if doubted else stopped
         runs.take(replace(others[0], reason=why))
         others = others[1:]
 

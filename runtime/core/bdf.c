@@ -37,7 +37,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     if (!bdf)
         return NULL;
     size_t n = (size_t)system->unknowns, nnz = (size_t)system->entries, m = n > 0 ? n : 1;
-    bdf->memory = calloc((SD_MAX_ORDER + 2 + 11) * m + 3 * (nnz + 1), sizeof(double));
+    bdf->memory = calloc((SD_MAX_ORDER + 2 + 12) * m + 3 * (nnz + 1), sizeof(double));
     if (!bdf->memory) {
         free(bdf);
         return NULL;
@@ -45,9 +45,9 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     double *next = bdf->memory;
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
-    double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->delta,
+    double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->test_weight, &bdf->delta,
                           &bdf->predicted, &bdf->predicted_d, &bdf->scale, &bdf->terms, &bdf->rate};
-    for (int i = 0; i < 11; i++, next += m)
+    for (int i = 0; i < 12; i++, next += m)
         *vectors[i] = next;
     bdf->jy = next;
     bdf->jyd = bdf->jy + nnz + 1;
@@ -86,14 +86,22 @@ static void set_weights(sd_bdf *bdf)
     }
 }
 
-/* Newton's weights, and magnitudes of the columns: index-2 unknowns and index-3 multipliers with powers of h */
-static void set_newton_weights(sd_bdf *bdf)
+/* the weights of a step of length h, in Newton's test and in that of the error */
+static void set_step_weights(sd_bdf *bdf)
 {
+    const double power[3] = {1.0, bdf->h, bdf->h * bdf->h}, test[3] = {0.0, 1.0, bdf->h};
     for (int32_t i = 0; i < bdf->n; i++) {
-        double power = bdf->power[i] == 0 ? 1.0 : bdf->power[i] == 1 ? bdf->h : bdf->h * bdf->h;
-        bdf->newton_weight[i] = bdf->weight[i] * power;
-        bdf->scale[i] = bdf->magnitude[i] / power;
+        bdf->newton_weight[i] = bdf->weight[i] * power[bdf->power[i]];
+        bdf->test_weight[i] = bdf->weight[i] * test[bdf->test[i] + 1];
     }
+}
+
+/* magnitudes of the columns: index-2 unknowns and index-3 multipliers with powers of h */
+static void set_scales(sd_bdf *bdf)
+{
+    const double power[3] = {1.0, 1.0 / bdf->h, 1.0 / (bdf->h * bdf->h)};
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->scale[i] = bdf->magnitude[i] * power[bdf->power[i]];
 }
 
 void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h)
@@ -106,6 +114,7 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
     memcpy(bdf->phi[0], y, (size_t)bdf->n * sizeof *y);
     bdf->h = 1.0;
     set_weights(bdf);
+    set_step_weights(bdf);
     bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, yd, bdf->t_end - t);
     bdf->h = fmin(bdf->h, bdf->h_max);
     for (int32_t i = 0; i < bdf->n; i++)
@@ -159,7 +168,7 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
     }
     for (int32_t e = 0; e < bdf->system->entries; e++)
         bdf->g[e] = bdf->jy[e] + bdf->cj * bdf->jyd[e];
-    set_newton_weights(bdf);
+    set_scales(bdf);
     bdf->ready = 0;
     int failed = sd_linear_factor(bdf->linear, bdf->g, bdf->scale);
     if (failed) {
@@ -175,12 +184,12 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
 
 static double newton_norm(const sd_bdf *bdf, const double *x)
 {
-    double sum = 0.0;
+    double sum[4] = {0.0, 0.0, 0.0, 0.0}; /* one would wait for itself */
     for (int32_t i = 0; i < bdf->n; i++) {
         double v = x[i] * bdf->newton_weight[i];
-        sum += v * v;
+        sum[i % 4] += v * v;
     }
-    return bdf->n ? sqrt(sum / bdf->n) : 0.0;
+    return bdf->n ? sqrt((sum[0] + sum[1] + sum[2] + sum[3]) / bdf->n) : 0.0;
 }
 
 /* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an
@@ -232,7 +241,7 @@ static int iterate(sd_bdf *bdf, double t)
             first = size;
             converged = size <= 100.0 * DBL_EPSILON;
         } else {
-            double rate = pow(size / first, 1.0 / m);
+            double rate = m == 1 ? size / first : pow(size / first, 1.0 / m);
             if (rate > SLOW && size > STAGNANT)
                 return SD_NEWTON;
             converged = rate > SLOW;
@@ -255,7 +264,7 @@ static int correct(sd_bdf *bdf)
 {
     double t = bdf->t + bdf->h;
     bdf->fresh_jacobian = 0;
-    set_newton_weights(bdf);
+    set_step_weights(bdf);
     for (;;) {
         int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->taken == 0 || bdf->fresh_jacobian < 0;
         if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {

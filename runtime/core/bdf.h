@@ -36,7 +36,7 @@ typedef struct sd_bdf {
     double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
         gamma[SD_MAX_ORDER + 2];
     double *phi[SD_MAX_ORDER + 2];
-    double *y, *yd, *ee, *weight, *newton_weight, *delta, *predicted, *predicted_d, *scale;
+    double *y, *yd, *ee, *weight, *newton_weight, *test_weight, *delta, *predicted, *predicted_d, *scale;
     double *terms, *rate, *jy, *jyd, *g, *memory;
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
@@ -61,7 +61,7 @@ void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd);
 void sd_bdf_coefficients(sd_bdf *bdf, double *ck);
 void sd_bdf_restore(sd_bdf *bdf);
 /* controller.c */
-double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *plus, const double *minus);
+double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus);
 int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next);
 void sd_bdf_accept(sd_bdf *bdf, int32_t order_next);
 double sd_bdf_first_step(const sd_bdf *bdf, const double *yd, double span);

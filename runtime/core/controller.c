@@ -5,45 +5,57 @@
 #include <math.h>
 #include <string.h>
 
-/* Root mean square of (x + plus - minus) in the error weights over the tested unknowns; plus, minus may be NULL. */
-double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *plus, const double *minus)
+/* Root mean square over the tested unknowns, of four partial sums: one would wait for itself. */
+static double root(const sd_bdf *bdf, const double *sum)
 {
-    double sum[4] = {0.0, 0.0, 0.0, 0.0}, h = bdf->h; /* four at once: one sum would wait for itself */
+    return bdf->tested ? sqrt((sum[0] + sum[1] + sum[2] + sum[3]) / bdf->tested) : 0.0;
+}
+
+/* Root mean square of x - minus (NULL: x) in the error weights. */
+double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus)
+{
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
     for (int32_t i = 0; i < bdf->n; i++) {
-        double v = x[i] + (plus ? plus[i] : 0.0) - (minus ? minus[i] : 0.0);
-        v = bdf->test[i] < 0 ? 0.0 : v * (bdf->test[i] ? bdf->weight[i] * h : bdf->weight[i]);
+        double v = (minus ? x[i] - minus[i] : x[i]) * bdf->test_weight[i];
         sum[i % 4] += v * v;
     }
-    return bdf->tested ? sqrt((sum[0] + sum[1] + sum[2] + sum[3]) / bdf->tested) : 0.0;
+    return root(bdf, sum);
+}
+
+/* Norms of ee, ee + phi[k] and ee + phi[k] + phi[k-1]: corrections at the orders k, k - 1, k - 2. */
+static void lower_orders(const sd_bdf *bdf, double *norm)
+{
+    int32_t k = bdf->order;
+    const double *ee = bdf->ee, *one = bdf->phi[k], *two = bdf->phi[k - 1], *weight = bdf->test_weight;
+    double sum[3][4] = {{0.0}};
+    for (int32_t i = 0; i < bdf->n; i++) {
+        double a = ee[i], b = a + one[i], c = b + two[i], w = weight[i];
+        sum[0][i % 4] += a * w * (a * w);
+        sum[1][i % 4] += b * w * (b * w);
+        sum[2][i % 4] += c * w * (c * w);
+    }
+    for (int j = 0; j < 3; j++)
+        norm[j] = root(bdf, sum[j]);
 }
 
 /* Error of the step and the order that promises more (never a higher one here).  1: the step passes. */
 int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next)
 {
     int32_t k = bdf->order;
-    double size = sd_bdf_norm(bdf, bdf->ee, NULL, NULL);
-    double here = bdf->sigma[k] * size, term = (k + 1) * here;
+    double norm[3];
+    lower_orders(bdf, norm);
+    double here = bdf->sigma[k] * norm[0], term = (k + 1) * here;
     *order_next = k;
     bdf->error_next = here;
     if (k > 1) {
-        double below = bdf->sigma[k - 1] * sd_bdf_norm(bdf, bdf->ee, bdf->phi[k], NULL);
-        double term_below = k * below;
-        int lower;
-        if (k > 2) {
-            /* two orders down: ee + phi[k] + phi[k-1] */
-            for (int32_t i = 0; i < bdf->n; i++)
-                bdf->delta[i] = bdf->ee[i] + bdf->phi[k][i];
-            double term_two = (k - 1) * bdf->sigma[k - 2] * sd_bdf_norm(bdf, bdf->delta, bdf->phi[k - 1], NULL);
-            lower = fmax(term_below, term_two) <= term;
-        } else {
-            lower = term_below <= 0.5 * term;
-        }
-        if (lower) {
+        double below = bdf->sigma[k - 1] * norm[1], term_below = k * below;
+        double term_two = k > 2 ? (k - 1) * bdf->sigma[k - 2] * norm[2] : 0.0;
+        if (k > 2 ? fmax(term_below, term_two) <= term : term_below <= 0.5 * term) {
             *order_next = k - 1;
             bdf->error_next = below;
         }
     }
-    *error = ck * size;
+    *error = ck * norm[0];
     return *error <= 1.0;
 }
 
@@ -67,14 +79,15 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
     } else {
         int32_t order = order_next;
         if (order_next == k && k < bdf->max_order && k + 1 < bdf->ns && order_change != 1) {
-            double above = sd_bdf_norm(bdf, bdf->ee, NULL, bdf->phi[k + 1]) / (k + 2);
-            double term_above = (k + 2) * above;
-            double term = (k + 1) * bdf->sigma[k] * sd_bdf_norm(bdf, bdf->ee, NULL, NULL);
+            double norm[3], above = sd_bdf_norm(bdf, bdf->ee, bdf->phi[k + 1]) / (k + 2), below = 0.0;
+            lower_orders(bdf, norm); /* a projection has moved them */
+            double term_above = (k + 2) * above, term = (k + 1) * bdf->sigma[k] * norm[0];
             if (k == 1) {
                 if (term_above < 0.5 * term)
                     order = 2;
             } else {
-                double term_below = k * bdf->sigma[k - 1] * sd_bdf_norm(bdf, bdf->ee, bdf->phi[k], NULL);
+                below = bdf->sigma[k - 1] * norm[1];
+                double term_below = k * below;
                 if (term_below <= fmin(term, term_above))
                     order = k - 1;
                 else if (term_above < term)
@@ -83,7 +96,7 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
             if (order == k + 1)
                 error = above;
             else if (order == k - 1)
-                error = bdf->sigma[k - 1] * sd_bdf_norm(bdf, bdf->ee, bdf->phi[k], NULL);
+                error = below;
         }
         bdf->order = order;
         double ratio = pow(2.0 * error + 1e-4, -1.0 / (order + 1));
@@ -112,7 +125,7 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
  * as y'^2 / y: h = sqrt(rtol) y / y' (the error test cuts it where that was too bold). */
 double sd_bdf_first_step(const sd_bdf *bdf, const double *yd, double span)
 {
-    double change = sqrt(bdf->rtol > 0.0 ? bdf->rtol : 1e-6) * sd_bdf_norm(bdf, yd, NULL, NULL);
+    double change = sqrt(bdf->rtol > 0.0 ? bdf->rtol : 1e-6) * sd_bdf_norm(bdf, yd, NULL);
     double h = 1e-3 * span, least = 1e3 * DBL_EPSILON * fmax(fabs(bdf->t), SD_SHORT * span);
     if (isfinite(change) && change * h > 0.5)
         h = 0.5 / change;

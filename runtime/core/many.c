@@ -11,7 +11,8 @@
 #define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
 #define SAFETY 2.5
 #define AIM 2.0
-#define LEFT 0.1
+#define LEFT 0.3
+#define LITTLE 0.1
 #define SLOWEST 0.75
 #define STRETCH 1.5
 #define SHORT 60
@@ -477,7 +478,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         step_before = step;
         double drop = pow(1.0 / fmax(AIM * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
         tolerance = next;
-        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, LEFT)) * next, many->finest);
+        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, power < 0.0 ? LITTLE : LEFT)) * next, many->finest);
         next = away ? fmin(next, TAME) : next;
         longest /= STRETCH;
         sd_samples *swap = last;

@@ -39,8 +39,9 @@ WORTH = 0.3
 SHORT, SHORT_CREDIT = 60, 0.75
 """Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
 FIRST_DROP = 1e-2
-AIM, LEFT = 2.0, 0.1
-"""How far below what was asked the next run aims, and the most that is left of its tolerance."""
+AIM, LEFT, LITTLE = 2.0, 0.3, 0.1
+"""How far below what was asked the next run aims, and the most that is left of its tolerance: LITTLE where no power is
+measured yet, for a miss behind it costs a run."""
 SLOWEST = 0.75
 """The least power with which errors are taken to fall when the next tolerance is chosen."""
 STRETCH = 1.5
@@ -288,8 +289,8 @@ class _Estimate:
         """
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
         drop = (1.0 / max(AIM * self.over, 1e-300)) ** (1.0 / power)
-        least = FIRST_DROP if self._power is None else 1e-3
-        return max(float(np.clip(drop, least, LEFT)) * tolerance, self.law.finest)
+        least, most = (FIRST_DROP, LITTLE) if self._power is None else (1e-3, LEFT)
+        return max(float(np.clip(drop, least, most)) * tolerance, self.law.finest)
 
 
 def control(

@@ -208,6 +208,7 @@ class Bdf(c.Structure):
                     "ee",
                     "weight",
                     "newton_weight",
+                    "test_weight",
                     "delta",
                     "predicted",
                     "predicted_d",

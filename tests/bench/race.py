@@ -57,10 +57,10 @@ class Entry:
 
 
 class Peers:
-    """Builds and runs peers/peer.c; `missing`: why it cannot."""
+    """Builds and runs peers/peer.c for a machine (an option of the compiler); `missing`: why it cannot."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, machine: str = "-march=native") -> None:
+        self.folder, self.machine = folder, machine
         check = folder / "check.c"
         check.write_text("#include <ida/ida.h>\n#include <cvode/cvode.h>\nint main(void) { return 0; }\n")
         command = ["cc", "-I/usr/include/suitesparse", str(check), "-o", str(folder / "check"), *self._libraries()]
@@ -88,7 +88,7 @@ class Peers:
         sources = [str(PEER), str(here / "residual.c"), str(here / "binding.c")]
         program = here / "peer"
         subprocess.run(
-            ["cc", "-O2", "-march=native", "-fno-math-errno", "-w", "-I/usr/include/suitesparse", f"-I{here}",
+            ["cc", "-O2", self.machine, "-fno-math-errno", "-w", "-I/usr/include/suitesparse", f"-I{here}",
              *sources, "-o", str(program), *self._libraries()],
             check=True,
         )  # fmt: skip
