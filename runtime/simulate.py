@@ -29,7 +29,7 @@ from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
 NO_FURTHER = 1.0 + 1e-9
-"""Of the instant at which a method stopped: another that stops there says nothing new."""
+"""Of the instant at which a method stopped: another that stops there got no further."""
 NOT_STIFF = "not stiff"
 """Why method auto stays with the explicit method."""
 SMALL = 100
@@ -140,6 +140,17 @@ def _short(runs: Runs, options: Options, achieved: Achieved) -> str | None:
     return None if balanced else f"the energy of {runs.method} does not balance"
 
 
+def _bounded(failure: SolverFailure, runs: Runs) -> bool:
+    """The caller's own bound ended it: another method would meet the same."""
+    limited = failure.cause == "max_steps" and runs.most_steps == runs.options.max_steps
+    return limited or failure.cause in ("max_wall", "memory")
+
+
+def _told(before: SolverFailure | None, last: SolverFailure) -> SolverFailure:
+    """Of two methods that stopped the one that got further; where they got equally far, the first."""
+    return before if before is not None and last.time <= NO_FURTHER * before.time else last
+
+
 def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     """With method auto: where one method fails, or is held back, the next begins anew.
 
@@ -155,20 +166,18 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
         runs.patience = LONG if runs.method == "bdf" and others and not steep else None
         try:
             achieved = _achieved(runs, options, doubted=doubted)
-            why = _short(runs, options, achieved) if steep and others else None
-            if why is None:
-                return achieved
-            missed = replace(achieved, error_estimate=None, below_round_off=False, met=False)
         except SolverFailure as failure:
-            limited = failure.cause == "max_steps" and runs.most_steps == options.max_steps
-            if limited or failure.cause in ("max_wall", "memory") or not others:
-                if missed is not None and runs.done:
-                    return missed
-                if stopped is not None and failure.time <= NO_FURTHER * stopped.time:
-                    raise stopped from None
-                raise
+            if not others or _bounded(failure, runs):
+                if missed is None:
+                    raise _told(stopped, failure) from None
+                return missed
             doubted, why = failure.cause not in ("max_steps", "stiff"), _left(runs.method, failure)
             stopped = failure if doubted else stopped
+        else:
+            short = _short(runs, options, achieved) if steep and others else None
+            if short is None:
+                return achieved
+            why, missed = short, replace(achieved, error_estimate=None, below_round_off=False, met=False)
         runs.take(replace(others[0], reason=why))
         others = others[1:]
 
