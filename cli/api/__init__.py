@@ -288,8 +288,10 @@ class Model:
             raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
         given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
         report = Report()
-        ran = self._loaded.run(set or {}, report, alone=True, **_changes(given))
-        return _handed(ran, report, unmet)
+        if given:
+            return _handed(self._loaded.run(set or {}, report, alone=True, **_changes(given)), report, unmet)
+        found = self._loaded.trace(set or {}, report)
+        return found if isinstance(found, Trace) else _handed(found, report, unmet)
 
 
     def sweep(

@@ -409,6 +409,7 @@ class Settle(c.Structure):
         ("room", _P),
         ("whole", _I),
         ("drift", _D),
+        ("contracted", _D),
     ]
 
 
@@ -576,6 +577,10 @@ class Region(c.Structure):
     _fields_ = [("at", _P), ("copy", _P), ("size", _L)]
 
 
+COUNTERS = 8
+"""Of the work of a pass."""
+
+
 class Pass(c.Structure):
     """sd_pass."""
 
@@ -586,6 +591,7 @@ class Pass(c.Structure):
         *[(name, _P) for name in ["y", "yd", "start_rate", "differential"]],
         *[(name, _P) for name in ["magnitude", "met", "magnitude0", "rtol", "h_max"]],
         ("longest", _D),
+        ("counter", _P * COUNTERS),
     ]
 
 
@@ -609,7 +615,7 @@ class Many(c.Structure):
         *[(name, _I) for name in ["parameters", "written", "columns", "observed"]],
         *[(name, _P) for name in ["start", "region"]],
         ("regions", _I),
-        *[(name, _P) for name in ["y0", "yd0", "anchored", "size"]],
+        *[(name, _P) for name in ["y0", "yd0", "anchored", "guessed", "guess", "size"]],
         ("smallest", _D),
         *[(name, _P) for name in ["jy0", "jyd0", "counts", "jy", "jyd"]],
         *[(name, _I) for name in ["flows", "inertias"]],
@@ -634,6 +640,9 @@ class Many(c.Structure):
         *[(name, _I) for name in ["stride", "seen", "rows", "thinned", "broken", "judged"]],
         ("last_time", _D),
         *[(name, _P) for name in ["end", "least", "most", "thick", "work", "kind"]],
+        ("held", _I),
+        ("spent", _D),
+        ("counted", _L * COUNTERS),
     ]
 
 
