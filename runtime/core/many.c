@@ -25,7 +25,6 @@
 #define LOOSE 1e-5
 #define ROUND_OFF (64.0 * DBL_EPSILON)
 #define NOTHING 1e-12    /* of the largest of the same unit: what is left of a zero (model/scales.py) */
-#define GROUP 1e-3       /* of the largest of its like: the least magnitude of a zero */
 #define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (integrate/runs.py) */
 #define MOVED 1e-10      /* of its magnitude: an anchor that moves by more is not what the text gives */
 #define CONTRACTS 0.5    /* largest residual over the one before: Newton's method converges (Deuflhard 2004, 2.1) */
@@ -99,14 +98,41 @@ static int negative_inertia(const sd_many *many)
     return 0;
 }
 
-/* 1: y, yd settled, the anchored as they were, everything finite, on the root of the nominal start */
-static int settled(sd_many *many, const double *anchor, double *y, double *yd)
+/* points are settled in these magnitudes */
+static void scale(sd_settle *settle, const double *magnitude, double tau)
+{
+    memcpy(settle->scale, magnitude, (size_t)settle->unknowns * sizeof *magnitude);
+    for (int32_t k = 0; k < settle->rates; k++)
+        settle->scale[settle->unknowns + k] = magnitude[settle->rate[k]] / tau;
+}
+
+/* what is left of a zero is zero, in the settler's magnitudes, and what the text gives is what it gives: balances would
+ * be sized by round-off */
+static void clean(const sd_many *many, const double *anchor, double *y, double *yd)
+{
+    const sd_settle *settle = many->start;
+    for (int32_t i = 0; i < settle->unknowns; i++)
+        if (fabs(y[i] - (many->anchored[i] ? anchor[i] : 0.0)) <= NOTHING * settle->scale[i])
+            y[i] = many->anchored[i] ? anchor[i] : 0.0;
+    for (int32_t k = 0; k < settle->rates; k++)
+        if (fabs(yd[settle->rate[k]]) <= NOTHING * settle->scale[settle->unknowns + k])
+            yd[settle->rate[k]] = 0.0;
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+}
+
+/* 1: y, yd settled, the anchored as they were, everything finite, on the root of the nominal start; magnitude: by which,
+ * NULL: those of the nominal start */
+static int settled(sd_many *many, const double *anchor, const double *magnitude, double *y, double *yd)
 {
     restore(many->region, many->regions);
+    if (magnitude)
+        scale(many->start, magnitude, many->tau);
     if (sd_settle_point(many->start, many->t0, y, yd) || *many->start->system->stop)
         return 0;
     if (!(many->start->contracted <= CONTRACTS))
         return 0;
+    clean(many, anchor, y, yd);
     for (int32_t i = 0; i < many->written; i++) {
         if (!isfinite(y[i]) || !isfinite(yd[i]))
             return 0;
@@ -130,12 +156,25 @@ static int guessed(sd_many *many, const double *anchor, const double *y, const d
         }
     if (!other)
         return 1;
-    if (!settled(many, anchor, a, b))
+    if (!settled(many, anchor, NULL, a, b))
         return 0;
     for (int32_t i = 0; i < n; i++)
         if (!(fabs(a[i] - y[i]) <= ALIKE * fmax(many->size[i], fabs(y[i]))))
             return 0;
     return 1;
+}
+
+/* magnitudes at this start, as a run of its own finds them (runtime/integrate/origin.py); 1: they cannot be had */
+static int sized(sd_many *many)
+{
+    const sd_pass *pass = &many->passes[0];
+    memset(pass->yd, 0, (size_t)pass->n * sizeof(double));
+    for (int32_t i = 0; i < pass->n; i++)
+        if (pass->differential[i])
+            pass->yd[i] = pass->start_rate[i];
+    sd_jacobian(many->system, many->t0, pass->y, pass->start_rate, many->form_jy, many->form_jyd);
+    return sd_magnitudes(many->sizing, many->system, many->t0, many->t1 - many->t0, pass->y, pass->yd, many->form_jy,
+                         many->form_jyd, pass->yd, many->order, many->found, &many->tau);
 }
 
 /* y, yd of passes[0] := the consistent start with these anchors */
@@ -149,24 +188,12 @@ static int begin(sd_many *many, const double *anchor)
     for (int32_t i = 0; i < many->written; i++)
         if (many->anchored[i])
             y[i] = anchor[i];
-    if (!settled(many, anchor, y, yd) || !guessed(many, anchor, y, yd))
+    if (!settled(many, anchor, NULL, y, yd) || !guessed(many, anchor, y, yd))
         return SD_MANY_START;
     sd_jacobian(many->start->system, many->t0, y, yd, many->jy, many->jyd);
     if (other_pattern(many) || !(many->start->linear->smallest >= VANISHED * many->smallest) || negative_inertia(many))
         return SD_MANY_STRUCTURE;
-    return SD_MANY_DONE;
-}
-
-/* out [n]: |y|, of a state what its rate makes of it in the time scale of the start, and a part of its like */
-static void sizes(const sd_many *many, int32_t n, const double *y, const double *yd, double *out, double *largest)
-{
-    memset(largest, 0, (size_t)many->alikes * sizeof *largest);
-    for (int32_t i = 0; i < n; i++) {
-        out[i] = fmax(fabs(y[i]), many->state[i] ? many->tau * fabs(yd[i]) : 0.0);
-        largest[many->alike[i]] = fmax(largest[many->alike[i]], out[i]);
-    }
-    for (int32_t i = 0; i < n; i++)
-        out[i] = fmax(out[i], GROUP * largest[many->alike[i]]);
+    return sized(many) || !settled(many, anchor, many->found, y, yd) ? SD_MANY_START : SD_MANY_DONE;
 }
 
 /* --- one integration ------------------------------------------------------------------------------------------- */
@@ -195,7 +222,6 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
 {
     sd_run *run = pass->run;
     const double *y = many->passes[0].y, *yd = many->passes[0].start_rate;
-    double *now = many->work, *then = now + pass->n, *largest = then + pass->n;
     restore(pass->region, pass->regions);
     if (run->ledgers)
         clear_ledgers(run->ledgers);
@@ -208,13 +234,12 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
     for (int32_t i = 0; i < pass->n; i++)
         if (pass->differential[i])
             pass->yd[i] = yd[i];
-    sizes(many, many->written, y, yd, now, largest);
-    sizes(many, many->written, many->y0, many->yd0, then, largest);
-    memcpy(pass->magnitude, pass->magnitude0, (size_t)pass->n * sizeof *now);
-    for (int32_t i = 0; i < many->written; i++)
-        if (now[i] > 0.0 && then[i] > 0.0 && (many->state[i] || now[i] > then[i]))
-            pass->magnitude[i] *= now[i] / then[i];
-    memset(pass->met, 0, (size_t)pass->n * sizeof *now);
+    for (int32_t i = 0; i < pass->n; i++)
+        pass->magnitude[i] = fmax(many->found[i], pass->least[i]);
+    scale(run->settle, pass->magnitude, many->tau);
+    if (pass->project)
+        scale(pass->project, pass->magnitude, many->tau);
+    memset(pass->met, 0, (size_t)pass->n * sizeof(double));
     *pass->rtol = tolerance;
     *pass->h_max = longest;
     if (last) {

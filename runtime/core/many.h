@@ -5,6 +5,7 @@
  * ran before: results are equal bit for bit whatever the order, and whoever runs them.
  * Start: the anchored unknowns as the run's text gives them, everything else from the nominal start by one settling, whose
  * steps converge as Newton's method does near a root; guesses that are others than the nominal ones must lead to it too.
+ * Magnitudes: of this start, as any run finds them (sizing.h).
  * Accuracy: a draft and finer runs compared at instants of the one before, as runtime/integrate/accuracy.py has it.
  * A run that fails, misses its accuracy or a ledger, breaks a claim, or whose structure is another than the nominal's
  * is handed back without a result: the caller runs it on its own, and says what is the matter.
@@ -13,6 +14,7 @@
 #define SYSDYN_MANY_H
 
 #include "run.h"
+#include "sizing.h"
 
 enum sd_many_state {
     SD_MANY_DONE = 0,
@@ -43,7 +45,8 @@ typedef struct sd_pass {
     double *y, *yd, *start_rate; /* [n] */
     const int32_t *differential; /* [n] 1: its rate is a start's */
     double *magnitude, *met;     /* [n] of the stepper */
-    const double *magnitude0;    /* [n] of the nominal start */
+    const double *least;         /* [n] what round-off leaves open: no magnitude is less */
+    sd_settle *project;          /* of the method; NULL: none */
     double *rtol, *h_max;        /* of the stepper */
     double longest;              /* step [s] */
     const int64_t *counter[SD_MANY_COUNTERS]; /* of its work; NULL: none */
@@ -83,9 +86,12 @@ typedef struct sd_many {
     double *inertia;             /* [flows][flows] */
     double t0, t1;
     /* magnitudes */
-    const int32_t *alike, *state; /* [n] number of the kind and unit; 1: state whose magnitude nobody named */
-    int32_t alikes;
-    double tau;                  /* time scale of the start [s] */
+    sd_system *system;           /* of the passes */
+    const sd_sizing *sizing;
+    const int32_t *order;        /* of its columns; NULL: dense */
+    double *form_jy, *form_jyd;  /* [entries] at the start */
+    double *found;               /* [n] magnitudes of this run */
+    double tau;                  /* time scale of its start [s] */
     /* accuracy */
     sd_pass passes[2];
     const int32_t *column;       /* [columns] place among the observed */
@@ -107,7 +113,7 @@ typedef struct sd_many {
     int32_t stride, seen, rows, thinned, broken, judged;
     double last_time;
     double *end, *least, *most, *thick; /* [columns] x 3, [columns][thins]: where the run's results go */
-    double *work;                /* [3 n + 4 columns + 2 units + alikes] */
+    double *work;                /* [4 columns + 2 units] */
     int32_t *kind;               /* [room] */
     /* of the last run */
     int32_t held;                /* rows of its last integration, at `row` of that */

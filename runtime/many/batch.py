@@ -24,8 +24,9 @@ from sysdyn.runtime.many.anchors import anchors, guesses
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
-from sysdyn.runtime.model.scales import alike, confirmed
+from sysdyn.runtime.model.scales import confirmed, sizing
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.simulate import alternatives, close, counted, form_name, formed
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
@@ -269,7 +270,8 @@ class Batch:
         field.y, field.yd, field.start_rate = (self._kept(room) for room in rooms)
         field.differential = self._kept(made.roles.differential.astype(np.int32))
         field.magnitude, field.met = lib.pointer(made.magnitude), lib.pointer(made._met)
-        field.magnitude0 = self._kept(made.magnitude.copy())
+        field.least = self._kept(np.ascontiguousarray(made._least))
+        field.project = None if made._project is None else c.addressof(made._project.core.contents)
         field.rtol = c.addressof(core) + kind.rtol.offset
         field.h_max = c.addressof(core) + kind.h_max.offset
         field.longest = longest
@@ -375,11 +377,12 @@ class Batch:
         many.p, many.parameters = lib.pointer(system.description.p), system.description.p.size
         many.written, many.columns, many.observed = n, columns, self.passes[1].observed
         many.t0, many.t1 = options.t_start, options.t_end
-        number = alike(system)[:n].astype(np.int32)
-        state = np.isin(system.kinds[:n], ("q", "f", "p", "s")) & (system.nominal[:n] == 0.0)
-        many.alike, many.state = self._kept(number), self._kept(state.astype(np.int32))
-        many.alikes = int(number.max(initial=0)) + 1
-        many.tau = self.passes[1]._time
+        sizes = sizing(system)
+        self._alive.append(sizes)
+        many.system, many.sizing = c.addressof(system.core), c.addressof(sizes.core)
+        many.order = lib.pointer(order_of(system))
+        many.form_jy, many.form_jyd = (self._kept(np.zeros(system.pattern.entries + 1)) for _ in range(2))
+        many.found = self._kept(np.zeros(system.unknowns + 1))
         for k in (0, 1):
             self._fill(k, min((STRETCH, 1.0)[k] * longest * span, options.longest or np.inf))
         many.column = self._kept(np.array([column.place for column in runs.columns], dtype=np.int32))
@@ -410,7 +413,7 @@ class Batch:
                 room=room,
             )
         many.kind = self._kept(np.zeros(room, dtype=np.int32))
-        many.work = self._kept(np.zeros(3 * system.unknowns + 4 * columns + 2 * len(units) + many.alikes + 8))
+        many.work = self._kept(np.zeros(4 * columns + 2 * len(units) + 8))
 
     def _claims(self, claims: tuple[Claim, ...]) -> None:
         """Expectations that the core looks at."""

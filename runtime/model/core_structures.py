@@ -589,7 +589,7 @@ class Pass(c.Structure):
         ("region", _P),
         *[(name, _I) for name in ["regions", "n"]],
         *[(name, _P) for name in ["y", "yd", "start_rate", "differential"]],
-        *[(name, _P) for name in ["magnitude", "met", "magnitude0", "rtol", "h_max"]],
+        *[(name, _P) for name in ["magnitude", "met", "least", "project", "rtol", "h_max"]],
         ("longest", _D),
         ("counter", _P * COUNTERS),
     ]
@@ -622,8 +622,7 @@ class Many(c.Structure):
         *[(name, _P) for name in ["inertia_row", "inertia_column", "inertia_entry", "inertia_rate"]],
         *[(name, _P) for name in ["inertia_sign", "inertia"]],
         *[(name, _D) for name in ["t0", "t1"]],
-        *[(name, _P) for name in ["alike", "state"]],
-        ("alikes", _I),
+        *[(name, _P) for name in ["system", "sizing", "order", "form_jy", "form_jyd", "found"]],
         ("tau", _D),
         ("passes", Pass * 2),
         *[(name, _P) for name in ["column", "target", "unit", "unit_of"]],
