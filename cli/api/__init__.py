@@ -337,8 +337,8 @@ _RUN = frozenset(("accuracy", "accuracy_check", "rtol", "atol", "method", "index
 def load(path: str | Path, *, model: str | None = None, scene: str | None = None, **options: Any) -> Model:
     """A model prepared once, for many runs; the options are those of `simulate`.
 
-    The first run sets up; a short one without events then costs its integrations and some tenths of a millisecond, another
-    one some milliseconds.  What a run comes to depends on its own numbers alone.
+    The first run sets up; a short one without events then costs its integrations and some tenths of a millisecond,
+    another one some milliseconds.  What a run comes to depends on its own numbers alone.
     """
     given = {"model": model, "scene": scene, **options}
     if given.get("formulation") == "auto":
