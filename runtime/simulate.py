@@ -214,6 +214,12 @@ def formed(
     return system, index, warnings
 
 
+def form_name(system: System, facts: Structure) -> str:
+    """The index form as the trace names it."""
+    form = system.form.name
+    return {"3": str(facts.index), "2": "2"}.get(form, form)
+
+
 def simulate(
     manifest: Mapping[str, Any] | Description,
     binding: Mapping[str, Any] | None,
@@ -240,8 +246,7 @@ def simulate(
     if system.form.name == "0" and options.events and options.events.contacts:
         name = options.events.contacts[0].name
         raise NoSuchForm(f"'{name}' holds at times: there is no one underlying equation; index 2 with bdf or radau")
-    form = system.form.name
-    way = Way(method, system, index, {"3": str(facts.index), "2": "2"}.get(form, form))
+    way = Way(method, system, index, form_name(system, facts))
     ways = (way,) if options.method != "auto" else alternatives(way, written, start, options)
     runs = Runs(start, options, ways[0])
     with runs.keeping.claimed():
@@ -278,12 +283,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
 def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure, warnings: tuple[str, ...]) -> Outcome:
     """The runs of one simulation, whose trace is claimed."""
     options, start = runs.options, runs.start
-    known = determined(written, start)
-    if not known.all():
-        runs.columns = tuple(
-            replace(column, derivative=False) if column.derivative and not known[column.place] else column
-            for column in runs.columns
-        )
+    runs.derive(determined(written, start))
 
     def outcome(
         final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None, **more: Any
@@ -312,17 +312,17 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     try:
         achieved = _controlled(runs, options, others)
     except SolverFailure as failure:
-        _close(runs, None, None)
+        close(runs, None, None)
         reached = failure.time if runs.done is None else options.t_end
         failure.partial = outcome(False, reached, None, failure)
         raise
     except BaseException:
-        _close(runs, None, None)
+        close(runs, None, None)
         raise
     assert runs.done is not None
     missed = _missed(runs, options, achieved)
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed)
-    _close(runs, achieved, judgement)
+    close(runs, achieved, judgement)
     finished, _, writer = runs.done
     if finished.unsettled and not options.events:
         warnings = (*warnings, f"{finished.unsettled} rows do not meet the equations: they are the integrator's own")
@@ -334,7 +334,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     return outcome(True, options.t_end, achieved, None, **told)
 
 
-def _close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:
+def close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:
     """Last attributes of the finished run that stands at the path; judgement None: it did not end as asked."""
     if runs.done is None or runs.done[2].closed:
         return

@@ -288,8 +288,10 @@ class Model:
             raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
         given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
         report = Report()
-        ran = self._loaded.run(set or {}, report, alone=True, **_changes(given))
-        return _handed(ran, report, unmet)
+        if given:
+            return _handed(self._loaded.run(set or {}, report, alone=True, **_changes(given)), report, unmet)
+        found = self._loaded.trace(set or {}, report)
+        return found if isinstance(found, Trace) else _handed(found, report, unmet)
 
 
     def sweep(
@@ -335,8 +337,8 @@ _RUN = frozenset(("accuracy", "accuracy_check", "rtol", "atol", "method", "index
 def load(path: str | Path, *, model: str | None = None, scene: str | None = None, **options: Any) -> Model:
     """A model prepared once, for many runs; the options are those of `simulate`.
 
-    A run costs its integrations and some milliseconds for its start and what is set up for it; what follows from the
-    structure is found once, and a run takes the structures of the one before it where the model has no events.
+    The first run sets up; a short one without events then costs its integrations and some tenths of a millisecond,
+    another one some milliseconds.  What a run comes to depends on its own numbers alone.
     """
     given = {"model": model, "scene": scene, **options}
     if given.get("formulation") == "auto":

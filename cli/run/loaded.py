@@ -9,28 +9,74 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.in_core import InCore
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, options_of, ready
+from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, options_of, parameters_of, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.again import Way, again
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.runtime.many.batch import ROWS, NotApplicableError
+from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
 KEPT = 64
 """Texts that are kept compiled."""
+SHORT, LONGER = 1000, 5
+"""Steps of the text's own run up to which runs are made in the core, where nobody can interrupt them; times those that
+one of them may take there."""
 _ELEMENT = re.compile(r"([^\[\]]+)\[(-?\d+(?:,-?\d+)*)\]")
 
 Settings = Mapping[str, Any]
 """Names of parameters (`m`, `m[2]`, `M1.R`) and inputs -> numbers in SI units, arrays, or texts of the language."""
+
+
+class Cores:
+    """A text's structures in the core that no run uses just now: runs side by side (threads) have one each.
+
+    refused: why it has none; moving: what changes where parameters change together, None where the options do.
+    """
+
+    def __init__(self) -> None:
+        self._free: list[InCore] = []
+        self.refused: str | None = None
+        self._moving: dict[frozenset[str], frozenset[str] | None] = {}
+
+    def take(self, make: Callable[[], InCore]) -> InCore | None:
+        """One to run with, made if there is none; None where there can be none."""
+        try:
+            return self._free.pop()
+        except IndexError:
+            pass
+        if self.refused is None:
+            try:
+                return make()
+            except NotApplicableError as error:
+                self.refused = str(error)
+        return None
+
+    def give(self, core: InCore) -> None:
+        """Takes one back."""
+        self._free.append(core)
+
+    def moving(self, core: InCore, names: frozenset[str]) -> frozenset[str] | None:
+        """Parameters that change where these do; None where the scene's options are among them."""
+        if names not in self._moving:
+            if len(self._moving) >= KEPT:
+                self._moving.clear()
+            try:
+                self._moving[names] = core.moving(names)
+            except NotApplicableError:
+                self._moving[names] = None
+        return self._moving[names]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +91,7 @@ class Compiled:
     """Of the run whose structures the next one takes."""
     ways: dict[frozenset[str], Way | None] = field(default_factory=dict)
     """What follows from parameters that were set together."""
+    cores: Cores = field(default_factory=Cores)
 
     def bound(self, numbers: Mapping[Any, Any]) -> Binding:
         """The text's binding with these numbers: by what follows from them, or anew."""
@@ -145,15 +192,54 @@ class Loaded:
         request = replace(self.request, **changes) if changes else self.request
         check_tolerances(request)
         prepared, compiled = self.bound(settings)
+        return (self._alone if alone else self._run)(request, prepared, compiled, report)
+
+    def _alone(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
+        """A run of which nobody looks at more than its trace once the next one begins."""
         network = prepared.network
         eventful = network.events or network.switches or prepared.compiled.form.kinks
         # a run beside another one (threads) has structures of its own
-        if not alone or eventful or not compiled.lone.acquire(blocking=False):
+        if eventful or not compiled.lone.acquire(blocking=False):
             return self._run(request, prepared, compiled, report)
         try:
             return self._run(request, replace(prepared, alone=True), compiled, report)
         finally:
             compiled.lone.release()
+
+    def trace(self, settings: Settings, report: Report) -> Trace | Ran | None:
+        """The trace of one run in memory: of a run in the core, whose text differs from another one's in numbers alone;
+        else what `run` hands back.
+        """
+        prepared, compiled = self.bound(settings)
+        found = self._in_core(settings, prepared, compiled)
+        return found if found is not None else self._alone(self.request, prepared, compiled, report)
+
+    def _in_core(self, settings: Settings, prepared: Prepared, compiled: Compiled) -> Trace | None:
+        """The trace of a run in the core; None where there is none."""
+        with ex.fresh(compiled.nodes):
+            core = compiled.cores.take(lambda: self._set_up(compiled))
+            if core is None:
+                return None
+            try:
+                names = frozenset(name.partition("[")[0] for name in settings).intersection(self.parameters)
+                moving = compiled.cores.moving(core, names)
+                numbers = None if moving is None else core.alone(prepared.binding, moving)
+                return None if numbers is None else core.batch.trace(*numbers, tuple(parameters_of(prepared)))
+            finally:
+                compiled.cores.give(core)
+
+    def _set_up(self, compiled: Compiled) -> InCore:
+        """The text in the core.  Only where its own run is short: of a long one the rest of a call costs little."""
+        short = replace(self.request, max_steps=min(self.request.max_steps or SHORT, SHORT))
+
+        def nominal() -> Ran | None:
+            return self._run(short, compiled.prepared, compiled, Report())
+
+        core = InCore(replace(self.request, max_steps=LONGER * SHORT), self.target, compiled.prepared, nominal, ROWS)
+        if self.request.max_steps is not None:
+            raise NotApplicableError("the steps of a run are limited")
+        core.set_up()
+        return core
 
     def _run(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
         with ex.fresh(compiled.nodes):

@@ -298,7 +298,7 @@ def options_of(
         wall_began=began,
         progress=progress,
         attributes=_attributes(target, prepared),
-        parameters=tuple(_parameters(prepared)),
+        parameters=tuple(parameters_of(prepared)),
     )
 
 
@@ -398,7 +398,7 @@ def model_digest(target: Target) -> str:
     return hashlib.sha256(target.document.file.source.text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _parameters(prepared: Prepared) -> Iterator[Parameter]:
+def parameters_of(prepared: Prepared) -> Iterator[Parameter]:
     """Parameters in SI units, arrays element by element (`m[2]`); arrays of more than LISTED elements are left out."""
     evaluate, values = prepared.binding.evaluate, prepared.binding.values
     units = prepared.layouts.setdefault("units of parameters", {})

@@ -1,32 +1,20 @@
-"""Cases of a sweep run in the core without Python between them, where the model allows it.
-
-That is where they differ in numbers alone, nothing happens at instants of its own (events, jumps of the text), and the
-rows fix the start but for what the text gives.  What a run needs that this way does not have (a structure of its own,
-another method, a reason for what it missed) is left to a run on its own.
-"""
+"""Cases of a sweep run in the core without Python between them, where the model allows it: see cli/run/in_core.py."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.cli.run.in_core import InCore
 from sysdyn.cli.run.loaded import Loaded
-from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import options_of, stops
 from sysdyn.cli.sweep.kept import Block
-from sysdyn.compiler.binding.binding import Binding
-from sysdyn.compiler.binding.columns import Read, following
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
-from sysdyn.runtime.integrate.options import Options, instants
+from sysdyn.runtime.integrate.options import instants
 from sysdyn.runtime.integrate.request import TRACE
-from sysdyn.runtime.many.anchors import guesses
-from sysdyn.runtime.many.batch import DONE, END, EXTREMA, TRACES, Batch, Claim, NotApplicableError, way_of
-from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.many.batch import DONE, END, EXTREMA, TRACES, NotApplicableError
 
 Floats = NDArray[np.float64]
 KEEPS = {"end": END, "extrema": EXTREMA, "traces": TRACES}
@@ -42,7 +30,7 @@ def thinned(begin: float, step: float, time: Floats) -> tuple[Floats, NDArray[np
     return np.asarray(grid, dtype=np.float64), place
 
 
-class InCore:
+class Cases:
     """Runs of one text in the core.  NotApplicableError where they cannot be made that way, with the reason."""
 
     def __init__(self, loaded: Loaded, names: Sequence[str], keep: str) -> None:
@@ -50,8 +38,6 @@ class InCore:
         numbers, texts = loaded._split(dict.fromkeys(names, 0.0))
         if texts:
             raise NotApplicableError(f"{texts[0][0]} is part of the text")
-        if loaded.first.prepared.backend != "c":
-            raise NotApplicableError("the model is not compiled to C")
         self._keys: tuple[Any, ...] = tuple(numbers)
         self._names = tuple(names)
         self._prepared, self._compiled = loaded.bound({})
@@ -59,67 +45,24 @@ class InCore:
             self._set_up(KEEPS[keep])
 
     def _set_up(self, keep: int) -> None:
-        prepared = self._prepared
-        options = self._options(prepared)
-        report = Report()
-        try:
-            ran = self._loaded.run({}, report)
-        except (ModelError, SolverFailure) as error:
-            raise NotApplicableError(f"the text's own numbers do not run: {error}") from error
-        if ran is None or ran.exit or not ran.outcome.met:
-            raise NotApplicableError("the text's own numbers do not run, or are not met")
-        started, self.method = ran.started, ran.outcome.method
-        claims = _claims(prepared)
-        way, start = way_of(started.system, started.state, started.facts, options, self.method)
-        if started.system.description.rows_of("initial"):
-            raise NotApplicableError("an initial value is no unknown of this formulation")
-        scene = prepared.network.scene
+        loaded, prepared, scene = self._loaded, self._prepared, self._prepared.network.scene
+        self._core = InCore(loaded.request, loaded.target, prepared, lambda: loaded.run({}, Report()), keep)
+        self._moving = self._core.moving(key if isinstance(key, str) else key[0] for key in self._keys)
         self.time, rows = np.zeros(0), np.zeros(0, dtype=np.int64)
         if keep == TRACES and scene is not None and scene.every is not None and scene.start is not None:
-            times, kinds = instants(options)
+            times, kinds = instants(self._core.options)
             evaluate = prepared.binding.evaluate
             self.time, rows = thinned(evaluate(scene.start), evaluate(scene.every), times[(kinds & TRACE) > 0])
-        free = not any(
-            node.op == "time"
-            for block in prepared.compiled.form.blocks
-            for kernel in block.kernels
-            for row in kernel.rows
-            for node in ex.topological([row.expression])
-        )
-        # a structure of its own: other runs of the same text write into theirs
-        way = replace(way, system=way.system.another(way.system.form.name))
-        kept = END if keep == END else EXTREMA if not rows.size else TRACES
-        self._batch = Batch(way, start, options, keep=kept, thin=rows, claims=claims, free=free)
-        self._at, self._written = way.system.form.at, way.system.form.written
+        self._core.set_up(rows)
         self._extrema = keep != END
-        self._nominal = guesses(self._at, self._written, way.system.description.initial)[0]
-
-    def _options(self, prepared: Prepared) -> Options:
-        """The options of every run; NotApplicableError where they follow from what varies."""
-        read = Read(prepared.binding.parameters)
-        seen = replace(prepared, binding=replace(prepared.binding, parameters=read))
-        report = Report()
-        options = options_of(self._loaded.request, self._loaded.target, seen, report, time.monotonic(), None)
-        if options is None:
-            raise NotApplicableError("the scene's options make no sense")
-        plain = {key if isinstance(key, str) else key[0] for key in self._keys}
-        moving = plain | set(following(prepared.compiled.network, plain))
-        if read.read & moving:
-            raise NotApplicableError(f"the scene's instants follow from {sorted(read.read & moving)[0]}")
-        read.read.clear()
-        options = replace(options, output=None, stops=stops(seen, options, report))
-        # where the text may jump at instants that follow from what varies, each run is looked at
-        self._looked = options if read.read & moving else None
-        if prepared.network.events or prepared.network.switches:
-            raise NotApplicableError("the model has events")
-        return options
 
     def run(self, numbers: Sequence[int], cases: Sequence[Mapping[str, Any]]) -> tuple[Block | None, list[int]]:
         """What is kept of the cases, and the places of those that need a run of their own."""
         values = np.array([[case[name] for name in self._names] for case in cases], dtype=np.float64)
         with ex.fresh(self._compiled.nodes):
             p, anchor, good = self._bound(values)
-        found = self._batch.run(p[good], anchor[good])
+        batch = self._core.batch
+        found = batch.run(p[good], anchor[good])
         done = found.state == DONE
         place = np.flatnonzero(good)
         left = sorted({*np.flatnonzero(~good).tolist(), *place[~done].tolist()})
@@ -128,8 +71,8 @@ class InCore:
         nothing = np.zeros((int(done.sum()), 0))
         block = Block(
             np.asarray(numbers, dtype=np.int64)[place[done]],
-            self._batch.columns,
-            self.method,
+            batch.columns,
+            self._core.method,
             found.estimate[done],
             np.asarray(found.steps[done], dtype=np.int64),
             found.cpu[done],
@@ -145,7 +88,7 @@ class InCore:
         """Numbers p [k, parameters], initial values [k, written], and which [k] make sense."""
         prepared = self._prepared
         found = None
-        if self._looked is None and all(isinstance(key, str) for key in self._keys):
+        if not self._core.jumps & self._moving and all(isinstance(key, str) for key in self._keys):
             varied = {key: values[:, j] for j, key in enumerate(self._keys)}
             found = prepared.compiled.columns(prepared.binding, varied)
         if found is None:
@@ -161,53 +104,32 @@ class InCore:
 
     def _anchors(self, starts: Sequence[tuple[Any, Floats]], number: int) -> Floats:
         """Initial values of all unknowns: a fixed one wins over a guess, a later statement over an earlier."""
-        anchor = np.tile(self._nominal, (number, 1))
-        fixed = np.zeros(self._written, dtype=bool)
+        anchor = np.tile(self._core.guesses, (number, 1))
+        fixed = np.zeros(self._core.written, dtype=bool)
         for start in self._prepared.binding.initial:
             if start.fixed:
-                fixed[self._at[start.family] + start.positions] = True
+                fixed[self._core.at[start.family] + start.positions] = True
         for start, column in starts:
-            for place in (self._at[start.family] + start.positions).tolist():
+            for place in (self._core.at[start.family] + start.positions).tolist():
                 if start.fixed or not fixed[place]:
                     anchor[:, place] = column
         return anchor
 
     def _alone(self, values: Floats) -> tuple[Floats, Floats] | None:
         """The numbers of one run by a binding of its own; None where it has another structure, or none."""
-        prepared = self._prepared
         try:
-            binding: Binding = prepared.compiled.bind(dict(zip(self._keys, map(np.asarray, values), strict=True)))
+            binding = self._prepared.compiled.bind(dict(zip(self._keys, map(np.asarray, values), strict=True)))
         except ModelError:
             return None
-        first = prepared.binding
-        same = np.array_equal(binding.ix, first.ix) and binding.shapes == first.shapes
-        if not same or binding.row_shapes != first.row_shapes or binding.p.size != first.p.size:
-            return None
-        if self._looked is not None and stops(replace(prepared, binding=binding), self._looked, Report()).size:
-            return None
-        return binding.p, guesses(self._at, self._written, binding.initial)[0]  # type: ignore[arg-type]
+        return self._core.alone(binding, self._moving)
 
     def _one_by_one(self, values: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         p = np.tile(self._prepared.binding.p, (len(values), 1))
-        anchor, good = np.tile(self._nominal, (len(values), 1)), np.zeros(len(values), dtype=bool)
+        anchor, good = np.tile(self._core.guesses, (len(values), 1)), np.zeros(len(values), dtype=bool)
         for k, row in enumerate(values):
             alone = self._alone(row)
             if alone is not None:
                 p[k], anchor[k] = alone
                 good[k] = True
         return p, anchor, good
-
-
-def _claims(prepared: Prepared) -> tuple[Claim, ...]:
-    """The scene's expectations as the core looks at them."""
-    network = prepared.network
-    if network.goldens:
-        raise NotApplicableError("a golden file is expected")
-    found = []
-    for k, e in enumerate(network.expectations):
-        within = None if e.within is None else f"expect {k} within"
-        moment = "at" if e.at is not None else e.moment
-        at = 0.0 if e.at is None else prepared.binding.evaluate(e.at)
-        found.append(Claim(f"expect {k} left", f"expect {k} right", within, e.operator, moment, at))
-    return tuple(found)
 

@@ -11,7 +11,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.loaded import Loaded
 from sysdyn.cli.run.running import Ran, Request
 from sysdyn.cli.sweep.axes import CHOICES
-from sysdyn.cli.sweep.in_core import InCore, thinned
+from sysdyn.cli.sweep.in_core import Cases, thinned
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.study import Case
 from sysdyn.dsl.text.diagnostics import ModelError, Report
@@ -34,7 +34,7 @@ class Runner:
     ) -> None:
         self.request, self.keep, self.core = request, keep, core
         self._loaded: dict[tuple[tuple[str, str], ...], Loaded] = {} if loaded is None else {(): loaded}
-        self._in_core: dict[Any, InCore | str] = {}
+        self._in_core: dict[Any, Cases | str] = {}
 
     def loaded(self, choices: tuple[tuple[str, str], ...] = ()) -> Loaded:
         """The model under choices that are no numbers."""
@@ -75,12 +75,12 @@ class Runner:
             left += [group[k] for k in places]
         return found, left
 
-    def way(self, choices: tuple[tuple[str, str], ...], names: tuple[str, ...]) -> InCore | str:
+    def way(self, choices: tuple[tuple[str, str], ...], names: tuple[str, ...]) -> Cases | str:
         """The core's way for cases with these names, or why there is none."""
         key = choices, names
         if key not in self._in_core:
             try:
-                self._in_core[key] = InCore(self.loaded(choices), names, self.keep) if self.core else "not asked for"
+                self._in_core[key] = Cases(self.loaded(choices), names, self.keep) if self.core else "not asked for"
             except NotApplicableError as error:
                 self._in_core[key] = str(error)
             except (ModelError, UsageError, SolverFailure):

@@ -12,11 +12,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.compiler.binding.binding import Binding
+from numpy.typing import NDArray
+from sysdyn.compiler.binding.binding import Binding, offsets_of, places_of
 from sysdyn.compiler.binding.columns import Varied, following, reads_of_structure
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.compiler.model.interpret import last_of
+from sysdyn.compiler.model.interpret import grid, last_of, looped
+from sysdyn.compiler.model.parameters import Extents
 from sysdyn.compiler.program.program import Program
 from sysdyn.dsl.model.expression import Node, topological, topological_unbound
 from sysdyn.dsl.model.network import Network, Slope
@@ -24,6 +26,17 @@ from sysdyn.values import dataclass
 
 Nodes = tuple[Node, ...]
 """Of an expression, each after those it needs."""
+Columns = dict[str, NDArray[np.float64]]
+"""Loop variables over the iterations of a nest; {} without loops."""
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """The form whose integrated rows have them; ranges of the indices by owner; places in p by name."""
+
+    form: DescriptorForm
+    owners: dict[str, Extents]
+    where: dict[str, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +44,15 @@ class Way:
     """What follows from a set of scalar parameters.
 
     follow: parameters with the nodes of their formulas, each after those it needs; slopes; initial values, by their
-    places among these: those that read any; places: (name, place in p).
+    places among these: those that read any, with the loop variables of their iterations; places: (name, place in p);
+    constants: of integrated rows, where any moves.
     """
 
     follow: tuple[tuple[str, Nodes], ...]
-    slopes: tuple[tuple[Slope, Nodes], ...]
-    pins: tuple[tuple[int, Nodes], ...]
+    slopes: tuple[tuple[Slope, Nodes, Columns], ...]
+    pins: tuple[tuple[int, Nodes, Columns], ...]
     places: tuple[tuple[str, int], ...]
+    constants: Constants | None = None
 
 
 def way(
@@ -50,7 +65,7 @@ def way(
 ) -> Way | None:
     """What follows from these parameters; None where more than numbers does."""
     known = {p.name: p for p in network.parameters}
-    if form.offsets or not names <= known.keys():
+    if not names <= known.keys():
         return None
     behind = following(network, set(names))
     moving = {*names, *behind}
@@ -66,16 +81,23 @@ def way(
 
     slopes = [slope for slope in network.slopes if read(slope.expression)]
     pins = [(k, pin) for k, pin in enumerate(form.pins) if read(pin.value)]
-    if any(slope.loops for slope in slopes) or any(pin.nest for _, pin in pins):
+    nests = [slope.loops for slope in slopes] + [term.loops for offset in form.offsets for term in offset.terms]
+    if any(read(node) for nest in nests for loop in nest for node in (loop.first, loop.last)):
         return None
     if network.scene is not None and network.scene.start is not None and read(network.scene.start):
         return None
+    if any(read(node) for offset in form.offsets for node in offset.at):
+        return None
+    move = bool(pins) or any(read(term.expression) for offset in form.offsets for term in offset.terms)
+    constants = Constants(form, *places_of(network, form, program, binding)) if form.offsets and move else None
+    lookup = binding.parameters.lookup
     places = tuple((name, place) for place, name in enumerate(program.scalars) if name in moving)
     return Way(
         tuple((n, _nodes(known[n].values[0])) for n in behind),
-        tuple((slope, _nodes(slope.expression)) for slope in slopes),
-        tuple((k, _nodes(pin.value)) for k, pin in pins),
+        tuple((slope, _nodes(slope.expression), grid(slope.loops, lookup)) for slope in slopes),
+        tuple((k, _nodes(pin.value), grid(pin.nest, lookup)) for k, pin in pins),
         places,
+        constants,
     )
 
 
@@ -96,17 +118,24 @@ def _again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Bindi
         values[name] = float(last_of(formula, lookup))
     if not all(math.isfinite(values[name]) for name in (*overrides, *(name for name, _ in path.follow))):
         return None
-    for slope, nodes in path.slopes:
-        value = last_of(nodes, lookup)
-        if (value != 0.0) if slope.flat else (value == 0.0 or (slope.sign and not slope.sign * value > 0.0)):
+    for slope, nodes, columns in path.slopes:
+        value = np.asarray(last_of(nodes, looped(columns, lookup)))
+        wrong = value != 0.0 if slope.flat else value == 0.0
+        if slope.sign:
+            wrong = ~(slope.sign * value > 0.0)
+        if wrong.any():
             return None
     starts = list(binding.initial)
-    for k, nodes in path.pins:
-        value = float(last_of(nodes, lookup))
-        if not math.isfinite(value):
+    for k, nodes, columns in path.pins:
+        value = np.asarray(last_of(nodes, looped(columns, lookup)), dtype=float)
+        if not np.isfinite(value).all():
             return None
         starts[k] = starts[k].at(np.full(starts[k].values.shape, value))
     p = binding.p.copy()
     for name, place in path.places:
         p[place] = values[name]
+    if path.constants is not None:
+        form, where = path.constants.form, path.constants.where
+        for name, held in offsets_of(form, path.constants.owners, tuple(starts), parameters).items():
+            p[where[name] : where[name] + held.size] = held
     return replace(binding, p=p, initial=tuple(starts), values=values, parameters=parameters)

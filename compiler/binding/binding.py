@@ -96,7 +96,7 @@ def bind(
     _refuse_outside(model, owners, parameters, network.place)
     bind_covers(form.covers, owners, parameters)
     starts = _starts(form, owners, parameters)
-    offsets = _offsets(form, owners, starts, parameters)
+    offsets = offsets_of(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)
     ix = [integer(slot, owners, parameters, where, network) for slot in program.slots]
     rows = {(r.owner, r.block): k for k, r in enumerate(form.rows)}
@@ -174,7 +174,7 @@ def _positions(name: str, box: Extents, at: list[NDArray[np.float64]], place: Pl
     return positions(box, [np.rint(values).astype(np.int64) for values in at])
 
 
-def _offsets(
+def offsets_of(
     form: DescriptorForm, owners: dict[str, Extents], starts: tuple[Start, ...], parameters: Parameters
 ) -> dict[str, NDArray[np.float64]]:
     """Constants of integrated constraints: B q0 at the initial displacements (0 where none is written)."""
@@ -228,7 +228,7 @@ def places_of(
 ) -> tuple[dict[str, Extents], dict[str, int]]:
     """Ranges of the indices by owner; where arrays, constants of integrated rows and tables begin in p."""
     owners = _owners(form, binding.parameters)
-    offsets = _offsets(form, owners, binding.initial, binding.parameters)
+    offsets = offsets_of(form, owners, binding.initial, binding.parameters)
     return owners, _layout(program, network, binding.parameters, offsets)[1]
 
 

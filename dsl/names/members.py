@@ -507,6 +507,8 @@ class Members(Names):
     def _method(self, e: syntax.Method) -> Value:
         """`label.on(x)`: the effort of a constraint on a coordinate."""
         base = self.located(e.base)
+        if base is None and isinstance(e.base, syntax.Name) and self.scope.is_broken(e.base.name):
+            raise Failed  # its statement was told
         symbol = None if base is None else base.symbol
         wrong = not isinstance(symbol, ConstraintSymbol) or symbol.kind == "gamma"
         if base is None or wrong or e.name != "on" or len(e.args) != 1:

@@ -59,6 +59,13 @@ _OTHERS = {
     "variable": "let x = ..., or state s = ...",
     "equation": "let, law, phi, psi or gamma",
     "equations": "let, law, phi, psi or gamma",
+    **dict.fromkeys(
+        ("constraint", "constraints", "constrain", "holonomic", "nonholonomic"),
+        "phi name: ... = ... of displacements, psi name: ... = ... of flows",
+    ),
+    **dict.fromkeys(("force", "forces", "torque", "moment", "load", "apply"), "work F on x"),
+    **dict.fromkeys(("mass", "inertia", "kinetic_energy", "lagrangian"), "energy T* = 1/2*m*x'^2, energy V = ..."),
+    **dict.fromkeys(("friction", "damping", "dissipation", "rayleigh"), "content D = 1/2*b*x'^2"),
     "import": "from std.electrical import resistor",
     "include": "from std.electrical import resistor",
     "class": "component or model",

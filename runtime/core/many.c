@@ -26,9 +26,10 @@
 #define TAME 1e-6
 #define ROUND_OFF (64.0 * DBL_EPSILON)
 #define NOTHING 1e-12    /* of the largest of the same unit: what is left of a zero (model/scales.py) */
-#define GROUP 1e-3       /* of the largest of its like: the least magnitude of a zero */
 #define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (integrate/runs.py) */
 #define MOVED 1e-10      /* of its magnitude: an anchor that moves by more is not what the text gives */
+#define CONTRACTS 0.5    /* largest residual over the one before: Newton's method converges (Deuflhard 2004, 2.1) */
+#define ALIKE 1e-8       /* of its magnitude: two starts that are one */
 #define VANISHED 1e-6    /* pivot of the start's matrix, or entry of its Jacobian, over that of the nominal start */
 #define SAME 1e-12       /* of an instant: a claim's */
 #define TRACE 1
@@ -98,6 +99,85 @@ static int negative_inertia(const sd_many *many)
     return 0;
 }
 
+/* points are settled in these magnitudes */
+static void scale(sd_settle *settle, const double *magnitude, double tau)
+{
+    memcpy(settle->scale, magnitude, (size_t)settle->unknowns * sizeof *magnitude);
+    for (int32_t k = 0; k < settle->rates; k++)
+        settle->scale[settle->unknowns + k] = magnitude[settle->rate[k]] / tau;
+}
+
+/* what is left of a zero is zero, in the settler's magnitudes, and what the text gives is what it gives: balances would
+ * be sized by round-off */
+static void clean(const sd_many *many, const double *anchor, double *y, double *yd)
+{
+    const sd_settle *settle = many->start;
+    for (int32_t i = 0; i < settle->unknowns; i++)
+        if (fabs(y[i] - (many->anchored[i] ? anchor[i] : 0.0)) <= NOTHING * settle->scale[i])
+            y[i] = many->anchored[i] ? anchor[i] : 0.0;
+    for (int32_t k = 0; k < settle->rates; k++)
+        if (fabs(yd[settle->rate[k]]) <= NOTHING * settle->scale[settle->unknowns + k])
+            yd[settle->rate[k]] = 0.0;
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+}
+
+/* 1: y, yd settled, the anchored as they were, everything finite, on the root of the nominal start; magnitude: by which,
+ * NULL: those of the nominal start */
+static int settled(sd_many *many, const double *anchor, const double *magnitude, double *y, double *yd)
+{
+    restore(many->region, many->regions);
+    if (magnitude)
+        scale(many->start, magnitude, many->tau);
+    if (sd_settle_point(many->start, many->t0, y, yd) || *many->start->system->stop)
+        return 0;
+    if (!(many->start->contracted <= CONTRACTS))
+        return 0;
+    clean(many, anchor, y, yd);
+    for (int32_t i = 0; i < many->written; i++) {
+        if (!isfinite(y[i]) || !isfinite(yd[i]))
+            return 0;
+        if (many->anchored[i] && !(fabs(y[i] - anchor[i]) <= MOVED * fmax(many->size[i], fabs(anchor[i]))))
+            return 0;
+    }
+    return 1;
+}
+
+/* 1: what the text guesses, if that is not what it guessed at the nominal start, leads to y, yd too */
+static int guessed(sd_many *many, const double *anchor, const double *y, const double *yd)
+{
+    int32_t n = many->written, other = 0;
+    double *a = many->passes[1].y, *b = many->passes[1].start_rate;
+    memcpy(a, y, (size_t)many->passes[0].n * sizeof *y);
+    memcpy(b, yd, (size_t)many->passes[0].n * sizeof *yd);
+    for (int32_t i = 0; i < n; i++)
+        if (many->guessed[i] && anchor[i] != many->guess[i]) {
+            other = 1;
+            a[i] = anchor[i];
+        }
+    if (!other)
+        return 1;
+    if (!settled(many, anchor, NULL, a, b))
+        return 0;
+    for (int32_t i = 0; i < n; i++)
+        if (!(fabs(a[i] - y[i]) <= ALIKE * fmax(many->size[i], fabs(y[i]))))
+            return 0;
+    return 1;
+}
+
+/* magnitudes at this start, as a run of its own finds them (runtime/integrate/origin.py); 1: they cannot be had */
+static int sized(sd_many *many)
+{
+    const sd_pass *pass = &many->passes[0];
+    memset(pass->yd, 0, (size_t)pass->n * sizeof(double));
+    for (int32_t i = 0; i < pass->n; i++)
+        if (pass->differential[i])
+            pass->yd[i] = pass->start_rate[i];
+    sd_jacobian(many->system, many->t0, pass->y, pass->start_rate, many->form_jy, many->form_jyd);
+    return sd_magnitudes(many->sizing, many->system, many->t0, many->t1 - many->t0, pass->y, pass->yd, many->form_jy,
+                         many->form_jyd, pass->yd, many->order, many->found, &many->tau);
+}
+
 /* y, yd of passes[0] := the consistent start with these anchors */
 static int begin(sd_many *many, const double *anchor)
 {
@@ -109,31 +189,12 @@ static int begin(sd_many *many, const double *anchor)
     for (int32_t i = 0; i < many->written; i++)
         if (many->anchored[i])
             y[i] = anchor[i];
-    restore(many->region, many->regions);
-    if (sd_settle_point(many->start, many->t0, y, yd) || *many->start->system->stop)
+    if (!settled(many, anchor, NULL, y, yd) || !guessed(many, anchor, y, yd))
         return SD_MANY_START;
-    for (int32_t i = 0; i < many->written; i++) {
-        if (!isfinite(y[i]) || !isfinite(yd[i]))
-            return SD_MANY_START;
-        if (many->anchored[i] && !(fabs(y[i] - anchor[i]) <= MOVED * fmax(many->size[i], fabs(anchor[i]))))
-            return SD_MANY_START;
-    }
     sd_jacobian(many->start->system, many->t0, y, yd, many->jy, many->jyd);
     if (other_pattern(many) || !(many->start->linear->smallest >= VANISHED * many->smallest) || negative_inertia(many))
         return SD_MANY_STRUCTURE;
-    return SD_MANY_DONE;
-}
-
-/* out [n]: |y|, of a state what its rate makes of it in the time scale of the start, and a part of its like */
-static void sizes(const sd_many *many, int32_t n, const double *y, const double *yd, double *out, double *largest)
-{
-    memset(largest, 0, (size_t)many->alikes * sizeof *largest);
-    for (int32_t i = 0; i < n; i++) {
-        out[i] = fmax(fabs(y[i]), many->state[i] ? many->tau * fabs(yd[i]) : 0.0);
-        largest[many->alike[i]] = fmax(largest[many->alike[i]], out[i]);
-    }
-    for (int32_t i = 0; i < n; i++)
-        out[i] = fmax(out[i], GROUP * largest[many->alike[i]]);
+    return sized(many) || !settled(many, anchor, many->found, y, yd) ? SD_MANY_START : SD_MANY_DONE;
 }
 
 /* --- one integration ------------------------------------------------------------------------------------------- */
@@ -162,7 +223,6 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
 {
     sd_run *run = pass->run;
     const double *y = many->passes[0].y, *yd = many->passes[0].start_rate;
-    double *now = many->work, *then = now + pass->n, *largest = then + pass->n;
     restore(pass->region, pass->regions);
     if (run->ledgers)
         clear_ledgers(run->ledgers);
@@ -175,13 +235,12 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
     for (int32_t i = 0; i < pass->n; i++)
         if (pass->differential[i])
             pass->yd[i] = yd[i];
-    sizes(many, many->written, y, yd, now, largest);
-    sizes(many, many->written, many->y0, many->yd0, then, largest);
-    memcpy(pass->magnitude, pass->magnitude0, (size_t)pass->n * sizeof *now);
-    for (int32_t i = 0; i < many->written; i++)
-        if (now[i] > 0.0 && then[i] > 0.0 && (many->state[i] || now[i] > then[i]))
-            pass->magnitude[i] *= now[i] / then[i];
-    memset(pass->met, 0, (size_t)pass->n * sizeof *now);
+    for (int32_t i = 0; i < pass->n; i++)
+        pass->magnitude[i] = fmax(many->found[i], pass->least[i]);
+    scale(run->settle, pass->magnitude, many->tau);
+    if (pass->project)
+        scale(pass->project, pass->magnitude, many->tau);
+    memset(pass->met, 0, (size_t)pass->n * sizeof(double));
     *pass->rtol = tolerance;
     *pass->h_max = longest;
     if (last) {
@@ -279,9 +338,16 @@ static void take(sd_many *many, sd_run *run, sd_samples *own, sd_samples *there)
         }
         many->thinned += due;
     }
+    many->held = run->rows;
     if (*run->stepper->t >= *run->stepper->t_end && run->rows)
         claim(many, run->row + (size_t)(run->rows - 1) * (size_t)(SD_ROW_HEAD + 2 * many->observed), 1);
     run->rows = 0;
+}
+
+static void count(sd_many *many, const sd_pass *pass, int64_t sign)
+{
+    for (int k = 0; k < SD_MANY_COUNTERS; k++)
+        many->counted[k] += pass->counter[k] ? sign * *pass->counter[k] : 0;
 }
 
 /* from the start to the end; own: its samples, there: those at instants of the last run */
@@ -289,20 +355,24 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
 {
     sd_run *run = pass->run;
     int64_t left = many->max_steps;
+    count(many, pass, -1);
     own->number = there->number = 0;
     many->stride = 1;
     many->seen = many->rows = many->thinned = many->broken = many->judged = 0;
     for (;;) {
         int64_t before = *run->stepper->taken;
+        double from = cpu_now();
         int state = sd_run_advance(run, left, 1e9);
+        many->spent += cpu_now() - from;
         *steps += *run->stepper->taken - before;
         left -= *run->stepper->taken - before;
         take(many, run, own, there);
         if (state == SD_FINISHED)
             break;
-        if (state != SD_FULL || left <= 0)
+        if (state != SD_FULL || left <= 0 || many->keep == SD_MANY_ROWS)
             return SD_MANY_FAILED;
     }
+    count(many, pass, 1);
     if (!many->known && own->number && own->time[own->number - 1] < many->last_time)
         own->number++; /* the last row stands behind the others already */
     return run->beyond > BEYOND ? SD_MANY_ACCURACY : SD_MANY_DONE; /* a step passed over something */
@@ -412,6 +482,22 @@ static int balanced(const sd_many *many, const sd_ledgers *ledgers)
     return 1;
 }
 
+/* of the samples only those at instants of other ones, which are fewer: a draft has no two within a part of a step */
+static void match(const sd_many *many, sd_samples *mine, const sd_samples *other)
+{
+    int32_t n = 0;
+    size_t columns = (size_t)many->columns, bytes = columns * sizeof(double);
+    for (int32_t k = 0; k < mine->number && n < other->number; k++) {
+        if (mine->time[k] != other->time[n])
+            continue;
+        mine->time[n] = mine->time[k];
+        memmove(mine->value + n * columns, mine->value + k * columns, bytes);
+        memmove(mine->late + n * columns, mine->late + k * columns, bytes);
+        n++;
+    }
+    mine->number = n;
+}
+
 /* runs until the last one's estimated error is what was asked: `control` of integrate/accuracy.py */
 static int control(sd_many *many, int64_t *steps, double *estimate)
 {
@@ -441,6 +527,8 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         if (state && !lost_now)
             return state;
         state = SD_MANY_DONE;
+        if (many->known)
+            match(many, there, last);
         double over, apart = difference(many, &many->passes[1], last, there, &over);
         if (lost || lost_now)
             apart = over = INFINITY;
@@ -503,6 +591,9 @@ void sd_many_runs(sd_many *many, int32_t runs, const double *p, const double *an
         many->least = least + k * columns;
         many->most = most + k * columns;
         many->thick = thick + k * columns * (size_t)many->thins;
+        many->held = 0;
+        many->spent = 0.0;
+        memset(many->counted, 0, sizeof many->counted);
         memcpy(many->p, p + (size_t)k * many->parameters, (size_t)many->parameters * sizeof *p);
         steps[k] = 0;
         estimate[k] = NAN;

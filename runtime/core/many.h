@@ -3,7 +3,9 @@
  * Everything that depends on the structure (patterns, orders, places) is set up once, at a nominal run.  A run begins by
  * putting every structure back as it was set up, so that what comes of it depends on its own numbers and on nothing that
  * ran before: results are equal bit for bit whatever the order, and whoever runs them.
- * Start: the anchored unknowns as the run's text gives them, everything else from the nominal start by one settling.
+ * Start: the anchored unknowns as the run's text gives them, everything else from the nominal start by one settling, whose
+ * steps converge as Newton's method does near a root; guesses that are others than the nominal ones must lead to it too.
+ * Magnitudes: of this start, as any run finds them (sizing.h).
  * Accuracy: a draft and finer runs compared at instants of the one before, as runtime/integrate/accuracy.py has it.
  * A run that fails, misses its accuracy or a ledger, breaks a claim, or whose structure is another than the nominal's
  * is handed back without a result: the caller runs it on its own, and says what is the matter.
@@ -12,6 +14,7 @@
 #define SYSDYN_MANY_H
 
 #include "run.h"
+#include "sizing.h"
 
 enum sd_many_state {
     SD_MANY_DONE = 0,
@@ -22,6 +25,9 @@ enum sd_many_state {
     SD_MANY_ENERGY = 5,    /* a ledger does not balance */
     SD_MANY_CLAIM = 6      /* an expectation does not hold */
 };
+
+#define SD_MANY_COUNTERS 8
+#define SD_MANY_ROWS 3 /* `keep`: all rows of the last integration stay where it wrote them */
 
 /* a structure as it was set up */
 typedef struct sd_region {
@@ -39,9 +45,11 @@ typedef struct sd_pass {
     double *y, *yd, *start_rate; /* [n] */
     const int32_t *differential; /* [n] 1: its rate is a start's */
     double *magnitude, *met;     /* [n] of the stepper */
-    const double *magnitude0;    /* [n] of the nominal start */
+    const double *least;         /* [n] what round-off leaves open: no magnitude is less */
+    sd_settle *project;          /* of the method; NULL: none */
     double *rtol, *h_max;        /* of the stepper */
     double longest;              /* step [s] */
+    const int64_t *counter[SD_MANY_COUNTERS]; /* of its work; NULL: none */
 } sd_pass;
 
 /* an expectation: value[left] op value[right], value[within] granted; moment 0 always, 1 finally, 2 at an instant */
@@ -65,6 +73,8 @@ typedef struct sd_many {
     int32_t regions;
     const double *y0, *yd0;      /* [written] the nominal start */
     const int32_t *anchored;     /* [written] 1: as the text gives it */
+    const int32_t *guessed;      /* [written] 1: sought from what the text gives, at the nominal start `guess` */
+    const double *guess;         /* [written] */
     const double *size;          /* [written] magnitudes */
     double smallest;             /* pivot of the start's matrix at the nominal start */
     const double *jy0, *jyd0;    /* [entries] of the start's system at the nominal start */
@@ -76,9 +86,12 @@ typedef struct sd_many {
     double *inertia;             /* [flows][flows] */
     double t0, t1;
     /* magnitudes */
-    const int32_t *alike, *state; /* [n] number of the kind and unit; 1: state whose magnitude nobody named */
-    int32_t alikes;
-    double tau;                  /* time scale of the start [s] */
+    sd_system *system;           /* of the passes */
+    const sd_sizing *sizing;
+    const int32_t *order;        /* of its columns; NULL: dense */
+    double *form_jy, *form_jyd;  /* [entries] at the start */
+    double *found;               /* [n] magnitudes of this run */
+    double tau;                  /* time scale of its start [s] */
     /* accuracy */
     sd_pass passes[2];
     const int32_t *column;       /* [columns] place among the observed */
@@ -92,7 +105,7 @@ typedef struct sd_many {
     double energy;               /* part of a ledger's turnover that its balance may be */
     const sd_claim *claim;
     int32_t claims;
-    int32_t keep;                /* 0 end values, 1 extrema too, 2 and rows `thin` of the trace */
+    int32_t keep;                /* 0 end values, 1 extrema too, 2 and rows `thin` of the trace; SD_MANY_ROWS */
     const int32_t *thin;         /* [thins] ascending numbers of rows of the trace */
     int32_t thins;
     /* at work */
@@ -100,8 +113,12 @@ typedef struct sd_many {
     int32_t stride, seen, rows, thinned, broken, judged;
     double last_time;
     double *end, *least, *most, *thick; /* [columns] x 3, [columns][thins]: where the run's results go */
-    double *work;                /* [3 n + 4 columns + 2 units + alikes] */
+    double *work;                /* [4 columns + 2 units] */
     int32_t *kind;               /* [room] */
+    /* of the last run */
+    int32_t held;                /* rows of its last integration, at `row` of that */
+    double spent;                /* CPU of its integrations [s] */
+    int64_t counted[SD_MANY_COUNTERS]; /* by all of them */
 } sd_many;
 
 /* one run after the other: p [runs][parameters], anchor [runs][written] values of anchored unknowns; state [runs] as

@@ -316,6 +316,8 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
             break;
         moved = move(settle, y, yd);
         double now = measure(settle, t, y, yd);
+        if (!(now <= CLOSE))
+            settle->contracted = fmax(settle->contracted, before > 0.0 && isfinite(now) ? now / before : INFINITY);
         /* between residuals of round-off the later point is the better one: the state is back where it came from */
         if (now < *best || now <= EXACT || (now <= FINE && drag >= SMALL)) {
             *best = now;
@@ -357,6 +359,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
     double best;
     settle->calls++;
+    settle->contracted = 0.0;
     take(settle, y, yd, settle->x0);
     if (settle->basis && settle->hold == 1.0 && settle->refused < REFUSALS) {
         if (follow(settle, t, y, yd, &best)) {

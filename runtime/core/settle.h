@@ -52,6 +52,7 @@ typedef struct sd_settle {
     double *room;                    /* [2][unknowns of the whole system] for points with all of them, and kept ones */
     int32_t whole;                   /* unknowns of a point: those of the system, or of the one that it is condensed from */
     double drift;                    /* norm of the constraint rows before the last call moved the point */
+    double contracted;               /* largest residual beside the one before it, of the steps of the last call */
 } sd_settle;
 
 /* whole: unknowns of a point, more than the system's where that is condensed */

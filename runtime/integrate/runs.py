@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.events.kinks import LIVE
 from sysdyn.runtime.integrate import accuracy
 from sysdyn.runtime.integrate.accuracy import Sampled
@@ -143,6 +145,14 @@ class Runs:
         self.open = options.every is not None
         self.compared_at: Floats | None = None
 
+    def derive(self, known: NDArray[np.bool_]) -> None:
+        """Of the derivatives of stored quantities only the known ones [observed] are stored."""
+        if not known.all():
+            self.columns = tuple(
+                replace(column, derivative=False) if column.derivative and not known[column.place] else column
+                for column in self.columns
+            )
+
     def _instants(self) -> tuple[Floats, Ints, Floats | None, _Joined | None]:
         """Instants [s] of rows and their kinds; those at which runs are compared where they are known (while it is
         open, those from which a draft takes its own), and both together.  The run before had the same, or others.
@@ -258,9 +268,8 @@ class Runs:
             self.forecast = time.monotonic() - self.began + left
         return left
 
-    def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
-        """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
-        first = self.done is None
+    def layout(self, rtol: float, atol: float | None) -> Layout:
+        """What a trace holds before its first row."""
         attributes: dict[str, str | float | int] = {
             **self.options.attributes,
             "method": self.method,
@@ -269,10 +278,14 @@ class Runs:
             "rtol": float(rtol),
             "atol": float(atol or 0.0),
         }
+        return Layout(self.columns, len(self.names), attributes, self.options.parameters)
+
+    def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
+        """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
+        first = self.done is None
         self.samples = []
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
-        layout = Layout(self.columns, len(self.names), attributes, self.options.parameters)
-        self.writer = self.keeping.writer(layout, first)
+        self.writer = self.keeping.writer(self.layout(rtol, atol), first)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest), self.origin)
         try:
             finished = self._integrate(integration)

@@ -1,34 +1,39 @@
 """Many runs in the core, one after the other: structures are set up once at a nominal run, and put back for each.
 
 Received: the nominal start with its structure, the options of a run and the method that the nominal run took; then the
-numbers of the runs.  Handed back: `Finished`.  A run without a result (`state` is not DONE) is the caller's.
+numbers of the runs.  Handed back: `Results`, or a trace.  A run without a result (`state` is not DONE) is the caller's.
 """
 
 from __future__ import annotations
 
 import ctypes as c
+import time
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import accuracy
-from sysdyn.runtime.integrate.accuracy import STRETCH, Law
+from sysdyn.runtime.integrate.accuracy import STRETCH, Achieved, Law
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
-from sysdyn.runtime.integrate.request import LONGEST, Request
-from sysdyn.runtime.integrate.runs import ROUGH, Runs, Way
-from sysdyn.runtime.judgement import allowed
+from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs, Way
+from sysdyn.runtime.judgement import allowed, judge
 from sysdyn.runtime.many.anchors import anchors, guesses
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
-from sysdyn.runtime.model.scales import alike
+from sysdyn.runtime.model.scales import confirmed, sizing
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.simulate import alternatives, counted, formed
+from sysdyn.runtime.numerics.ordering import order_of
+from sysdyn.runtime.simulate import alternatives, close, counted, form_name, formed
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import DENSE, Structure
+from sysdyn.runtime.trace.keeping import Held
+from sysdyn.runtime.trace.trace import Parameter, Trace
 from sysdyn.values import dataclass
 
 MOST = 48
@@ -36,12 +41,16 @@ MOST = 48
 DONE = 0
 WHY = ("", "start", "structure", "stopped", "accuracy", "energy", "claim")
 """What kept a run from a result, by its state."""
-END, EXTREMA, TRACES = 0, 1, 2
-"""What is kept of a run: end values alone, least and largest too, rows of its trace too."""
+END, EXTREMA, TRACES, ROWS = 0, 1, 2, 3
+"""What is kept of a run: end values alone, least and largest too, some rows of its trace too; all rows of the last one,
+which is then handed back as a trace."""
 COUNTS = 1e-9
 """Of the largest entry of a row: what is less is round-off, or may as well vanish."""
 MARGIN, LOOSER = 0.1, 3.0
 """Of the accuracy asked: what the nominal run's estimate may be; how much its tolerances are loosened at most."""
+COUNTED = ("steps", "rejected_steps", "newton_failures")
+"""Counters of a method's structure, the first of a pass; then factorisations, residuals, Jacobians, and those two of an
+underlying equation."""
 FREELY = 0.25
 """Longest step as part of the span where nothing in the rows depends on time: no event of a source can be missed."""
 
@@ -65,7 +74,7 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class Results:
     """Of runs [k]: state (DONE, or what `WHY` names), steps, estimate (relative), cpu [s]; end, least, most [k,
     quantities]; traces [k, quantities, rows kept].
     """
@@ -86,7 +95,7 @@ def way_of(
     """The way with the method that a nominal run took, and the start in its layout."""
     written, start, facts = counted(written, start, facts, options)
     system, index, _ = formed(written, start, facts, options)
-    first = Way(choose_method(options), system, index, "")
+    first = Way(choose_method(options), system, index, form_name(system, facts))
     ways = (first,) if options.method != "auto" else alternatives(first, written, start, options)
     found = next((way for way in ways if way.method == method), None)
     if found is None:
@@ -136,7 +145,8 @@ class Batch:
             raise NotApplicableError(why)
         if keep == END and not claims:
             options = replace(options, every=None, at=())
-        self.options, self.way = replace(options, output=None, progress=None, watch=None), way
+        options = replace(options, output=None, progress=None, watch=None, wall_began=None, cpu_compile=0.0)
+        self.options, self.way = options, way
         self._alive: list[Any] = []  # what the core has addresses of
         self.runs = Runs(start, self.options, way)
         if self.runs.meters or not self.runs.columns:
@@ -160,6 +170,9 @@ class Batch:
         self._measure(longest, law, draft, fine)
         self._claims(claims)
         self.core.keep = keep
+        if keep == ROWS:
+            written = way.system if way.system.form.name == "3" else way.system.another("3")
+            self.runs.derive(determined(written, start))
         self._loosen(law)
 
     def _loosen(self, law: Law) -> None:
@@ -170,6 +183,8 @@ class Batch:
         guess = guesses(self.system.form.at, self.system.form.written, self.system.description.initial)[0]
         found = self.run(self.system.description.p[None, :], guess[None, :])
         if found.state[0] != DONE:
+            if self.core.keep == ROWS:
+                raise NotApplicableError(f"the nominal run has no result in the core: {WHY[found.state[0]]}")
             return
         over = float(found.estimate[0]) / float(np.min(self._targets, initial=1.0))
         factor = float(np.clip((MARGIN / max(over, 1e-9)) ** (1.0 / law.power), 1.0, LOOSER))
@@ -192,7 +207,7 @@ class Batch:
     def _pass(self, number: int, tolerance: float, longest: float) -> Integration:
         """The structures of the draft (0), or of the runs behind it (1)."""
         runs, options = self.runs, self.options
-        runs.controlled, runs.open = True, False  # every run is compared at the same instants
+        runs.controlled, runs.open = True, False  # every run is compared at instants of the draft
         request: Request = runs.request(tolerance, None, longest)
         instants, kinds = runs.instants, runs.kinds
         if runs.common is not None:
@@ -204,6 +219,7 @@ class Batch:
             h_max=min(longest * (options.t_end - options.t_start), options.longest or np.inf),
             settled_to=ROUGH * tolerance,
             draft=not number,
+            apart=APART if runs.common is not None and not number else 0.0,
             condense=False,
             max_wall=None,
         )
@@ -254,10 +270,24 @@ class Batch:
         field.y, field.yd, field.start_rate = (self._kept(room) for room in rooms)
         field.differential = self._kept(made.roles.differential.astype(np.int32))
         field.magnitude, field.met = lib.pointer(made.magnitude), lib.pointer(made._met)
-        field.magnitude0 = self._kept(made.magnitude.copy())
+        field.least = self._kept(np.ascontiguousarray(made._least))
+        field.project = None if made._project is None else c.addressof(made._project.core.contents)
         field.rtol = c.addressof(core) + kind.rtol.offset
         field.h_max = c.addressof(core) + kind.h_max.offset
         field.longest = longest
+        field.counter[:] = self._counters(made)
+
+    @staticmethod
+    def _counters(made: Integration) -> list[int | None]:
+        """Addresses of what is counted."""
+        method, linear, own = made.method.contents, made.linear.contents, made.stepped.core
+        found: list[tuple[Any, str]] = [(method, name) for name in COUNTED]
+        found += [(linear, "factorisations"), (own, "residual_evaluations"), (own, "jacobian_evaluations")]
+        if made.underlying is not None:
+            found.append((made.underlying.applied, "residual_evaluations"))
+            found.append((made.underlying.matrix, "jacobian_evaluations"))
+        places: list[int | None] = [c.addressof(item) + getattr(type(item), name).offset for item, name in found]
+        return places + [None] * (lib.COUNTERS - len(places))
 
     def _begin(self) -> None:
         """The start of every run."""
@@ -289,6 +319,8 @@ class Batch:
         self._alive += [settler, settled]
         many.y0, many.yd0 = self._kept(y.copy()), self._kept(yd.copy())
         many.anchored = self._kept(found.astype(np.int32))
+        guess, said = guesses(system.form.at, n, system.description.initial)
+        many.guessed, many.guess = self._kept((said & ~found).astype(np.int32)), self._kept(guess)
         many.size = self._kept(made.magnitude[:n].copy())
         many.jy0, many.jyd0 = self._kept(np.append(jy, 0.0)), self._kept(np.append(jyd, 0.0))
         counts = 1 * _counts(settled, jy, settler.scale[:n]) + 2 * _counts(settled, jyd, self._rates(settler, n))
@@ -345,11 +377,12 @@ class Batch:
         many.p, many.parameters = lib.pointer(system.description.p), system.description.p.size
         many.written, many.columns, many.observed = n, columns, self.passes[1].observed
         many.t0, many.t1 = options.t_start, options.t_end
-        number = alike(system)[:n].astype(np.int32)
-        state = np.isin(system.kinds[:n], ("q", "f", "p", "s")) & (system.nominal[:n] == 0.0)
-        many.alike, many.state = self._kept(number), self._kept(state.astype(np.int32))
-        many.alikes = int(number.max(initial=0)) + 1
-        many.tau = self.passes[1]._time
+        sizes = sizing(system)
+        self._alive.append(sizes)
+        many.system, many.sizing = c.addressof(system.core), c.addressof(sizes.core)
+        many.order = lib.pointer(order_of(system))
+        many.form_jy, many.form_jyd = (self._kept(np.zeros(system.pattern.entries + 1)) for _ in range(2))
+        many.found = self._kept(np.zeros(system.unknowns + 1))
         for k in (0, 1):
             self._fill(k, min((STRETCH, 1.0)[k] * longest * span, options.longest or np.inf))
         many.column = self._kept(np.array([column.place for column in runs.columns], dtype=np.int32))
@@ -380,7 +413,7 @@ class Batch:
                 room=room,
             )
         many.kind = self._kept(np.zeros(room, dtype=np.int32))
-        many.work = self._kept(np.zeros(3 * system.unknowns + 4 * columns + 2 * len(units) + many.alikes + 8))
+        many.work = self._kept(np.zeros(4 * columns + 2 * len(units) + 8))
 
     def _claims(self, claims: tuple[Claim, ...]) -> None:
         """Expectations that the core looks at."""
@@ -394,11 +427,11 @@ class Batch:
         self._alive.append(made)
         self.core.claim, self.core.claims = c.addressof(made), len(claims)
 
-    def run(self, p: Floats, anchor: Floats) -> Finished:
+    def run(self, p: Floats, anchor: Floats) -> Results:
         """Runs with numbers p [k, parameters] and initial values anchor [k, written] (guesses of all unknowns)."""
         number, columns = len(p), len(self.columns)
         p, anchor = np.ascontiguousarray(p), np.ascontiguousarray(anchor)
-        found = Finished(
+        found = Results(
             np.zeros(number, dtype=np.int32),
             np.zeros(number, dtype=np.int64),
             np.zeros(number),
@@ -415,6 +448,39 @@ class Batch:
         self.system.description.p[:] = before
         self.system.failure.check()
         return found
+
+
+    def trace(self, p: Floats, anchor: Floats, parameters: tuple[Parameter, ...]) -> Trace | None:
+        """One run with its numbers p [parameters] and initial values anchor [written], as `simulate` hands back its
+        own; None where it has no result here.  parameters: as the trace lists them.
+        """
+        runs, core, made = self.runs, self.core, self.passes[1]
+        runs.began = time.monotonic()
+        found = self.run(p[None, :], anchor[None, :])
+        if found.state[0] != DONE:
+            return None
+        runs.cpu, runs.wall = core.spent, time.monotonic() - runs.began
+        steps, rejected, newton, factorisations, *evaluated = core.counted
+        residuals, jacobians = (evaluated[k] + evaluated[k + 2] for k in (0, 1))
+        runs.statistics = Statistics(steps, rejected, residuals, jacobians, factorisations, newton)
+        magnitude = confirmed(self.system, self.options.t_end - self.options.t_start, *made._sizes())
+        finished = Finished(
+            self.options.t_end,
+            runs.statistics,
+            magnitude[: self.system.form.written],
+            made.largest(),
+            core.spent,
+            made.settler.core.contents.failures,
+            made.ledgers,
+        )
+        rows = made._rows[: core.held]
+        writer = Held(replace(runs.layout(made.method.contents.rtol, None), parameters=parameters))
+        writer.append(rows[(rows[:, 1].astype(np.int32) & TRACE) > 0])
+        runs.done = finished, [], writer
+        estimate = float(found.estimate[0])
+        judgement = judge(self.options, runs.method, finished.balances, True, ())
+        close(runs, Achieved(estimate, estimate < accuracy.ROUND_OFF, True, 0, 0.0), judgement)
+        return runs.held
 
 
 def _counts(system: System, values: Floats, scale: Floats) -> NDArray[np.bool_]:

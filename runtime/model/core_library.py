@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime import _core  # type: ignore[attr-defined]
 from sysdyn.runtime.model.core_structures import (
     CAUSES,
+    COUNTERS,
     MAX_ORDER,
     PAIRS,
     ROW_HEAD,
@@ -54,6 +55,7 @@ from sysdyn.runtime.model.core_structures import (
 
 __all__ = [
     "CAUSES",
+    "COUNTERS",
     "MAX_ORDER",
     "PAIRS",
     "ROWS",

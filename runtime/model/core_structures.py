@@ -410,6 +410,7 @@ class Settle(c.Structure):
         ("room", _P),
         ("whole", _I),
         ("drift", _D),
+        ("contracted", _D),
     ]
 
 
@@ -577,6 +578,10 @@ class Region(c.Structure):
     _fields_ = [("at", _P), ("copy", _P), ("size", _L)]
 
 
+COUNTERS = 8
+"""Of the work of a pass."""
+
+
 class Pass(c.Structure):
     """sd_pass."""
 
@@ -585,8 +590,9 @@ class Pass(c.Structure):
         ("region", _P),
         *[(name, _I) for name in ["regions", "n"]],
         *[(name, _P) for name in ["y", "yd", "start_rate", "differential"]],
-        *[(name, _P) for name in ["magnitude", "met", "magnitude0", "rtol", "h_max"]],
+        *[(name, _P) for name in ["magnitude", "met", "least", "project", "rtol", "h_max"]],
         ("longest", _D),
+        ("counter", _P * COUNTERS),
     ]
 
 
@@ -610,15 +616,14 @@ class Many(c.Structure):
         *[(name, _I) for name in ["parameters", "written", "columns", "observed"]],
         *[(name, _P) for name in ["start", "region"]],
         ("regions", _I),
-        *[(name, _P) for name in ["y0", "yd0", "anchored", "size"]],
+        *[(name, _P) for name in ["y0", "yd0", "anchored", "guessed", "guess", "size"]],
         ("smallest", _D),
         *[(name, _P) for name in ["jy0", "jyd0", "counts", "jy", "jyd"]],
         *[(name, _I) for name in ["flows", "inertias"]],
         *[(name, _P) for name in ["inertia_row", "inertia_column", "inertia_entry", "inertia_rate"]],
         *[(name, _P) for name in ["inertia_sign", "inertia"]],
         *[(name, _D) for name in ["t0", "t1"]],
-        *[(name, _P) for name in ["alike", "state"]],
-        ("alikes", _I),
+        *[(name, _P) for name in ["system", "sizing", "order", "form_jy", "form_jyd", "found"]],
         ("tau", _D),
         ("passes", Pass * 2),
         *[(name, _P) for name in ["column", "target", "unit", "unit_of"]],
@@ -635,6 +640,9 @@ class Many(c.Structure):
         *[(name, _I) for name in ["stride", "seen", "rows", "thinned", "broken", "judged"]],
         ("last_time", _D),
         *[(name, _P) for name in ["end", "least", "most", "thick", "work", "kind"]],
+        ("held", _I),
+        ("spent", _D),
+        ("counted", _L * COUNTERS),
     ]
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.run.loaded import Loaded
 from sysdyn.cli.run.running import Request
-from sysdyn.cli.sweep.in_core import InCore
+from sysdyn.cli.sweep.in_core import Cases
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.many.batch import NotApplicableError
 
@@ -35,7 +35,7 @@ def row(name: str, parameter: str | None, runs: int, keep: str, until: str | Non
     parameter = parameter or some[0]
     cases = [{parameter: float(v)} for v in np.linspace(0.9, 1.1, runs) * known[parameter]]
     try:
-        core = InCore(loaded, [parameter], keep)
+        core = Cases(loaded, [parameter], keep)
     except NotApplicableError as error:
         return f"{name:20s} {parameter:8s} one by one: {error}"
     spent = []

@@ -45,11 +45,13 @@ SAME = ("pendulum", "dc_motor", "bouncing_ball", "diode_circuit", "co_circuit", 
 
 @pytest.mark.parametrize("name", [f"seed/{name}" for name in SAME])
 def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
+    """Runs on their own: with an option that the others do not have (tests/cli/test_in_core.py looks at those)."""
     file = MODELS / f"{name}.sd"
     model = load(file, scene="reference")
-    model.run({next(iter(model.parameters)): 1.1 * float(next(iter(model.parameters.values())))})
+    own = {"max_steps": 10**6}
+    model.run({next(iter(model.parameters)): 1.1 * float(next(iter(model.parameters.values())))}, **own)
     for changed in ({}, {k: 1.05 * float(v) for k, v in model.parameters.items() if np.ndim(v) == 0}):
-        mine = model.run(changed)
+        mine = model.run(changed, **own)
         other = simulate(file, scene="reference", set=changed, output=tmp_path / "t.h5")
         assert set(mine.names) == set(other.names)
         assert all(np.array_equal(mine[n], other[n], equal_nan=True) for n in (*mine.names, "audit.energy"))

@@ -11,7 +11,7 @@ import pytest
 from sysdyn.cli.main import run
 from sysdyn.cli.run.loaded import Loaded
 from sysdyn.cli.run.running import Request
-from sysdyn.cli.sweep.in_core import InCore
+from sysdyn.cli.sweep.in_core import Cases
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.many.batch import NotApplicableError
@@ -50,13 +50,13 @@ def test_runs_in_the_core_are_single_runs(name, keep):
     """End values and extrema within the accuracy of 1e-4 that both promise, and equal in any order and company."""
     loaded = Loaded(Request(str(MODELS / "seed" / f"{name}.sd"), accuracy=1e-4))
     names, cases = varied(loaded, SEEDS[name], 12)
-    core = InCore(loaded, names, keep)
+    core = Cases(loaded, names, keep)
     block, left = core.run(range(12), cases)
     assert not left
     assert (block.estimate <= 1e-4).all()
     order = np.random.default_rng(1).permutation(12)
     again, _ = core.run(order.tolist(), [cases[k] for k in order])
-    alone, _ = InCore(loaded, names, keep).run([7], [cases[7]])
+    alone, _ = Cases(loaded, names, keep).run([7], [cases[7]])
     for field in ("end", "least", "most", "estimate", "steps", "traces"):
         assert np.array_equal(getattr(block, field)[order], getattr(again, field)), field
         assert np.array_equal(getattr(block, field)[7:8], getattr(alone, field)), field
@@ -78,7 +78,7 @@ def test_what_is_met_is_within_the_accuracy(name):
     names, cases = varied(loaded, (), 5, 3)
     nominal = loaded.first.prepared.binding.values
     cases = [{n: nominal[n] + 5.0 * (v - nominal[n]) for n, v in case.items()} for case in cases]
-    block, _ = InCore(loaded, names, "end").run(range(5), cases)
+    block, _ = Cases(loaded, names, "end").run(range(5), cases)
     for row, k in enumerate(block.runs):
         trace = loaded.run(cases[k], Report(), accuracy=1e-9).outcome.traced
         for j, quantity in enumerate(block.names):
@@ -91,7 +91,7 @@ def test_small_swings_meet_the_closed_form(tmp_path):
     accuracy is kept though magnitudes differ by 1000 from the nominal run's.
     """
     loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd"), until="3"))
-    core = InCore(loaded, ["th_0"], "end")
+    core = Cases(loaded, ["th_0"], "end")
     amplitudes = [1e-3, 1e-2, 0.5, 1.5]
     block, left = core.run(range(4), [{"th_0": a} for a in amplitudes])
     assert not left
@@ -106,7 +106,7 @@ def test_what_is_another_structure_is_left_to_a_run_of_its_own():
     """No mass, a negative one, a rest without direction: no result in the core, and the others stand."""
     loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd")))
     cases = [{"m": 1.0, "th_0": 0.2}, {"m": 0.0, "th_0": 0.2}, {"m": -1.0, "th_0": 0.2}, {"m": 2.0, "th_0": 0.0}]
-    block, left = InCore(loaded, ["m", "th_0"], "end").run(range(4), cases)
+    block, left = Cases(loaded, ["m", "th_0"], "end").run(range(4), cases)
     assert left == [1, 2, 3]
     assert block.runs.tolist() == [0]
     kept = Runner(Request(str(MODELS / "seed" / "pendulum.sd")))(3, cases[3])
@@ -120,7 +120,7 @@ def test_what_is_another_structure_is_left_to_a_run_of_its_own():
 def test_why_not(name, parameter, why):
     loaded = Loaded(Request(str(MODELS / "seed" / f"{name}.sd")))
     with pytest.raises(NotApplicableError, match=why):
-        InCore(loaded, [parameter], "end")
+        Cases(loaded, [parameter], "end")
 
 
 def test_an_expectation_that_fails_is_named(tmp_path, monkeypatch, capsys):
@@ -155,7 +155,7 @@ def test_results_are_equal_bit_for_bit_whoever_runs_them(tmp_path, monkeypatch):
 def test_runs_in_the_core_pass_no_line_of_python_each(effort):
     """A period of the pendulum at 1e-4, end values: 10000 runs a second of a core (tests/bench/sweeps.py)."""
     loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd"), until="3.07"))
-    core = InCore(loaded, ["th_0"], "end")
+    core = Cases(loaded, ["th_0"], "end")
     cases = [{"th_0": float(a)} for a in np.linspace(0.05, 0.5, 500)]
     lines = [effort(lambda n=n: core.run(range(n), cases[:n]))[1] for n in (100, 100, 500)]
     assert lines[2] - lines[1] < 10 * 400
