@@ -176,6 +176,7 @@ def _load() -> Any:
         "sd_linear_z_pivoted": (_P, [_P]),
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P]),
         "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P]),
+        "sd_determined": (c.c_int, [_I, _I, *[_P] * 4, _D, _L, _P, _P]),
         "sd_match": (_I, [_I, _I, _P, _P, _P, _P]),
         "sd_peel": (_I, [_I, _I, _I, _P, _P, _P, _D, _P]),
         "sd_propagate": (c.c_int, [_P, _P, _P, _P, _I, _P]),
