@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
+from sysdyn.runtime.condense.condensed import LARGE, Condensed, Forms, condensed
 from sysdyn.runtime.condense.elimination import steady
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.least_norm import LeastNorm
@@ -127,7 +127,10 @@ class Integration:
         whole = request.events is not None or request.least_norm or request.fixed_step is not None
         if whole or not request.condense or request.method in ON_UNDERLYING:
             return None
-        return condensed(self.system, self.start.t, self.y, self.yd)
+        found = condensed(self.system, self.start.t, self.y, self.yd)
+        if self.system.unknowns > LARGE:
+            lib.core.sd_trim()
+        return found
 
     @property
     def stepped(self) -> System | Condensed:

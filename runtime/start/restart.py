@@ -27,7 +27,7 @@ def still(
     """Y, yd [unknowns as written] settled at t where no state [unknowns] moves for it; None where one does."""
     y, yd = point
     settler.core.contents.ready = 0
-    found, rate, done = settler.settle(t, y, yd, hold=HELD)
+    found, rate, done = settler.held(t, y, yd)
     stays = done and bool((np.abs(found - y)[state] <= STILL * magnitude[state]).all())
     return (found, rate) if stays else None
 
