@@ -113,9 +113,6 @@ class Condensed:
 
     def _pair(self) -> None:
         """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching."""
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import maximum_bipartite_matching
-
         form, columns, rows = self.whole.form, self.whole.pattern.columns_of(), self.whole.pattern.row
         row_at, at = np.full(self.whole.rows, -1), np.full(self.whole.unknowns, -1)
         row_at[self.kept_rows], at[self.kept] = np.arange(self.rows), np.arange(self.unknowns)
@@ -133,9 +130,12 @@ class Condensed:
         left, open_ = np.flatnonzero(own < 0), np.flatnonzero(free)
         entries = (own[self.pattern.columns_of()] < 0) & free[self.pattern.row]
         number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1
-        where = number[self.pattern.columns_of()[entries]], place[self.pattern.row[entries]]
-        rest = csr_array((np.ones(where[0].size), where), shape=(left.size, left.size))
-        found = maximum_bipartite_matching(rest, perm_type="column") if left.size else left
+        where = Places(place[self.pattern.row[entries]], number[self.pattern.columns_of()[entries]])
+        rest, _ = compress(open_.size, left.size, [where])
+        found, looks = np.full(left.size, -1, dtype=np.int32), np.zeros(1, dtype=np.int64)
+        arrays = (lib.pointer(item) for item in (rest.column, rest.row, found, looks))
+        if lib.core.sd_match(rest.rows, rest.unknowns, *arrays) < 0:
+            raise MemoryError
         if (found < 0).any():
             return
         own[left] = open_[found]

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define REFINEMENTS 2
+#define ROUND_OFF 1e-14 /* what is left of a row in excess that agrees; of others the refinement makes up for it */
 
 /* rest := b - A x */
 static void miss(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
@@ -25,6 +26,7 @@ int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const in
     int failed = lu && rest ? 0 : 2;
     if (!failed) {
         lu->most = most;
+        lu->dropped = ROUND_OFF;
         failed = sd_sparse_pivot(lu, column, row, value);
         failed = failed == 2 ? 2 : failed || !(lu->smallest >= least);
     }

@@ -96,6 +96,8 @@ class Integration:
         if system.form.name == "2":
             self._weigh()
         self._light = origin.light
+        if system.unknowns > LARGE:
+            origin.let_go()
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
         self.forms = self._condensed()
         self._linear()
@@ -111,6 +113,8 @@ class Integration:
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         self._stepper()
         self._driver()
+        if system.unknowns > LARGE:
+            lib.core.sd_trim()
         self.pieces = Pieces(self, request.events) if request.events else None
 
     def _weigh(self) -> None:
