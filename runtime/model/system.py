@@ -117,7 +117,7 @@ class System:
             for key in [k for k in layouts if isinstance(k, tuple) and self.form.name in (k[0], k[1], *k[2:3])]:
                 del layouts[key]
 
-    def forget_once(self, *name: Hashable) -> None:
+    def forget_once(self, name: Hashable) -> None:
         """The same of one thing that was made once."""
         if self.description.systems is None:
             self.description.layouts.pop(("once", name, self.form.name, self.left_out), None)
