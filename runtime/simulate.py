@@ -22,7 +22,7 @@ from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.start import ConsistentState, consistent_start
+from sysdyn.runtime.start.start import LARGE, ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
@@ -276,6 +276,8 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     system = written.another("0")
     missing = rateless(system, start)
     if missing:
+        if system.unknowns > LARGE:
+            system.forget()
         return replace(way, reason=f"no explicit equation for {missing[0]}"), other
     return Way("dopri", system, 1, "0", NOT_STIFF), way, other
 

@@ -27,6 +27,8 @@ LEAST, STEEP = 12, 50
 0.74 to 0.86 of the time, whole runs in memory as long as before or less; of fewer the tables cost what the steps save.
 Between steep laws small matrices may leave columns open (numerics/ordering.py), which a condensed one knows less well:
 a circuit of diodes of less than 20 unknowns crawled."""
+LARGE = 100_000
+"""Unknowns beyond which what only other numbers would need is let go."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
 DEFINED = "leaves runs: a constant sum of others"
@@ -80,14 +82,26 @@ def _spans(full: Longs) -> tuple[Longs, Longs, Longs]:
     return full[begin], begin, np.diff(np.concatenate([begin, [full.size]]))
 
 
+class Room:
+    """Where points, rows and matrices of whole systems are evaluated, one after the other."""
+
+    def __init__(self, *systems: System) -> None:
+        unknowns = max(max(system.form.extended, system.unknowns) for system in systems) + 8
+        entries = max(system.pattern.entries for system in systems) + 1
+        self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
+        self.r = np.zeros(max(system.rows for system in systems) + 1)
+        self.jy, self.jyd = np.zeros(entries), np.zeros(entries)
+
+
 class Condensed:
     """The kept unknowns and rows of a system; what Method and Settler ask of a System, with places of its own.
 
     kept, kept_rows: their places in the whole system; core: the core's structure of it.
     """
 
-    def __init__(self, system: System, found: Sums, kept_rows: Longs) -> None:
+    def __init__(self, system: System, found: Sums, kept_rows: Longs, room: Room) -> None:
         """found: the structure, and the first numbers."""
+        self._room = room
         self.whole, self.sums, self.kept, self.kept_rows = system, found, found.kept, kept_rows
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
@@ -99,9 +113,6 @@ class Condensed:
 
     def _pair(self) -> None:
         """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching."""
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import maximum_bipartite_matching
-
         form, columns, rows = self.whole.form, self.whole.pattern.columns_of(), self.whole.pattern.row
         row_at, at = np.full(self.whole.rows, -1), np.full(self.whole.unknowns, -1)
         row_at[self.kept_rows], at[self.kept] = np.arange(self.rows), np.arange(self.unknowns)
@@ -119,9 +130,12 @@ class Condensed:
         left, open_ = np.flatnonzero(own < 0), np.flatnonzero(free)
         entries = (own[self.pattern.columns_of()] < 0) & free[self.pattern.row]
         number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1
-        where = number[self.pattern.columns_of()[entries]], place[self.pattern.row[entries]]
-        rest = csr_array((np.ones(where[0].size), where), shape=(left.size, left.size))
-        found = maximum_bipartite_matching(rest, perm_type="column") if left.size else left
+        where = Places(place[self.pattern.row[entries]], number[self.pattern.columns_of()[entries]])
+        rest, _ = compress(open_.size, left.size, [where])
+        found, looks = np.full(left.size, -1, dtype=np.int32), np.zeros(1, dtype=np.int64)
+        arrays = (lib.pointer(item) for item in (rest.column, rest.row, found, looks))
+        if lib.core.sd_match(rest.rows, rest.unknowns, *arrays) < 0:
+            raise MemoryError
         if (found < 0).any():
             return
         own[left] = open_[found]
@@ -215,6 +229,10 @@ class Condensed:
             self._straight[0][int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
         self._some = some
 
+    def fix(self) -> None:
+        """Lets go of what only other numbers would need: `renew` is not asked again."""
+        del self._composition, self._shared, self._order
+
     def _observed_rates(self) -> bool:
         """Whether what is observed reads rates of eliminated unknowns."""
         blocks = self.whole.description.blocks
@@ -242,7 +260,7 @@ class Condensed:
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
         straight = self._straight = self._straights()
         self.renew(self.sums)
-        room = max(whole.form.extended, whole.unknowns) + 8
+        room = self._room
         self.condensed = lib.Condensed(
             full=c.addressof(self._trim),
             unknowns=self.unknowns,
@@ -258,11 +276,11 @@ class Condensed:
             from_=self._hold(self._from),
             to=self._hold(self._to),
             share=self._hold(self._share),
-            y=self._hold(np.zeros(room)),
-            yd=self._hold(np.zeros(room)),
-            r=self._hold(np.zeros(whole.rows + 1)),
-            jy=self._hold(np.zeros(whole.pattern.entries + 1)),
-            jyd=self._hold(np.zeros(whole.pattern.entries + 1)),
+            y=lib.pointer(room.y),
+            yd=lib.pointer(room.yd),
+            r=lib.pointer(room.r),
+            jy=lib.pointer(room.jy),
+            jyd=lib.pointer(room.jyd),
         )
         self.core = lib.System(
             unknowns=self.unknowns,
@@ -328,11 +346,12 @@ class _Condenser:
         self._found: Elimination | None = None
         self._forms: Forms | None = None
         self._last: tuple[Forms | None, bytes] | None = None
+        """What came of the last numbers asked, and their digest."""
 
     def forms(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         """With the numbers of now; of the same start and parameters those of the last time."""
         numbers = np.array([t]), y, yd, self.whole.description.p
-        asked = b"".join(item.tobytes() for item in numbers)
+        asked = sha256(b"".join(item.tobytes() for item in numbers)).digest()
         if self._last is None or self._last[1] != asked:
             self._last = self._renewed(t, y, yd), asked
         return self._last[0]
@@ -355,7 +374,14 @@ class _Condenser:
         elif not numbers.same(self._forms.stepped.sums):
             self._forms.stepped.renew(numbers)
             self._forms.settled.renew(numbers)
-        return self._forms
+        if whole.unknowns <= LARGE:
+            return self._forms
+        # of a large one the room counts: other numbers find all anew
+        forms, self._found, self._forms = self._forms, None, None
+        whole.forget_once("may leave")
+        for form in () if forms is None else (forms.stepped, forms.settled):
+            form.fix()
+        return forms
 
     def _made(self, found: Elimination, numbers: Sums) -> Forms | None:
         whole = self.whole
@@ -366,7 +392,10 @@ class _Condenser:
         if kept is None:
             return None
         places = np.flatnonzero(rows), np.flatnonzero(kept)
-        return Forms(Condensed(whole, numbers, places[0]), Condensed(self.settled, numbers, places[1]))
+        room = Room(whole, self.settled)
+        return Forms(
+            Condensed(whole, numbers, places[0], room), Condensed(self.settled, numbers, places[1], room)
+        )
 
 
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:

@@ -29,6 +29,8 @@ HEALTHY = 1e-7
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
 LONGEST = 12
 """Definitions one after the other: through more of them the rest would read everything (a chain of scalars)."""
+SEARCHED = 64
+"""Families among which a circle of definitions is looked for."""
 PREFERRED = ("kappa", "mu", "e", "f")
 """Kinds in the order in which they are defined by rows that could define more than one."""
 
@@ -114,8 +116,7 @@ def _rank(system: System, family: int) -> int:
 
 class _Search:
     """Unknowns and the rows that define them, as far as they are found; reads[a]: families that define family a; read:
-    families that define any.  No family is defined through itself: the next one is read by none so far, or reads none
-    that is defined.
+    families that define any.  No family is defined through itself.
 
     allowed [entries]: the row may define the unknown.
     """
@@ -150,11 +151,24 @@ class _Search:
         own, of = self.rows[entries] - span[0], self.of[entries]
         here = of == family
         once = np.bincount(own[here], minlength=span[1] - span[0]) == 1
-        blocked = [k for k in self._families(*span) if k != family and k in self.reads and family in self.read]
+        blocked = [k for k in self._families(*span) if k != family and self._through(k, family)]
         once[own[np.isin(of, blocked)]] = False
         found = entries[here & once[own]]
         found = found[self.allowed[found] & ~self.defined[self.columns[found]] & self.free[self.rows[found]]]
         return np.asarray(found[np.unique(self.columns[found], return_index=True)[1]])
+
+    def _through(self, first: int, family: int) -> bool:
+        """Whether a family is defined through another one, or might be: no more than SEARCHED are looked at."""
+        if first not in self.reads or family not in self.read:
+            return False
+        seen, open_ = {first}, [first]
+        while open_ and len(seen) <= SEARCHED:
+            more = self.reads.get(open_.pop(), set()) - seen
+            if family in more:
+                return True
+            seen |= more
+            open_ += more
+        return bool(open_)
 
     def _take(self, family: int, span: tuple[int, int]) -> None:
         chosen = self._candidates(family, span)

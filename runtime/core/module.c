@@ -2,6 +2,18 @@
  * is asked some hundred times a run, and ctypes' own ways take five times as long. */
 #include <Python.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+/* Hands memory that was let go back to the machine: between the stages of a large run little of it would fit. */
+void sd_trim(void)
+{
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
+}
+
 /* address of the first element of an array, whatever its strides; the caller keeps it alive */
 static PyObject *address(PyObject *module, PyObject *array)
 {

@@ -31,7 +31,8 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, in
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
     size_t all = system->left ? (size_t)whole + 8 : 0;
-    settle->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * m + 6 * n + 4 * all, sizeof(double));
+    size_t most = linear && (size_t)linear->entries > 2 * m ? (size_t)linear->entries : 2 * m;
+    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 6 * n + 4 * all, sizeof(double));
     if (!settle->memory) {
         free(settle);
         return NULL;
@@ -52,15 +53,26 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, in
     settle->step = settle->scale + n; /* unknowns, rates and rows */
     settle->met = settle->step + n + m;
     settle->matrix = settle->met + n;
-    settle->room = settle->matrix + linear->entries + 1;
+    settle->room = settle->matrix + most + 1;
     settle->whole = whole;
     return settle;
+}
+
+int sd_settle_take(sd_settle *settle, sd_linear *linear)
+{
+    settle->taken = calloc((size_t)linear->entries + 1, sizeof(double));
+    if (!settle->taken)
+        return 2;
+    settle->linear = linear;
+    settle->matrix = settle->taken;
+    return 0;
 }
 
 void sd_settle_free(sd_settle *settle)
 {
     if (!settle)
         return;
+    free(settle->taken);
     sd_sparse_free(settle->basis);
     free(settle->lift);
     free(settle->memory);
@@ -147,6 +159,8 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
+    if (!settle->linear && settle->provide())
+        return 1;
     slopes(settle, t, y, yd, 1);
     memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
     for (int32_t e = 0; e < system->entries; e++) {

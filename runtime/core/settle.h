@@ -23,7 +23,7 @@ enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
 
 typedef struct sd_settle {
     sd_system *system;
-    sd_linear *linear;               /* of the saddle-point matrix [unknowns + rates + rows] */
+    sd_linear *linear;               /* of the saddle-point matrix [unknowns + rates + rows]; NULL: not there yet */
     int32_t unknowns, rates, rows;
     const int32_t *rate;             /* [rates] positions in yd */
     const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
@@ -51,12 +51,16 @@ typedef struct sd_settle {
     const struct sd_condensed *seen;       /* points are handed over as this system has them; NULL: with all unknowns */
     double *room;                    /* [2][unknowns of the whole system] for points with all of them, and kept ones */
     int32_t whole;                   /* unknowns of a point: those of the system, or of the one that it is condensed from */
+    int (*provide)(void);            /* of large ones: makes `linear` and its places when they are wanted first; 0 done */
+    double *taken;                   /* the matrix of such a one */
     double drift;                    /* norm of the constraint rows before the last call moved the point */
     double contracted;               /* largest residual beside the one before it, of the steps of the last call */
 } sd_settle;
 
 /* whole: unknowns of a point, more than the system's where that is condensed */
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole);
+/* takes the factors of the saddle-point matrix; 2: no memory */
+int sd_settle_take(sd_settle *settle, sd_linear *linear);
 /* The basis: pattern of G^T, order of its columns, the rows; places as above.  2: no memory. */
 int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
                     const int32_t *place_y, const int32_t *place_yd);

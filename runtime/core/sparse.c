@@ -207,7 +207,7 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         lu->source[k] = pivot;
         for (int32_t i = top; i < rows; i++) {
             int32_t r = lu->stack[i];
-            if (lu->place[r] < 0) {
+            if (lu->place[r] < 0 && (lu->dropped == 0.0 || sd_size(lu->x[r] * inverse) > lu->dropped)) {
                 lu->l_row[nl] = r;
                 lu->l_value[nl++] = lu->x[r] * inverse;
             }

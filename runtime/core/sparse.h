@@ -23,6 +23,8 @@ typedef struct sd_sparse {
     int pivoted;                 /* a valid pattern exists */
     int diagonal;                /* row c pivots in column c wherever its entry will do: the order is one of A + A^T */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
+    double dropped;              /* entries of L up to this size are left out, rows in excess that agree with it; 0: none.
+                                    The factors serve once: no refactorising on such a pattern */
     int64_t most;                /* entries of the factors beyond which pivoting is given up; 0: none */
     int32_t bad_row, bad_column;
 } sd_sparse;

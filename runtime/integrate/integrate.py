@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
+from sysdyn.runtime.condense.condensed import LARGE, Condensed, Forms, condensed
 from sysdyn.runtime.condense.elimination import steady
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.least_norm import LeastNorm
@@ -35,7 +35,7 @@ from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import order_of
-from sysdyn.runtime.start.restart import Restart
+from sysdyn.runtime.start.restart import Restart, still
 from sysdyn.runtime.start.settled import Settler
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, null_place
@@ -96,6 +96,8 @@ class Integration:
         if system.form.name == "2":
             self._weigh()
         self._light = origin.light
+        if system.unknowns > LARGE:
+            origin.let_go()
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
         self.forms = self._condensed()
         self._linear()
@@ -111,6 +113,8 @@ class Integration:
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         self._stepper()
         self._driver()
+        if system.unknowns > LARGE:
+            lib.core.sd_trim()
         self.pieces = Pieces(self, request.events) if request.events else None
 
     def _weigh(self) -> None:
@@ -125,9 +129,12 @@ class Integration:
         """The forms without what constant sums define; None where all unknowns are integrated."""
         request = self.request
         whole = request.events is not None or request.least_norm or request.fixed_step is not None
-        if whole or not request.condense or request.method in ON_UNDERLYING or len(self.segments) > 1:
+        if whole or not request.condense or request.method in ON_UNDERLYING:
             return None
-        return condensed(self.system, self.start.t, self.y, self.yd)
+        found = condensed(self.system, self.start.t, self.y, self.yd)
+        if self.system.unknowns > LARGE:
+            lib.core.sd_trim()
+        return found
 
     @property
     def stepped(self) -> System | Condensed:
@@ -151,11 +158,12 @@ class Integration:
         if not self.linear:
             raise MemoryError
 
-    def _settler(self, name: str, state: NDArray[np.bool_]) -> Settler:
+    def _settler(self, name: str, state: NDArray[np.bool_], *, whole: bool = False) -> Settler:
+        """Of the rows of a form; whole: with every unknown, whatever leaves the runs."""
         form = self.system.form
         n = form.written
         kinematics = (form.k_q, form.k_f)
-        left = self.forms.settled if self.forms is not None and name == "settled" else None
+        left = self.forms.settled if self.forms is not None and name == "settled" and not whole else None
         system = self.system.another(name)
         return Settler(system, kinematics, self.magnitude[:n], self._time, state, self._light[:n], left)
 
@@ -368,20 +376,45 @@ class Integration:
 
     @property
     def restart(self) -> Restart:
-        """Finds consistent points behind jumps."""
+        """Finds consistent points behind jumps, with every unknown."""
         if self._restart is None:
-            self._restart = Restart(self.settler, self.roles.state[: self.system.form.written])
+            state = self.roles.state[: self.system.form.written]
+            settler = self.settler if self.forms is None else self._settler("settled", state, whole=True)
+            self._restart = Restart(settler, state)
         return self._restart
+
+    def _across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
+        """The point behind a jump of the text at t (s); where no state jumps, what is left of the unknowns tells."""
+        if self.forms is not None:
+            n = self.system.form.written
+            found = still(self.settler, t, (y, yd), self.roles.state[:n], self.magnitude[:n])
+            if found is not None:
+                return found
+        return self.restart.across(t, y, yd)
+
+    def _share(self, y: Floats) -> None:
+        """What a method of fewer unknowns knows of their sizes becomes known of all at a point y."""
+        if self.forms is None:
+            return
+        kept, (_, magnitude, met) = self.forms.stepped.kept, self._stepped[1]
+        np.maximum(self._met, np.abs(y), out=self._met)
+        self.magnitude[kept], self._met[kept] = magnitude, met
+
+    def _hand_down(self) -> None:
+        """The magnitudes that the method of fewer unknowns goes by, from those of all."""
+        if self.forms is not None:
+            self._stepped[1][1][:] = self.magnitude[self.forms.stepped.kept]
 
     def _cross(self, segment: Segment) -> None:
         """Restarts behind the instant at which a segment ended."""
         n, method = self.system.form.written, self.method.contents
         y, yd = self.method.point()
+        self._share(y)
         y, yd, _ = self.settler.settle(method.t, y[:n], yd[:n])
         if self.pieces is not None:
             found: tuple[Floats, Floats] | None = self.pieces.jump(segment.begin, y, yd)
         else:
-            found = self.restart.across(segment.begin, y, yd)
+            found = self._across(segment.begin, y, yd)
         if found is None:
             raise self._failure("newton")
         method.t_end = segment.end
@@ -397,6 +430,7 @@ class Integration:
         self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
         self.begin_to_move(t)
         self._resolve(t)
+        self._hand_down()
         pointers = (lib.pointer(item) for item in (self.y, self.yd, *before))
         lib.core.sd_run_restart(self.run_, t, label, *pointers)
 

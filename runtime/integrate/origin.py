@@ -28,7 +28,7 @@ class Origin:
     def __init__(self, system: System, start: ConsistentState, index: int) -> None:
         self.system, self.start, self.t = system, start, start.t
         self.y, self.rate = start.for_form(system)
-        self.jy, self.jyd = system.jacobian(start.t, self.y, self.rate)
+        self._matrix: tuple[Floats, Floats] | None = None
         self.yd = np.where(system.differential(self.jyd), self.rate, 0.0)
         self.roles: Roles = roles(system, start.t, self.jyd, index)
         self.least = np.where(system.are("q", "f"), UNRESOLVED * unresolved(system, self.y, self.jy), 0.0)
@@ -37,6 +37,25 @@ class Origin:
         self._explicit: tuple[System, Roles] | None = None
         self.kept: Roles | None = None
         """Roles of what is left where unknowns leave the runs (condense/)."""
+
+    @property
+    def jy(self) -> Floats:
+        """dF/dy [entries] at the start."""
+        return self._entries()[0]
+
+    @property
+    def jyd(self) -> Floats:
+        """dF/dy' [entries] at the start."""
+        return self._entries()[1]
+
+    def _entries(self) -> tuple[Floats, Floats]:
+        if self._matrix is None:
+            self._matrix = self.system.jacobian(self.t, self.y, self.rate)
+        return self._matrix
+
+    def let_go(self) -> None:
+        """Of the Jacobian: found again if asked."""
+        self._matrix = None
 
     def sized(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
@@ -62,5 +81,5 @@ class Origin:
 
     def weighted(self) -> None:
         """The entries of the Jacobian anew: its rows q' - f have other factors."""
-        self.jy, self.jyd = self.system.jacobian(self.t, self.y, self.rate)
+        self.let_go()
         self._sized = self._light = None

@@ -20,6 +20,9 @@ CAUSES = ("", "newton", "error_test", "singular", "nonfinite", "step_too_small",
 ROWS = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p, c.c_void_p)
 """sd_rows and sd_entries: frame, t, y, yd, out."""
 
+PROVIDE = c.CFUNCTYPE(c.c_int)
+"""provide of sd_settle."""
+
 _D, _I, _L, _P = c.c_double, c.c_int32, c.c_int64, c.c_void_p
 _ORDERS = _D * (MAX_ORDER + 2)
 
@@ -409,6 +412,8 @@ class Settle(c.Structure):
         ("seen", _P),
         ("room", _P),
         ("whole", _I),
+        ("provide", _P),
+        ("taken", _P),
         ("drift", _D),
         ("contracted", _D),
     ]

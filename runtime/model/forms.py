@@ -92,7 +92,8 @@ class Form:
     """A choice of calls with the layout of y and of the rows.
 
     written: unknowns as written (nu stand behind them); at: places of the families, audit families behind
-    the written ones (`extended` in all); kind: of each unknown; k_row, k_q, k_f: the rows q' - f;
+    the written ones (`extended` in all); kind: (kind, number) of unknowns one after the other; k_row, k_q, k_f: the
+    rows q' - f;
     groups: (name of the group, row family, first row), ascending; scales: calls of the scale blocks of steep rows.
     """
 
@@ -103,7 +104,7 @@ class Form:
     rows: int
     at: Ints
     calls: tuple[Planned, ...]
-    kind: tuple[str, ...]
+    kind: tuple[tuple[str, int], ...]
     k_row: Ints
     k_q: Ints
     k_f: Ints
@@ -149,19 +150,21 @@ def nu_name(kappa: str) -> str:
     return f"{kappa.removesuffix('.multiplier')}.nu"
 
 
-def _layout(description: Description) -> tuple[Ints, list[str], int]:
-    """At (audit families behind the others), kind of each unknown, number with the audit families."""
+def _layout(description: Description) -> tuple[Ints, list[tuple[str, int]], int, int]:
+    """At (audit families behind the others), kinds and numbers of unknowns, their number, with the audit families."""
     at = np.zeros(len(description.families), dtype=np.int32)
-    kinds: list[str] = []
+    kinds: list[tuple[str, int]] = []
+    end = 0
     for k, family in enumerate(description.families):
         if family.kind != "audit":
-            at[k] = len(kinds)
-            kinds += [family.kind] * family.size
-    end = len(kinds)
+            at[k] = end
+            kinds.append((family.kind, family.size))
+            end += family.size
+    written = end
     for k in description.families_of("audit"):
         at[k] = end
         end += description.families[k].size
-    return at, kinds, end
+    return at, kinds, written, end
 
 
 def _kinematics(description: Description, at: Ints) -> tuple[Ints, Ints, dict[str, int]]:
@@ -215,8 +218,8 @@ def _leveled(
 
 def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
-    at, kind, extended = _layout(description)
-    written = len(kind)
+    at, kind, written, extended = _layout(description)
+    unknowns = written
     k_q, k_f, first = _kinematics(description, at)
     bare = name in BARE
     if bare:
@@ -247,8 +250,9 @@ def plan(description: Description, name: str) -> Form:
                 number += description.rows[k].size
         if group == "kinematics":
             for k in description.families_of("kappa"):
-                nu[k] = len(kind)
-                kind += ["nu"] * description.families[k].size
+                nu[k] = unknowns
+                kind.append(("nu", description.families[k].size))
+                unknowns += description.families[k].size
             calls.append(Planned(block, nu, _stabilised(description.rows, BASE.get(block, block), first)))
         else:
             calls.append(Planned(block, at, tables[group]))
@@ -258,8 +262,8 @@ def plan(description: Description, name: str) -> Form:
     return Form(
         name=name,
         written=written,
-        unknowns=len(kind),
-        extended=max(extended, len(kind)),
+        unknowns=unknowns,
+        extended=max(extended, unknowns),
         rows=number,
         at=at,
         calls=tuple(calls),

@@ -17,6 +17,8 @@ from sysdyn.runtime.model.failures import ContractError
 from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
+KEPT = 200_000
+"""Entries up to which the columns of a pattern are kept: of large ones they are made anew in milliseconds."""
 Array = TypeVar("Array", bound=NDArray[Any])
 
 
@@ -44,10 +46,13 @@ class Pattern:
 
     def columns_of(self) -> Ints:
         """Column of each entry [entries]; read-only."""
-        return self._columns
+        return self._columns if self.entries <= KEPT else self._made()
 
     @cached_property
     def _columns(self) -> Ints:
+        return self._made()
+
+    def _made(self) -> Ints:
         return read_only(np.repeat(np.arange(self.unknowns, dtype=np.int32), np.diff(self.column)))
 
 

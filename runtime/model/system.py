@@ -117,7 +117,7 @@ class System:
             for key in [k for k in layouts if isinstance(k, tuple) and self.form.name in (k[0], k[1], *k[2:3])]:
                 del layouts[key]
 
-    def forget_once(self, *name: Hashable) -> None:
+    def forget_once(self, name: Hashable) -> None:
         """The same of one thing that was made once."""
         if self.description.systems is None:
             self.description.layouts.pop(("once", name, self.form.name, self.left_out), None)
@@ -409,7 +409,11 @@ class System:
     @cached_property
     def kinds(self) -> NDArray[np.str_]:
         """Kind of each unknown: q f p s e kappa mu nu; read-only."""
-        return self.once("kinds", lambda: read_only(np.array(self.form.kind, dtype="<U5")))
+        return self.once("kinds", lambda: read_only(self._kinds()))
+
+    def _kinds(self) -> NDArray[np.str_]:
+        kinds, numbers = zip(*self.form.kind, strict=True) if self.form.kind else ((), ())
+        return np.repeat(np.array(kinds, dtype="<U5"), np.array(numbers, dtype=np.int64))
 
     def are(self, *kinds: str) -> Mask:
         """Unknowns of these kinds [unknowns]; read-only."""

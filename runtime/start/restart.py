@@ -21,6 +21,17 @@ EXACT = 1e-9
 """Scaled residual with which the slower search is content."""
 
 
+def still(
+    settler: Settler, t: float, point: tuple[Floats, Floats], state: NDArray[np.bool_], magnitude: Floats
+) -> tuple[Floats, Floats] | None:
+    """Y, yd [unknowns as written] settled at t where no state [unknowns] moves for it; None where one does."""
+    y, yd = point
+    settler.core.contents.ready = 0
+    found, rate, done = settler.held(t, y, yd)
+    stays = done and bool((np.abs(found - y)[state] <= STILL * magnitude[state]).all())
+    return (found, rate) if stays else None
+
+
 class Restart:
     """state [unknowns as written]: the unknowns that keep their values."""
 
@@ -38,11 +49,9 @@ class Restart:
         """The same with the impulses [unknowns as written] that took the flows there."""
         magnitude = self.magnitude(y.size)
         impulse = np.zeros(y.size)
-        self.settler.core.contents.ready = 0
-        found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
-        still = done and bool((np.abs(found - y)[self.state] <= STILL * magnitude[self.state]).all())
-        if still:  # no state need jump: there is no impulse
-            return found, rate, impulse
+        same = still(self.settler, t, (y, yd), self.state, magnitude)
+        if same is not None:  # no state need jump: there is no impulse
+            return *same, impulse
         if self.impulses.broken(t, y, yd, magnitude):
             y, impulse = self.impulses.after(t, y, yd, magnitude)
         # what follows may jump by far more than its magnitude: at equal weights that would move the state

@@ -6,6 +6,9 @@ Unknowns x = (y as written, the derivatives that occur); see core/settle.h.  `Se
 from __future__ import annotations
 
 import ctypes as c
+import weakref
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +19,8 @@ from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import column_order, tall_order
 
+LARGE = 100_000
+"""Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before."""
 LIGHT = 1e-3
 """Weight (of squares) of displacements without inertia: they follow those that have some."""
 FREE = 1e-4
@@ -93,9 +98,7 @@ class Settler:
         self._n, self._moves = n, n + k
         self.pattern: Pattern
         self._key: tuple[object, ...] = () if condensed is None else condensed.key
-        self.pattern, self._slots, self._sort = settled.once(
-            ("saddle", *self._key), lambda: (*self._saddle(), self._sorts())
-        )
+        self._sort = settled.once(("sorts", *self._key), self._sorts)
         self._weight = np.ones(self._moves)
         if light is not None:
             self._weight[:n][light] = LIGHT
@@ -103,6 +106,9 @@ class Settler:
         self._weight[n:] = FREE**2
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
         self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
+        self.linear: Any = None
+        if self._moves <= LARGE:
+            self._provide()
         self._allocate()
 
     def _saddle(self) -> tuple[Pattern, list[Ints]]:
@@ -141,15 +147,38 @@ class Settler:
             found[: self.system.rows][inertial_rates(self.system)] = 3
         return found if isinstance(self._left, System) else found[self._left.kept_rows]
 
-    def _allocate(self) -> None:
-        order = self.system.once(("saddle order", *self._key), lambda: column_order(self.pattern))
-        self._order = order
+    def _provide(self) -> None:
+        """The factors of the saddle-point matrix, and where its parts stand."""
+        self.pattern, self._slots = self.system.once(("saddle", *self._key), self._saddle)
+        self._order = self.system.once(("saddle order", *self._key), lambda: column_order(self.pattern))
         self.linear = lib.core.sd_linear_new(
             self.pattern.unknowns,
-            *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order)),
+            *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, self._order)),
         )
         if not self.linear:
             raise MemoryError
+
+    def _placed(self) -> None:
+        """What the core is told of them."""
+        names = ("slot_y", "slot_y_t", "slot_yd", "slot_yd_t", "slot_x", "slot_r")
+        for name, slot in zip(names, self._slots, strict=True):
+            setattr(self.core.contents, name, lib.pointer(slot))
+
+    def _provided(self) -> Callable[[], int]:
+        """The same when they are wanted first; where a basis is enough they never are."""
+        own = weakref.ref(self)
+
+        def provide() -> int:
+            settler = own()
+            if settler is None:
+                return 1
+            settler._provide()
+            settler._placed()
+            return int(lib.core.sd_settle_take(settler.core, settler.linear))
+
+        return provide
+
+    def _allocate(self) -> None:
         self.core = lib.core.sd_settle_new(
             c.byref(self._left.core), self.linear, int(self.rates.size), self._points
         )
@@ -158,9 +187,11 @@ class Settler:
         core = self.core.contents
         core.weight = lib.pointer(self._weight)
         core.rate = lib.pointer(self.rates)
-        names = ("slot_y", "slot_y_t", "slot_yd", "slot_yd_t", "slot_x", "slot_r")
-        for name, slot in zip(names, self._slots, strict=True):
-            setattr(core, name, lib.pointer(slot))
+        if self.linear is None:
+            self._wanted = lib.PROVIDE(self._provided())
+            core.provide = c.cast(self._wanted, c.c_void_p)
+        else:
+            self._placed()
         core.sort = lib.pointer(self._sort)
         core.k_q, core.k_f = (lib.pointer(item) for item in self._k)
         core.kinematics = self._k[0].size
@@ -207,6 +238,15 @@ class Settler:
             self.core.contents.hold, self.core.contents.ready = 1.0, 0
         self.system.failure.check()
         return a[: self._points], b[: self._points], not failed
+
+    def held(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
+        """The same with the state where it is: of large ones within a basis that moves none of it, if there is one."""
+        if self.linear is not None or not self.core.contents.basis:
+            return self.settle(t, y, yd, hold=HELD)
+        slack, self.core.contents.slack = self.core.contents.slack, 0.0
+        found = self.settle(t, y, yd)
+        self.core.contents.slack = slack
+        return found
 
     def __del__(self) -> None:
         if getattr(self, "core", None):

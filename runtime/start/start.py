@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.system import System
@@ -530,4 +531,6 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     if best.x.size > LARGE:
         starter.forget()
+        del starter, guess, free
+        lib.core.sd_trim()
     return ConsistentState(t0, y, yd, moved, best.residual, strategy)

@@ -150,7 +150,7 @@ class Starter:
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
         self.settled.forget()
-        self.system.forget_once("equations of the start", True)
+        self.system.forget_once(("equations of the start", True))
 
     def _summed_rows(self, sums: _Sums) -> None:
         """The entries of sums of rows behind the others."""

@@ -2,7 +2,8 @@
 
 Differential index of the form as written, from the pencil dF/dyd yd' + dF/dy y at the point: rows without yd are
 differentiated until dF/dyd is nonsingular (shuffle algorithm, Luenberger 1978); ranks by singular values of the
-equilibrated matrices.  Larger models: the inverse of dF/dy + cj dF/dyd grows like cj^(index - 1) with cj.
+equilibrated matrices.  Larger models: the inverse of dF/dy + cj dF/dyd grows like cj^(index - 1) with cj above every
+frequency of the model; below some, what is fast passes for a constraint.
 Freedom: rank of [Phi_q; Psi_f], taken from the reactions of the multipliers (virtual displacements).
 """
 
@@ -17,7 +18,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
-from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.start.start import LARGE, ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, independent, nearby, reactions, vanished
 from sysdyn.values import dataclass
 
@@ -31,6 +32,13 @@ ROUSED = 1e-2
 GENERIC = 0.7310585786300049
 POINTS = tuple(GENERIC * 10.0**power for power in (3, -3, 6, -6, 9, -9))
 """At which a pencil is looked at, after equilibration: at GENERIC first."""
+RATES = (1e16, 1e12, 1e8, 1e4)
+"""cj (1/s) at which the growth of the inverse is asked for: the first one that tells."""
+CLEAR = 0.1
+"""What a growth may miss a power of cj by, in decades a decade."""
+RESOLVED = 1e-9
+"""Least pivot, as part of its column, of factors that tell: where cj is too large, sums of rows in which the rates
+cancel are round-off."""
 NONE = np.zeros(0, dtype=np.int32)
 SLIDES = 2.0
 """Of a branch (events/kinks.py)."""
@@ -118,15 +126,24 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), (pattern.rows, pattern.unknowns))
     scale = row[pattern.row] * column[columns]
     sides = np.random.default_rng(3).standard_normal((4, pattern.rows))
-    sizes = [_inverse(system, (jy + cj * jyd) * scale, sides.copy()) for cj in (1e4, 1e5)]
-    if not all(np.isfinite(size) and size > 0.0 for size in sizes):
-        return None
-    index = round(float(np.log10(sizes[1] / sizes[0]))) + 1
-    return index if 0 <= index <= MAX_INDEX else None
+    for rate in RATES:
+        sizes, least = [], 1.0
+        for cj in (rate, 10.0 * rate):
+            size, pivot = _inverse(system, (jy + cj * jyd) * scale, sides.copy())
+            least = min(least, pivot)
+            sizes.append(size)
+            if not (np.isfinite(size) and size > 0.0):
+                break
+        else:
+            growth = float(np.log10(sizes[1] / sizes[0]))
+            tells = least >= RESOLVED and abs(growth - round(growth)) <= CLEAR
+            if (tells or rate == RATES[-1]) and 0 <= round(growth) + 1 <= MAX_INDEX:
+                return round(growth) + 1
+    return None
 
 
-def _inverse(system: System, values: Floats, sides: Floats) -> float:
-    """Largest entry of A^-1 b for sides b [k, rows]; infinite where A (by its entries) is singular."""
+def _inverse(system: System, values: Floats, sides: Floats) -> tuple[float, float]:
+    """Largest entry of A^-1 b for sides b [k, rows], infinite where A (by its entries) is singular; least pivot."""
     pattern, order = system.pattern, order_of(system)
     places = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(order)
     linear = lib.core.sd_linear_new(pattern.unknowns, *places)
@@ -134,12 +151,12 @@ def _inverse(system: System, values: Floats, sides: Floats) -> float:
         raise MemoryError
     try:
         if lib.core.sd_linear_factor(linear, lib.pointer(values), None):
-            return np.inf
+            return np.inf, 0.0
         for side in sides:
             lib.core.sd_linear_solve(linear, lib.pointer(side))
+        return float(np.abs(sides).max()), float(linear.contents.smallest)
     finally:
         lib.core.sd_linear_free(linear)
-    return float(np.abs(sides).max())
 
 
 def _place(system: System, multiplier: int) -> tuple[int, int]:
@@ -267,6 +284,9 @@ def structure(system: System, state: ConsistentState) -> Structure:
     weights = combination(found, left) if left.size and found is not None else np.zeros(0)
     group = tuple((_label(system, int(places[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8))
     names = tuple(_place(system, int(places[k])) for k in left)
+    if system.unknowns > LARGE:
+        for once in (("reacting places", idle.tobytes()), "sizes of J"):
+            system.forget_once(once)
     return Structure(
         index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names
     )

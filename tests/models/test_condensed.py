@@ -200,3 +200,54 @@ def test_a_resistor_of_a_row_may_vanish(tmp_path, small):
     assert ends[0] == ends[3]
     assert ends[1] == pytest.approx(ends[2], abs=1e-6)
     assert abs(ends[1] - ends[0]) > 1e-4
+
+
+KINKED, JUMPING = "1 V*min(t/(0.3 s), 1)", "1 V*step(t - 0.3 s)"
+
+
+def _after_ramp(matrix, drive):
+    """x(1) of x' = A x + b min(t / 0.3, 1) from rest."""
+    n = len(matrix)
+    whole = np.zeros((n + 2, n + 2))
+    whole[:n, :n], whole[:n, n], whole[n, n + 1] = matrix, drive, 1.0 / 0.3
+    at = expm(0.3 * whole) @ np.eye(n + 2)[n + 1]
+    whole[n, n + 1] = 0.0
+    return expm(0.7 * whole) @ at
+
+
+def _after_jump(matrix, drive):
+    """x(1) of x' = A x + b (t > 0.3) from rest."""
+    n = len(matrix)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n] = matrix, drive
+    return expm(0.7 * whole) @ np.eye(n + 1)[n]
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.parametrize(("source", "exact"), [(KINKED, _after_ramp), (JUMPING, _after_jump)], ids=["kink", "jump"])
+def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, source, exact, method):
+    """One unknown a node on both sides of it; no structure of all unknowns is made where no state jumps."""
+    seen, whole = [], []
+    made, settled = integrate.Integration._condensed, integrate.Integration._settler
+
+    def watched(self):
+        found = made(self)
+        seen.append((len(self.segments), found.stepped.unknowns))
+        return found
+
+    def counted(self, *rows, **asked):
+        whole.append(asked.get("whole"))
+        return settled(self, *rows, **asked)
+
+    monkeypatch.setattr(integrate.Integration, "_condensed", watched)
+    monkeypatch.setattr(integrate.Integration, "_settler", counted)
+    trace = trace_of(tmp_path, LADDER.replace("1 V*sin(5 rad/s*t)", source), method=method)
+    c, r = _capacitors(), (1.0 + np.arange(1, N + 1) / N) / N
+    flow = np.diag(1.0 / r) @ (np.eye(N, k=-1) - np.eye(N))
+    balance = np.diag(1.0 / c) @ (np.eye(N) - np.eye(N, k=1))
+    found = exact(balance @ flow, balance[:, 0] / r[0])
+    for name, value in (("end", found[N - 1]), ("middle", found[N // 2 - 1])):
+        assert trace[name].values[-1] == pytest.approx(value, abs=3e-7 * trace[name].nominal), name
+    assert all(pieces == 2 and unknowns < 1.2 * N for pieces, unknowns in seen)
+    assert not any(whole)
+    assert np.abs(trace["audit.constraints"].values).max() < 1e-12

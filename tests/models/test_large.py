@@ -3,7 +3,9 @@
 import subprocess
 import sys
 
+import pytest
 from reduced import ROOT
+from sysdyn.api import compile_model
 from sysdyn.cli.main import run
 from sysdyn.dsl.model import budget
 
@@ -26,6 +28,16 @@ def test_a_step_of_ten_thousand_sections_is_no_matter_of_gigabytes(tmp_path):
     done = subprocess.run([sys.executable, "-c", PROGRAM, *asked], capture_output=True, text=True, check=False)
     assert done.returncode == 3
     assert "the limit of steps is reached" in done.stdout
+
+
+@pytest.mark.parametrize("sections", [10, 60])
+def test_the_index_does_not_depend_on_the_size(tmp_path, sections):
+    """2, by singular values and by growth: of sections as fast as 1e10 rad/s."""
+    path = tmp_path / "line.sd"
+    path.write_text(LINE.read_text().replace("param n = 100000", f"param n = {sections}"))
+    module = compile_model(str(path), backend="numpy")
+    assert module.manifest["index"] == 2
+    assert not any(unknown["kind"] == "nu" for unknown in module.manifest["unknowns"])
 
 
 def test_a_run_that_there_is_no_memory_for_is_not_begun(tmp_path, capsys, monkeypatch):

@@ -1,0 +1,18 @@
+/* A x = b of a sparse matrix with as many rows as columns or more, where every column is determined.
+ *
+ * As many rows as there are columns pivot, chosen by size (sparse.h); the others must agree, and whoever asks looks at
+ * them.  Where every column has a pivot the solution is the only one, and so the one of least norm: one factorisation of the rows
+ * stands for one of the saddle-point matrix of twice their size and four times their fill.
+ */
+#ifndef SYSDYN_TALL_H
+#define SYSDYN_TALL_H
+
+#include <stdint.h>
+
+/* column [columns + 1], row, value [entries]: A by columns; order [columns] of elimination; least: pivot, as part of its
+ * column, below which a column counts as not determined; most: entries of the factors; b [rows] -> x [columns].
+ * 0 done, 1 not determined, 2 no memory */
+int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+                  const int32_t *order, double least, int64_t most, const double *b, double *x);
+
+#endif

@@ -1,0 +1,102 @@
+"""Rows that determine their unknowns, and more rows than unknowns, against solutions that are known."""
+
+import numpy as np
+import pytest
+from sysdyn.runtime.model.patterns import Places, compress
+from sysdyn.runtime.numerics import least_change
+from sysdyn.runtime.numerics.least_change import determined, least_norm
+from sysdyn.runtime.numerics.ordering import neighbours, paired_order
+
+N = 400
+
+
+def _chain(n=N):
+    """Second differences of n unknowns with both ends held, and each third row once more: [rows, n] by its entries."""
+    rows, columns, values = [], [], []
+    for k in (*range(n), *range(0, n, 3)):
+        row = (max(rows) + 1) if rows else 0
+        for j, v in ((k - 1, -1.0), (k, 2.0), (k + 1, -1.0)):
+            if 0 <= j < n:
+                rows.append(row), columns.append(j), values.append(v)
+    return (max(rows) + 1, n), (np.array(rows), np.array(columns), np.array(values))
+
+
+def _times(shape, entries, x):
+    found = np.zeros(shape[0])
+    np.add.at(found, entries[0], entries[2] * x[entries[1]])
+    return found
+
+
+def test_rows_in_excess_change_nothing():
+    """A parabola is what constant second differences make."""
+    shape, entries = _chain()
+    k = np.arange(1, N + 1)
+    exact = 0.5 * k * (N + 1 - k)
+    assert _times(shape, entries, exact) == pytest.approx(np.ones(shape[0]), abs=1e-9)
+    found = determined(shape, entries, np.ones(shape[0]))
+    assert found == pytest.approx(exact, rel=1e-11)
+
+
+def test_what_is_open_is_not_determined():
+    """A column without a row of its own; columns that stand in rows together alone; more columns than rows."""
+    shape, (i, j, v) = _chain()
+    aim = np.ones(shape[0])
+    assert determined((shape[0], N + 1), (i, j, v), aim)[N] == 0.0  # stands in no row: the least is zero
+    pair = np.append(i, [0, 1]), np.append(j, [N, N]), np.append(v, [0.0, 0.0])
+    assert determined((shape[0], N + 1), pair, aim)[N] == 0.0
+    twice = np.concatenate([i, i]), np.concatenate([j, j + N]), np.concatenate([v, v])
+    assert determined((shape[0], 2 * N), twice, aim) is None
+    both = np.concatenate([i, i + shape[0], i]), np.concatenate([j, j, j + N]), np.concatenate([v, v, v])
+    assert determined((2 * shape[0], 2 * N), both, np.concatenate([aim, aim])) is not None
+
+
+def test_a_difference_alone_leaves_the_mean_open():
+    """x_k - x_(k+1) around a ring: rows enough, of one rank less."""
+    n = 300
+    k = np.arange(n)
+    entries = np.concatenate([k, k]), np.concatenate([k, (k + 1) % n]), np.concatenate([np.ones(n), -np.ones(n)])
+    aim = np.cos(2.0 * np.pi * k / n)
+    assert determined((n, n), entries, aim) is None
+    found = least_norm((n, n), entries, aim)
+    assert found.sum() == pytest.approx(0.0, abs=1e-6 * np.abs(found).max())
+    assert _times((n, n), entries, found) == pytest.approx(aim, abs=1e-9)
+
+
+def test_the_saddle_point_is_not_asked_where_rows_determine_all(monkeypatch):
+    """One factorisation of the rows themselves."""
+    monkeypatch.setattr(least_change, "_SPARSE", ())
+    shape, entries = _chain()
+    found = least_norm(shape, entries, np.ones(shape[0]))
+    assert found[0] == pytest.approx(0.5 * N, rel=1e-11)
+
+
+def test_the_order_of_a_square_grid_fills_little():
+    """Neighbours of a matrix, and what its elimination fills by their order: a third of what any pivots would."""
+    m = 30
+    k = np.arange(m * m).reshape(m, m)
+    down, across = (k[:-1].ravel(), k[1:].ravel()), (k[:, :-1].ravel(), k[:, 1:].ravel())
+    pairs = np.concatenate([np.stack(down), np.stack(across)], axis=1)
+    row = np.concatenate([k.ravel(), pairs[0], pairs[1]])
+    column = np.concatenate([k.ravel(), pairs[1], pairs[0]])
+    pattern, _ = compress(m * m, m * m, [Places(row, column)])
+    edges = neighbours(pattern)
+    assert edges.rows == pairs.shape[1]
+    assert (np.bincount(edges.row) == 2).all()
+    order = paired_order(pattern)
+    assert sorted(order.tolist()) == list(range(m * m))
+    assert _filled(m * m, pairs, order) < 15 * m * m
+
+
+def _filled(n, pairs, order):
+    """Entries of the factor of a symmetric matrix by its graph, unknowns eliminated in this order."""
+    beside = [set() for _ in range(n)]
+    for a, b in pairs.T.tolist():
+        beside[a].add(b), beside[b].add(a)
+    count = 0
+    for k in order.tolist():
+        others = beside[k]
+        count += len(others)
+        for a in others:
+            beside[a] |= others
+            beside[a] -= {a, k}
+    return count
