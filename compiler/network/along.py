@@ -95,7 +95,7 @@ def _with_transformers(network: Network) -> Network:
         for k, (coefficient, displacement) in enumerate(parts):
             ends = (ground, points[0]) if effort else (points[k], points[k - 1] if k else ground)
             one, two = f"{b.name}.along{k + 1}#1", f"{b.name}.along{k + 1}#2"
-            port = replace(b, kind="port", side=None, law=None, on=None, shift=None)
+            port = replace(b, kind="port", side=None, law=None, on=None)
             domain = common[displacement.data[0]]
             branches.append(replace(port, name=one, plus=ends[0], minus=ends[1]))
             branches.append(replace(port, name=two, domain=domain, plus=None, minus=None, on=displacement))

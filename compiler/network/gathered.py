@@ -66,7 +66,7 @@ def _free(network: Network) -> set[str]:
         b.name
         for b in network.branches
         if b.name not in held and not (b.loops or b.at or b.stated or MARK in b.name)
-        if None is b.on is b.shift is b.energy and None is not b.law
+        if None is b.on is b.energy and None is not b.law
         if b.plus is not None and b.minus is not None and not (b.plus.at or b.minus.at)
     }
 

@@ -16,7 +16,6 @@ from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.islands import grounded
-from sysdyn.compiler.network.linkages import with_linkages
 from sysdyn.compiler.network.positions import from_masses, from_stores, massive, with_contents, with_quadratures
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.stated import ALL, as_elements
@@ -46,7 +45,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = with_linkages(from_masses(from_stores(grounded(as_elements(network, ALL)))))
+    bare = from_masses(from_stores(grounded(as_elements(network, ALL))))
     network = with_contents(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
@@ -111,11 +110,10 @@ def _energy(e: Energy) -> Energy:
 
 def _branch(b: Branch) -> Branch:
     law = None if b.law is None else _node(b.law)
-    shift = None if b.shift is None else _node(b.shift)
     energy = None if b.energy is None else _node(b.energy)
     side = None if b.side is None else REFLECTED[b.side]
     kind = _ELEMENTS.get(b.kind, b.kind)
-    return replace(b, domain=_domain(b.domain), kind=kind, side=side, law=law, shift=shift, energy=energy)
+    return replace(b, domain=_domain(b.domain), kind=kind, side=side, law=law, energy=energy)
 
 
 def _coupling(c: Coupling) -> Coupling:

@@ -83,7 +83,6 @@ class Branch:
     minus: Terminal | None
     on: Node | None
     place: Place
-    shift: Node | None = None  # the law is over the own variable plus this constant
     stated: bool = False  # its energy stands among the state functions, kept for the audit
     energy: Node | None = None  # the state function of its own variable, where the author wrote that instead of the law
 

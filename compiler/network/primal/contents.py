@@ -1,8 +1,14 @@
-"""Initial conditions of a network as those of its coordinates; stores in series that start with different contents.
+"""Initial conditions of a network as those of its coordinates; stores whose contents these do not tell alone.
 
-In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + c, with c its own
-initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`; a dynamic variable
-of rate zero where not all of these are fixed and a loop of stores and efforts may ask for others.
+Contents of potential stores are c = B x + k: x the coordinates, which are one choice of tree; k one constant for each
+store beside it (language, section 11, 11), a parameter `branch.content` where the text tells it, else a dynamic
+variable of rate zero, which the start chooses.
+
+In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + k, with k its own
+initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
+efforts may ask for others.  A store between two nodes of the reflection (an inductor) holds their difference: where
+such stores close loops in which contents are said, each has its own initial content as k; it is chosen where
+nothing is said of it.
 """
 
 from __future__ import annotations
@@ -16,7 +22,7 @@ from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, N
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.overlaps import cut_off
 from sysdyn.compiler.network.primal.reading import Piece, Ranges, Reader, touches_network
-from sysdyn.compiler.network.primal.rings import closes
+from sysdyn.compiler.network.primal.rings import closes, in_loops
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
     Node,
@@ -109,12 +115,19 @@ class Contents:
     """Initial contents of potential stores: constants of followers, and the initial conditions that remain."""
 
     def __init__(
-        self, reader: Reader, members: Sequence[Member], initials: Sequence[Initial], branches: Sequence[Branch]
+        self,
+        reader: Reader,
+        members: Sequence[Member],
+        initials: Sequence[Initial],
+        elements: Sequence[Element],
+        *,
+        reflected: bool,
     ) -> None:
         self.reader = reader
         self.members = members
         self.initials = initials
-        self.stiff = [b for b in branches if b.kind in ("potential", "effort")]
+        potential = [e for e in elements if e.branch.kind == "potential" and e.branch.domain.common == "flow"]
+        self.between = [e for e in potential if len(e.ends) == 2] if reflected else []
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
@@ -123,18 +136,22 @@ class Contents:
         for initial in initials:
             for part, box, content in self._contents(initial):
                 self._given.setdefault(part.target.data[0], []).append((part, box, content))
+        stiff = [e.branch for e in elements if e.branch.kind in ("potential", "effort")]
         for element in dict.fromkeys(m.element for m in members if _follows(m)):
-            self._constant(element, [m for m in members if m.element is element and _follows(m)])
+            self._follower(element, [m for m in members if m.element is element and _follows(m)], stiff)
+        self._chords()
 
     def _contents(self, initial: Initial) -> Iterator[tuple[Initial, Box, Node]]:
-        """The displacements that an initial condition gives to potential stores of series classes."""
+        """The displacements that an initial condition gives to potential stores whose contents may need constants."""
         target = initial.target
         if target.op != "var" or target.data[1:] not in (("be", 0), ("bq", 0)) or variables(initial.value):
             return
+        numbers = {e.number for e in self.between}
 
         def found(ranges: Ranges) -> tuple[Box, Node] | None:
             piece = self.reader.piece(target.data[0], target.args, ranges)
-            content = None if piece.member is None else self._charge(piece, initial)
+            counted = piece.member is not None or piece.element.number in numbers
+            content = self._charge(piece, initial) if counted else None
             held = {name: r.interval for name, r in ranges.items()}
             box = tuple(a.over(held) for a in self.reader.affine(target.args, ranges))
             return None if content is None else (box, content)
@@ -174,27 +191,41 @@ class Contents:
         bounds = [self.reader.sizes.bound(a, initial.place) for a in at]
         return tuple(Interval(b, b) for b in bounds)
 
-    def _constant(self, element: Element, members: Sequence[Member]) -> None:
-        """A parameter, unless it is zero by the text."""
-        counters = tuple(f"#c{k}" for k in range(len(element.at)))
-        at = tuple(index(name) for name in counters)
+    def _follower(self, element: Element, members: Sequence[Member], stiff: Sequence[Branch]) -> None:
+        """The constant of stores in series with others, unless it is zero by the text."""
+        at = _own_indices(element)
         value: Node = const(0.0)
         for m in members:
             first = self.start(m.leader.name, m.leader_at(at))
             value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
         fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
-        fixed |= not closes(element.branch, self.stiff)
-        if fixed and is_const(value, 0.0):
+        self._constant(element, value if fixed or not closes(element.branch, stiff) else None)
+
+    def _chords(self) -> None:
+        """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
+        stores = [e.branch for e in self.between]
+        looped = [e for e in in_loops(self.between) if e.branch.law is not None]
+        given = [e for e in looped if any(meet(box, e.named) for _, box, _ in self._given.get(e.name, ()))]
+        for e in looped if given else ():
+            if any(e is other for other in given):
+                self._constant(e, self.start(e.name, _own_indices(e)))
+            elif closes(e.branch, stores):
+                self._constant(e, None)
+
+    def _constant(self, element: Element, value: Node | None) -> None:
+        """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
+        if value is not None and is_const(value, 0.0):
             return
+        at = _own_indices(element)
         taken = {p.name for p in self.parameters} | {s.name for s in self.states}
         stem, place = f"{element.name}.content", element.branch.place
         name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
         unit, shape = element.branch.domain.displacement, shape_of(element.named)
-        self.reader.book.contents[element.number] = name, fixed
-        if fixed:
-            self.parameters.append(Parameter(name, shape, unit, (value,), counters, place))
+        self.reader.book.contents[element.number] = name, value is not None
+        if value is not None:
+            self.parameters.append(Parameter(name, shape, unit, (value,), tuple(a.data for a in at), place))
             return
-        loops = tuple(Loop(c, low, high) for c, (low, high) in zip(counters, shape, strict=True))
+        loops = tuple(Loop(a.data, low, high) for a, (low, high) in zip(at, shape, strict=True))
         self.states.append(State(name, shape, unit, place))
         self.dynamics.append(Dynamic(var(name, "s", *at), const(0.0), loops, place))
 
@@ -276,6 +307,11 @@ def _led_by(m: Member) -> Box:
     """The elements of the leader that a member follows."""
     pairs = ((None if k is None else m.box[k], c) for k, c in m.leader_index)
     return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
+
+
+def _own_indices(element: Element) -> tuple[Node, ...]:
+    """Loop variables over the indices of its name."""
+    return tuple(index(f"#c{k}") for k in range(len(element.at)))
 
 
 def _follows(m: Member) -> bool:

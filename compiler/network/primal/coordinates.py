@@ -45,7 +45,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     book.sticking = _sticking(network)
     reader = Reader(sizes, book)
     initials = foremost(tuple(at_stores(network, incidence, reader)), network.branches, sizes)
-    contents = Contents(reader, classes.members, initials, network.branches)
+    contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected)
     guesses, stores = measured(network, initials, sizes, reader, reflected=reflected)
     found = replace(
         network,

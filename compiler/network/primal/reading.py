@@ -239,19 +239,20 @@ class Reader:
     def _moving(self, node: Node, piece: Piece, ranges: Ranges, active: tuple[Node, ...]) -> Node:
         """Displacement or flow of a branch."""
         kind, branch = node.data[1], piece.element.branch
-        if piece.member is not None:
-            m = piece.member
-            value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args)))
-            content = self.book.contents.get(piece.element.number)
-            if kind == "bf" or content is None:
-                return value
-            constant, fixed = content
-            return add(value, param(constant, *node.args) if fixed else var(constant, "s", *node.args))
         if branch.on is not None:
             value = self.at_piece(branch.on, piece, node.args)
             return self.resolve(value if kind == "bq" else self._derivative(value, node), ranges, active)
-        ends = [self._end(c, "n" + kind[1], piece, node.args) for c in piece.element.ends]
-        return self.resolve(sub(*ends), ranges, active)
+        if piece.member is not None:
+            m = piece.member
+            value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args)))
+        else:
+            ends = [self._end(c, "n" + kind[1], piece, node.args) for c in piece.element.ends]
+            value = self.resolve(sub(*ends), ranges, active)
+        content = self.book.contents.get(piece.element.number)
+        if kind == "bf" or content is None:
+            return value
+        constant, fixed = content
+        return add(value, param(constant, *node.args) if fixed else var(constant, "s", *node.args))
 
     def _end(self, contact: Contact, kind: str, piece: Piece, at: tuple[Node, ...]) -> Node:
         """A quantity of the node at one end; that of a common-flow ground is zero."""
