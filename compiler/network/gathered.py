@@ -14,11 +14,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.along import rewritten
 from sysdyn.compiler.network.skeleton import Shaped, filled, shaped
 from sysdyn.dsl.model.expression import Node, add, const, index, param, substitute, var, variables
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Initial, Loop, Network, NodeFamily, Parameter, Terminal
+from sysdyn.dsl.model.rewriting import rewritten
 from sysdyn.dsl.model.units import Unit, si
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass

@@ -18,6 +18,7 @@ from sysdyn.compiler.network.primal.overlaps import Ranges, beside, common, coun
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, Shape, State, Terminal
+from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 
@@ -59,12 +60,7 @@ def from_stores(network: Network) -> Network:
         change = {n: path for n in read if (path := over_ground((n.data[0], n.args))) is not None}
         return ex.substitute(root, change) if change else root
 
-    return replace(
-        network,
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
-        expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
-    )
+    return rewritten(network, read, TRACED)
 
 
 def from_masses(network: Network) -> Network:
@@ -92,13 +88,7 @@ def from_masses(network: Network) -> Network:
         found = [n for n in ex.topological([root]) if n.op == "var" and n.data[1] == "np"]
         return ex.substitute(root, {n: stores(n) for n in found}) if found else root
 
-    return replace(
-        network,
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
-        expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
-        dynamics=tuple(replace(d, expression=read(d.expression)) for d in network.dynamics),
-    )
+    return rewritten(network, read, (*TRACED, "dynamics"))
 
 
 # -- quadratures -------------------------------------------------------------------------------------------
@@ -106,8 +96,7 @@ def from_masses(network: Network) -> Network:
 
 def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
     """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of."""
-    roots = [o.expression for o in network.observations] + [d.expression for d in network.dynamics]
-    roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
+    roots = expressions(network, "observations", "dynamics", "expectations")
     stores = _stores(network)
     wanted: dict[Wanted, None] = {}
     for node in ex.topological(roots):
@@ -175,22 +164,15 @@ def _with_position(
         found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] == what]
         return ex.substitute(root, {n: _quadrature(what[0], n.args, n.data[2]) for n in found}) if found else root
 
+    network = rewritten(network, read, (*TRACED, "dynamics"))
     rate = ex.var(what[0], "nf" if what[1] == "nq" else "bf", *at)
     return replace(
         network,
         states=(*network.states, State(f"{what[0]}.q", shape, domain.displacement, place)),
-        dynamics=(
-            *(replace(d, expression=read(d.expression)) for d in network.dynamics),
-            Dynamic(state, rate, loops, place),
-        ),
+        dynamics=(*network.dynamics, Dynamic(state, rate, loops, place)),
         initials=(*network.initials, *starts),
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
-        expectations=tuple(
-            replace(e, left=read(e.left), right=read(e.right), within=None if e.within is None else read(e.within))
-            for e in network.expectations
-        ),
     )
+
 
 UNWRITTEN = 1e-6
 """Weight (of squares) of a guess that the text does not write, as the consistent start has it."""
