@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 
+from sysdyn.compiler.network.initially import initially
 from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
@@ -174,22 +175,8 @@ class Contents:
 
     def start(self, name: str, at: tuple[Node, ...]) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
-        value: Node = const(0.0)
-        for initial, box, content in self._given.get(name, []):
-            loops = [loop.index for loop in initial.loops]
-            places = [self.reader.sizes.affine(a, loops, initial.place) for a in initial.target.args]
-            pairs = zip(places, at, strict=True)
-            change = {index(a.loop): sub(node, a.offset.node) for a, node in pairs if a.loop is not None}
-            own_value = substitute(content, change)
-            if any(n.op == "index" for a in at for n in _leaves(a)):
-                value = _within(box, at, own_value, value)
-            elif all(i.holds(k) for i, k in zip(box, self._point(at, initial), strict=True)):
-                value = own_value
-        return value
-
-    def _point(self, at: tuple[Node, ...], initial: Initial) -> Box:
-        bounds = [self.reader.sizes.bound(a, initial.place) for a in at]
-        return tuple(Interval(b, b) for b in bounds)
+        given = [replace(initial, value=content) for initial, _, content in self._given.get(name, ())]
+        return initially(given, at) or const(0.0)
 
     def _follower(self, element: Element, members: Sequence[Member], stiff: Sequence[Branch]) -> None:
         """The constant of stores in series with others, unless it is zero by the text."""
