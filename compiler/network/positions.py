@@ -11,10 +11,18 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.initially import initially
 from sysdyn.compiler.network.primal.bounds import Sizes
 from sysdyn.compiler.network.primal.contents import charge
-from sysdyn.compiler.network.primal.overlaps import Ranges, beside, common, count, meeting, narrowed, ranges_of
+from sysdyn.compiler.network.primal.overlaps import (
+    Ranges,
+    beside,
+    common,
+    count,
+    initially,
+    meeting,
+    narrowed,
+    ranges_of,
+)
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, Shape, State, Terminal
@@ -221,13 +229,13 @@ class _Contents:
         """Contents that nothing is written of, by the positions of their ends, of which something is."""
         moved = self._moved()
         for b in self.branches:
-            ends = [self._start(t) for t in (b.plus, b.minus)]
+            within = ranges_of(b.loops, self.sizes, b.place)
+            ends = [self._start(t, within) for t in (b.plus, b.minus)]
             if not b.loops and b.plus is not None and b.minus is not None:
                 ends = [moved.get(self._point(t), end) for t, end in zip((b.plus, b.minus), ends, strict=True)]
             if ends == [None, None]:
                 continue
             value = ex.sub(ends[0] or ex.const(0.0), ends[1] or ex.const(0.0))
-            within = ranges_of(b.loops, self.sizes, b.place)
             holes = [m[0] for i in self.said.get((b.name, "bq"), ()) if (m := meeting(i, b.at, within, self.sizes))]
             for rest in beside(within, holes):
                 yield Initial(self._content(b), value, False, narrowed(b.loops, rest), b.place)
@@ -240,7 +248,7 @@ class _Contents:
             assert b.minus is not None
             for t in (b.plus, b.minus):
                 if t.node is not None and self._point(t) not in guess:
-                    found = initially(self.said.get((t.node, "nq"), ()), t.at)
+                    found = self._start(t, {})
                     guess[self._point(t)] = (ex.const(0.0), UNWRITTEN) if found is None else (found, 1.0)
                     for known in itertools.islice(self._fixed(t, {}), 1):
                         forest.join(self._point(t), None, known.value)
@@ -265,11 +273,11 @@ class _Contents:
             return None
         return initial.value if initial.target.data[1] == "bq" else charge(b, initial.value)
 
-    def _start(self, terminal: Terminal | None) -> Node | None:
+    def _start(self, terminal: Terminal | None, within: Ranges) -> Node | None:
         """The initial position of a terminal over the branch's loops, as far as it is written."""
         if terminal is None or terminal.node is None:
             return None
-        return initially(self.said.get((terminal.node, "nq"), ()), terminal.at)
+        return initially(self.said.get((terminal.node, "nq"), ()), terminal.at, within, self.sizes)
 
     def fixed(self) -> Iterator[Initial]:
         """Contents of the elements of loops between places whose positions are known."""

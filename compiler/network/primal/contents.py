@@ -16,20 +16,17 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.initially import initially
+from sysdyn.compiler.network.primal import overlaps
 from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.network.primal.integrals import line
-from sysdyn.compiler.network.primal.overlaps import cut_off
+from sysdyn.compiler.network.primal.overlaps import cut_off, initially, inside
 from sysdyn.compiler.network.primal.reading import Piece, Ranges, Reader, touches_network
 from sysdyn.compiler.network.primal.rings import closes, in_loops
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
     Node,
-    both,
-    compare,
-    conditional,
     const,
     index,
     is_const,
@@ -132,18 +129,18 @@ class Contents:
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
-        self._given: dict[str, list[tuple[Initial, Box, Node]]] = {}
+        self._given: dict[str, list[tuple[Initial, Box]]] = {}
         self._pinned: set[Node] = set()
         for initial in initials:
-            for part, box, content in self._contents(initial):
-                self._given.setdefault(part.target.data[0], []).append((part, box, content))
+            for part, box in self._contents(initial):
+                self._given.setdefault(part.target.data[0], []).append((part, box))
         stiff = [e.branch for e in elements if e.branch.kind in ("potential", "effort")]
         for element in dict.fromkeys(m.element for m in members if _follows(m)):
             self._follower(element, [m for m in members if m.element is element and _follows(m)], stiff)
         self._chords()
 
-    def _contents(self, initial: Initial) -> Iterator[tuple[Initial, Box, Node]]:
-        """The displacements that an initial condition gives to potential stores whose contents may need constants."""
+    def _contents(self, initial: Initial) -> Iterator[tuple[Initial, Box]]:
+        """The contents, and their elements, that an initial condition gives to stores that may need constants."""
         target = initial.target
         if target.op != "var" or target.data[1:] not in (("be", 0), ("bq", 0)) or variables(initial.value):
             return
@@ -159,7 +156,7 @@ class Contents:
 
         for loops, pair in self.reader.cut(initial.loops, initial.place, found):
             if pair is not None:
-                yield replace(initial, loops=loops), *pair
+                yield replace(initial, loops=loops, value=pair[1]), pair[0]
 
     def _charge(self, piece: Piece, initial: Initial) -> Node | None:
         branch = piece.element.branch
@@ -173,18 +170,19 @@ class Contents:
             return None
         return substitute(self.reader.at_piece(found, piece, initial.target.args), {mark: initial.value})
 
-    def start(self, name: str, at: tuple[Node, ...]) -> Node:
+    def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
-        given = [replace(initial, value=content) for initial, _, content in self._given.get(name, ())]
-        return initially(given, at) or const(0.0)
+        given = [initial for initial, _ in self._given.get(name, ())]
+        return initially(given, at, within, self.reader.sizes) or const(0.0)
 
     def _follower(self, element: Element, members: Sequence[Member], stiff: Sequence[Branch]) -> None:
         """The constant of stores in series with others, unless it is zero by the text."""
-        at = _own_indices(element)
+        at, whole = _own_indices(element)
         value: Node = const(0.0)
         for m in members:
-            first = self.start(m.leader.name, m.leader_at(at))
-            value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
+            part = dict(zip(whole, m.box, strict=True))
+            first = self.start(m.leader.name, m.leader_at(at), part)
+            value = inside(part, whole, sub(self.start(element.name, at, part), scale(m.sign, first)), value)
         fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
         self._constant(element, value if fixed or not closes(element.branch, stiff) else None)
 
@@ -192,10 +190,10 @@ class Contents:
         """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
         stores = [e.branch for e in self.between]
         looped = [e for e in in_loops(self.between) if e.branch.law is not None]
-        given = [e for e in looped if any(meet(box, e.named) for _, box, _ in self._given.get(e.name, ()))]
+        given = [e for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))]
         for e in looped if given else ():
             if any(e is other for other in given):
-                self._constant(e, self.start(e.name, _own_indices(e)))
+                self._constant(e, self.start(e.name, *_own_indices(e)))
             elif closes(e.branch, stores):
                 self._constant(e, None)
 
@@ -203,7 +201,7 @@ class Contents:
         """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
         if value is not None and is_const(value, 0.0):
             return
-        at = _own_indices(element)
+        at, _ = _own_indices(element)
         taken = {p.name for p in self.parameters} | {s.name for s in self.states}
         stem, place = f"{element.name}.content", element.branch.place
         name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
@@ -219,7 +217,7 @@ class Contents:
     def _fixed(self, name: str, box: Box) -> bool:
         """Whether the text fixes the contents of all these elements."""
         left = [box]
-        for initial, said, _ in self._given.get(name, ()):
+        for initial, said in self._given.get(name, ()):
             if initial.fixed:
                 left = [part for rest in left for part in cut_off(rest, said)]
         return not left
@@ -248,7 +246,7 @@ class Contents:
     def _led(self, coordinate: str) -> bool:
         """Whether a statement gives the content of a leader of the coordinate's classes."""
         leaders = [m for m in self.members if m.leads and m.coordinate == coordinate]
-        return any(meet(m.box, box) for m in leaders for _, box, _ in self._given.get(m.element.name, []))
+        return any(meet(m.box, box) for m in leaders for _, box in self._given.get(m.element.name, []))
 
     def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
         """The loops that the target still follows."""
@@ -267,7 +265,8 @@ class Contents:
             if not self.reader.book.contents.get(piece.element.number, ("", True))[1]:
                 return "pin", self.reader.resolve(var(target.data[0], "bq", *target.args), ranges), content
             q = var(m.coordinate, "q", *m.indices(target.args))
-            first = self.start(m.leader.name, m.leader_at(target.args))
+            within = {name: r.interval for name, r in ranges.items()}
+            first = self.start(m.leader.name, m.leader_at(target.args), within)
             if m.leads and len(m.index) == len(target.args):
                 return "pin", q, content
             return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
@@ -296,9 +295,10 @@ def _led_by(m: Member) -> Box:
     return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
 
 
-def _own_indices(element: Element) -> tuple[Node, ...]:
-    """Loop variables over the indices of its name."""
-    return tuple(index(f"#c{k}") for k in range(len(element.at)))
+def _own_indices(element: Element) -> tuple[tuple[Node, ...], overlaps.Ranges]:
+    """Loop variables over the indices of its name, and their ranges."""
+    within = {f"#c{k}": interval for k, interval in enumerate(element.named)}
+    return tuple(index(name) for name in within), within
 
 
 def _follows(m: Member) -> bool:
@@ -308,14 +308,6 @@ def _follows(m: Member) -> bool:
 def meet(a: Box, b: Box) -> bool:
     """Whether boxes have elements in common."""
     return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))
-
-
-def _within(box: Box, at: tuple[Node, ...], value: Node, other: Node) -> Node:
-    """The value at indices in the box, the other elsewhere."""
-    pairs = list(zip(box, at, strict=True))
-    low = [compare("<=", i.first.node, node) for i, node in pairs]
-    high = [compare("<=", node, i.last.node) for i, node in pairs]
-    return conditional(both(*low, *high), value, other) if pairs else value
 
 
 def _leaves(node: Node) -> Iterator[Node]:
