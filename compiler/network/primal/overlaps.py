@@ -55,6 +55,12 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
     return found, substitute(initial.value, change)
 
 
+def untold(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Iterator[Ranges]:
+    """The parts of the ranges in which no statement is about elements `at`."""
+    found = (meeting(initial, at, within, sizes) for initial in initials)
+    return beside(within, [m[0] for m in found if m is not None])
+
+
 def initially(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Node | None:
     """What statements of one family, of which no two are about one element (`precedence`), say of its elements `at`:
     the value over the ranges, zero where nothing is said; None where nothing is.

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Sizes
-from sysdyn.compiler.network.primal.overlaps import beside, meeting, narrowed, ranges_of
+from sysdyn.compiler.network.primal.overlaps import narrowed, ranges_of, untold
 from sysdyn.dsl.model.network import Branch, Initial, Network
 
 _SAME = {"p": "f", "np": "nf"}
@@ -82,13 +82,6 @@ def _rank(k: int, initial: Initial) -> tuple[int, bool, int]:
 
 def _left(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """What no statement that goes before is about."""
-    if not others:
-        yield initial
-        return
     within = ranges_of(initial.loops, sizes, initial.place)
-    holes = [m[0] for other in others if (m := meeting(other, initial.target.args, within, sizes))]
-    if not initial.loops:
-        yield from () if holes else (initial,)
-        return
-    for rest in beside(within, holes):
+    for rest in untold(others, initial.target.args, within, sizes):
         yield replace(initial, loops=narrowed(initial.loops, rest))
