@@ -1,5 +1,6 @@
 """Of several initial values of one element, the one that goes before the others is left."""
 
+from sysdyn.compiler.network.primal import overlaps
 from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
@@ -16,9 +17,9 @@ model net {
 """
 
 
-def left(*said):
+def left(*said, head=HEAD):
     """(kind, value, fixed, range) of each statement left."""
-    text = HEAD + "\n".join(f"  {line}" for line in said) + "\n}\nscene run of net { time 0 s to 1 s; trace C[1].e }\n"
+    text = head + "\n".join(f"  {line}" for line in said) + "\n}\nscene run of net { time 0 s to 1 s; trace C[1].e }\n"
     found = []
     with ex.fresh():
         report = Report()
@@ -52,3 +53,15 @@ def test_two_fixed_values_both_stay():
 
 def test_a_resistors_charge_is_not_its_effort():
     assert len(left("init R[1].e ~ 1 V", "init R[1].q ~ 2 C")) == 2
+
+
+def test_ranges_are_held_against_what_may_be_about_their_elements_alone(monkeypatch):
+    """60 ranges of two elements and 60 elements beside them: 60 meetings, not 3600."""
+    asked = []
+    meeting = overlaps.meeting
+    monkeypatch.setattr(overlaps, "meeting", lambda *of: asked.append(of) or meeting(*of))
+    ranges = [f"for i in {4 * k + 1}..{4 * k + 2} {{ init C[i].e ~ 1 V }}" for k in range(60)]
+    single = [f"init C[{4 * k + 2 + k % 2}].e ~ 2 V" for k in range(60)]
+    found = left(*ranges, *single, head=HEAD.replace("n = 6", "n = 240"))
+    assert len(found) == 120
+    assert sum(not at.loops for at, *_ in asked) <= 60
