@@ -21,8 +21,8 @@ from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.network.primal.integrals import line
-from sysdyn.compiler.network.primal.overlaps import cut_off, initially, inside
-from sysdyn.compiler.network.primal.reading import Piece, Ranges, Reader, touches_network
+from sysdyn.compiler.network.primal.overlaps import cut_off, initially, inside, ranges_of
+from sysdyn.compiler.network.primal.reading import Ranges, Reader, touches_network
 from sysdyn.compiler.network.primal.rings import closes, in_loops
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
@@ -74,12 +74,33 @@ def momentum(branch: Branch, flow: Node) -> Node | None:
 
 
 def at_stores(network: Network, incidence: Incidence, reader: Reader) -> Iterator[Initial]:
-    """Initial conditions; those of a node's effort as those of a linear store between that node and ground."""
+    """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents."""
     for initial in network.initials:
         if initial.target.op == "var" and initial.target.data[1:] == ("ne", 0):
-            yield from _at_store(initial, incidence.cells.get(initial.target.data[0], ()), reader)
+            for part in _at_store(initial, incidence.cells.get(initial.target.data[0], ()), reader):
+                yield from _as_content(part, reader)
         else:
-            yield initial
+            yield from _as_content(initial, reader)
+
+
+def _as_content(initial: Initial, reader: Reader) -> Iterator[Initial]:
+    """Where a law tells it, what the store holds at the effort."""
+    target = initial.target
+    if target.op != "var" or target.data[1:] != ("be", 0) or variables(initial.value):
+        yield initial
+        return
+    mark = index("#v")  # the value is over the statement's own loops: put in after the law's were replaced
+
+    def content(ranges: Ranges) -> Node | None:
+        piece = reader.piece(target.data[0], target.args, ranges)
+        found = charge(piece.element.branch, mark)
+        return None if found is None else substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
+
+    for loops, value in reader.cut(initial.loops, initial.place, content):
+        if value is None:
+            yield replace(initial, loops=loops)
+        else:
+            yield replace(initial, target=var(target.data[0], "bq", *target.args), value=value, loops=loops)
 
 
 def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Reader) -> Iterator[Initial]:
@@ -131,44 +152,14 @@ class Contents:
         self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box]]] = {}
         self._pinned: set[Node] = set()
-        for initial in initials:
-            for part, box in self._contents(initial):
-                self._given.setdefault(part.target.data[0], []).append((part, box))
+        for initial in filter(_is_content, initials):
+            within = ranges_of(initial.loops, reader.sizes, initial.place)
+            box = tuple(reader.sizes.affine(a, within, initial.place).over(within) for a in initial.target.args)
+            self._given.setdefault(initial.target.data[0], []).append((initial, box))
         stiff = [e.branch for e in elements if e.branch.kind in ("potential", "effort")]
         for element in dict.fromkeys(m.element for m in members if _follows(m)):
             self._follower(element, [m for m in members if m.element is element and _follows(m)], stiff)
         self._chords()
-
-    def _contents(self, initial: Initial) -> Iterator[tuple[Initial, Box]]:
-        """The contents, and their elements, that an initial condition gives to stores that may need constants."""
-        target = initial.target
-        if target.op != "var" or target.data[1:] not in (("be", 0), ("bq", 0)) or variables(initial.value):
-            return
-        numbers = {e.number for e in self.between}
-
-        def found(ranges: Ranges) -> tuple[Box, Node] | None:
-            piece = self.reader.piece(target.data[0], target.args, ranges)
-            counted = piece.member is not None or piece.element.number in numbers
-            content = self._charge(piece, initial) if counted else None
-            held = {name: r.interval for name, r in ranges.items()}
-            box = tuple(a.over(held) for a in self.reader.affine(target.args, ranges))
-            return None if content is None else (box, content)
-
-        for loops, pair in self.reader.cut(initial.loops, initial.place, found):
-            if pair is not None:
-                yield replace(initial, loops=loops, value=pair[1]), pair[0]
-
-    def _charge(self, piece: Piece, initial: Initial) -> Node | None:
-        branch = piece.element.branch
-        if branch.kind != "potential":
-            return None
-        if initial.target.data[1] == "bq":
-            return initial.value
-        mark = index("#v")  # the value is over the statement's own loops: put in after the law's were replaced
-        found = charge(branch, mark)
-        if found is None:
-            return None
-        return substitute(self.reader.at_piece(found, piece, initial.target.args), {mark: initial.value})
 
     def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
@@ -256,27 +247,25 @@ class Contents:
     def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
         """Where one piece is read: (pin | class | drop, target, value); class: the coordinate of the store's class."""
         target = initial.target
-        piece = None
-        if target.op == "var" and target.data[1] in ("be", "bq") and not variables(initial.value):
+        if _is_content(initial):
             piece = self.reader.piece(target.data[0], target.args, ranges)
-        content = None if piece is None else self._charge(piece, initial)
-        if piece is not None and piece.member is not None and content is not None:
-            m = piece.member
-            if not self.reader.book.contents.get(piece.element.number, ("", True))[1]:
-                return "pin", self.reader.resolve(var(target.data[0], "bq", *target.args), ranges), content
-            q = var(m.coordinate, "q", *m.indices(target.args))
-            within = {name: r.interval for name, r in ranges.items()}
-            first = self.start(m.leader.name, m.leader_at(target.args), within)
-            if m.leads and len(m.index) == len(target.args):
-                return "pin", q, content
-            return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
-        if piece is not None and piece.member is None and content is not None:
-            moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
-            return "pin", *_pin(moved, content)
+            m, (_, fixed) = piece.member, self.reader.book.contents.get(piece.element.number, ("", True))
+            if m is not None and fixed and piece.element.branch.kind == "potential":
+                q = var(m.coordinate, "q", *m.indices(target.args))
+                if m.leads and len(m.index) == len(target.args):
+                    return "pin", q, initial.value
+                within = {name: r.interval for name, r in ranges.items()}
+                first = self.start(m.leader.name, m.leader_at(target.args), within)
+                return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
         new, value = (self.reader.resolve(node, ranges) for node in (target, initial.value))
         if not variables(value):
             return "pin", *_pin(new, value)
         return "pin", new, value
+
+
+def _is_content(initial: Initial) -> bool:
+    """Whether a statement tells a displacement of a branch by itself."""
+    return initial.target.op == "var" and initial.target.data[1:] == ("bq", 0) and not variables(initial.value)
 
 
 def _pin(target: Node, value: Node) -> tuple[Node, Node]:
