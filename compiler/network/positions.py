@@ -26,7 +26,7 @@ from sysdyn.compiler.network.primal.overlaps import (
 )
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, Shape, State, Terminal
+from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, State, Terminal
 from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import Place
 
@@ -88,27 +88,39 @@ def from_masses(network: Network) -> Network:
 
 
 def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
-    """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of."""
-    roots = expressions(network, "observations", "dynamics", "expectations")
+    """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of: a dynamic
+    variable NAME.q each, which begins as the displacement is written to begin.
+    """
     stores = _stores(network)
-    wanted: dict[Wanted, None] = {}
-    for node in ex.topological(roots):
-        if node.op == "var" and _is_position(node, stores):
-            wanted.setdefault((node.data[0], node.data[1]))
-    nodes = {n.name: (n.shape, n.domain, n.place) for n in network.nodes}
+    roots = ex.topological(expressions(network, "observations", "dynamics", "expectations"))
+    wanted = dict.fromkeys((n.data[0], n.data[1]) for n in roots if _is_position(n, stores))
+
+    def read(root: Node) -> Node:
+        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] in wanted]
+        return ex.substitute(root, {n: _quadrature(n.data[0], n.args, n.data[2]) for n in found}) if found else root
+
+    families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
+    for n in network.nodes:
+        loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(n.shape))
+        families[n.name, "nq"] = [(loops, tuple(ex.index(x.index) for x in loops), n.domain, n.place)]
+    for b in network.branches:
+        families.setdefault((b.name, "bq"), []).append((b.loops, b.at, b.domain, b.place))
+    states, dynamics = [], []
     for name, kind in wanted:
-        if kind == "nq":
-            shape, domain, place = nodes[name]
-            loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(shape))
-            network = _with_position(
-                network, (name, kind), (shape, loops, tuple(ex.index(x.index) for x in loops)), domain, place
-            )
-        else:
-            for b in network.branches:
-                if b.name == name:
-                    shape = tuple((loop.first, loop.last) for loop in b.loops)
-                    network = _with_position(network, (name, kind), (shape, b.loops, b.at), b.domain, b.place)
-    return network, frozenset(wanted)
+        for loops, at, domain, place in families[name, kind]:
+            shape = tuple((loop.first, loop.last) for loop in loops)
+            states.append(State(f"{name}.q", shape, domain.displacement, place))
+            dynamics.append(Dynamic(_quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
+    starts = (i for i in network.initials if i.target.op == "var" and i.target.data in {(*w, 0) for w in wanted})
+    begun = (replace(i, target=_quadrature(i.target.data[0], i.target.args)) for i in starts)
+    network = rewritten(network, read, (*TRACED, "dynamics"))
+    found = replace(
+        network,
+        states=(*network.states, *states),
+        dynamics=(*network.dynamics, *dynamics),
+        initials=(*network.initials, *begun),
+    )
+    return found, frozenset(wanted)
 
 
 def massive(network: Network) -> frozenset[str]:
@@ -135,36 +147,6 @@ def _is_position(node: Node, stores: frozenset[str]) -> bool:
 
 def _quadrature(name: str, at: Sequence[Node], order: int = 0) -> Node:
     return ex.var(f"{name}.q", "s", *at, order=order)
-
-
-def _with_position(
-    network: Network,
-    what: Wanted,
-    family: tuple[Shape, tuple[Loop, ...], tuple[Node, ...]],
-    domain: Domain,
-    place: Place,
-) -> Network:
-    """One dynamic variable NAME.q for a displacement var(name, kind); it begins as that is written to begin."""
-    shape, loops, at = family
-    state = _quadrature(what[0], at)
-    starts = [
-        replace(i, target=_quadrature(what[0], i.target.args))
-        for i in network.initials
-        if i.target.op == "var" and i.target.data == (*what, 0)
-    ]
-
-    def read(root: Node) -> Node:
-        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] == what]
-        return ex.substitute(root, {n: _quadrature(what[0], n.args, n.data[2]) for n in found}) if found else root
-
-    network = rewritten(network, read, (*TRACED, "dynamics"))
-    rate = ex.var(what[0], "nf" if what[1] == "nq" else "bf", *at)
-    return replace(
-        network,
-        states=(*network.states, State(f"{what[0]}.q", shape, domain.displacement, place)),
-        dynamics=(*network.dynamics, Dynamic(state, rate, loops, place)),
-        initials=(*network.initials, *starts),
-    )
 
 
 # -- contents ----------------------------------------------------------------------------------------------
