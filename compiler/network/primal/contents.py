@@ -23,7 +23,7 @@ from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, N
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.overlaps import cut_off, initially, inside, ranges_of
 from sysdyn.compiler.network.primal.reading import Ranges, Reader, touches_network
-from sysdyn.compiler.network.primal.rings import closes, in_loops
+from sysdyn.compiler.network.primal.rings import in_loops
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
     Node,
@@ -145,8 +145,11 @@ class Contents:
         self.reader = reader
         self.members = members
         self.initials = initials
-        potential = [e for e in elements if e.branch.kind == "potential" and e.branch.domain.common == "flow"]
-        self.between = [e for e in potential if len(e.ends) == 2] if reflected else []
+        joining = [e for e in elements if len(e.ends) == 2]
+        series = [e for e in joining if e.branch.domain.common == "effort"]
+        between = [e for e in joining if e.branch.domain.common == "flow"] if reflected else []
+        between = [e for e in between if e.branch.kind == "potential"]
+        self.looped = in_loops([*(e for e in series if e.branch.kind in ("potential", "effort")), *between])
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
@@ -156,17 +159,16 @@ class Contents:
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = tuple(reader.sizes.affine(a, within, initial.place).over(within) for a in initial.target.args)
             self._given.setdefault(initial.target.data[0], []).append((initial, box))
-        stiff = [e.branch for e in elements if e.branch.kind in ("potential", "effort")]
         for element in dict.fromkeys(m.element for m in members if _follows(m)):
-            self._follower(element, [m for m in members if m.element is element and _follows(m)], stiff)
-        self._chords()
+            self._follower(element, [m for m in members if m.element is element and _follows(m)])
+        self._chords([e for e in between if e.number in self.looped and e.branch.law is not None])
 
     def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
         given = [initial for initial, _ in self._given.get(name, ())]
         return initially(given, at, within, self.reader.sizes) or const(0.0)
 
-    def _follower(self, element: Element, members: Sequence[Member], stiff: Sequence[Branch]) -> None:
+    def _follower(self, element: Element, members: Sequence[Member]) -> None:
         """The constant of stores in series with others, unless it is zero by the text."""
         at, whole = _own_indices(element)
         value: Node = const(0.0)
@@ -175,18 +177,13 @@ class Contents:
             first = self.start(m.leader.name, m.leader_at(at), part)
             value = inside(part, whole, sub(self.start(element.name, at, part), scale(m.sign, first)), value)
         fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
-        self._constant(element, value if fixed or not closes(element.branch, stiff) else None)
+        self._constant(element, value if fixed or element.number not in self.looped else None)
 
-    def _chords(self) -> None:
+    def _chords(self, looped: Sequence[Element]) -> None:
         """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
-        stores = [e.branch for e in self.between]
-        looped = [e for e in in_loops(self.between) if e.branch.law is not None]
-        given = [e for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))]
+        given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
         for e in looped if given else ():
-            if any(e is other for other in given):
-                self._constant(e, self.start(e.name, *_own_indices(e)))
-            elif closes(e.branch, stores):
-                self._constant(e, None)
+            self._constant(e, self.start(e.name, *_own_indices(e)) if e.number in given else None)
 
     def _constant(self, element: Element, value: Node | None) -> None:
         """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
