@@ -24,13 +24,13 @@ from sysdyn.compiler.binding.counts import check_counts
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.conjugates import with_book_signs
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.forms.floating import anchored
 from sysdyn.compiler.forms.frozen import frozen
 from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.legendre import transformed
+from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates
 from sysdyn.compiler.forms.steepness import scaled
 from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
@@ -175,7 +175,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         network, inverted, steps = primal(family, reflected=reflected)
         verify_network(network, coordinates=True)
     with _timed("energies", timings):
-        model = anchored(energies.energies(network))
+        model = in_relative_coordinates(energies.energies(network))
         energies.verify_energies(model)
         as_written = network.scene is not None and network.scene.keeps("keep_flow")
         model, notes = integrate(model) if integrating and not as_written else (model, ())

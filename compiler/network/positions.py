@@ -41,7 +41,7 @@ _Point = tuple[str, tuple[int | Node, ...]] | None
 
 def from_stores(network: Network) -> Network:
     """Traced positions of points that stores hold to the ground, as displacements of these stores."""
-    forest = _Forest()
+    forest = _SpanningForest()
     for b in network.branches:
         single = b.kind == "potential" and b.domain.common == "flow" and not b.loops
         if single and b.plus is not None and b.minus is not None:
@@ -270,9 +270,9 @@ class _Contents:
         if (terminal.node, "nq") in self.wanted:
             yield within, _quadrature(terminal.node, terminal.at)
 
-    def _known_points(self, *, constant: bool) -> _Forest:
+    def _known_points(self, *, constant: bool) -> _SpanningForest:
         """The ends of single branches, joined to the ground where their positions are known; constant: as numbers."""
-        forest = _Forest()
+        forest = _SpanningForest()
         for point, terminal in self.terminals.items():
             values = (value for _, value in self._known(terminal, {}) if not (constant and ex.variables(value)))
             known = next(values, None)
@@ -281,7 +281,7 @@ class _Contents:
         return forest
 
 
-class _Forest:
+class _SpanningForest:
     """Points joined by displacements: the position of each over the root of its tree."""
 
     def __init__(self) -> None:

@@ -15,10 +15,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
-from sysdyn.compiler.network.islands import grounded
 from sysdyn.compiler.network.positions import from_masses, from_stores, massive, with_contents, with_quadratures
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.stated import ALL, as_elements
+from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (

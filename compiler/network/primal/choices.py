@@ -58,7 +58,7 @@ def own(branch: Branch, kind: str) -> Node:
     return var(branch.name, kind, *branch.at)
 
 
-class Choice:
+class Causality:
     """How one branch enters."""
 
     def __init__(

@@ -19,11 +19,11 @@ from dataclasses import replace
 from sysdyn.compiler.network.primal import overlaps
 from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
+from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.overlaps import cut_off, initially, inside, ranges_of
-from sysdyn.compiler.network.primal.reading import Ranges, Reader, touches_network
-from sysdyn.compiler.network.primal.rings import in_loops
+from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
     Node,
@@ -73,7 +73,7 @@ def momentum(branch: Branch, flow: Node) -> Node | None:
     return None if straight is None else straight.inverse(flow)
 
 
-def at_stores(network: Network, incidence: Incidence, reader: Reader) -> Iterator[Initial]:
+def at_stores(network: Network, incidence: Incidence, reader: Rewriter) -> Iterator[Initial]:
     """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents."""
     for initial in network.initials:
         if initial.target.op == "var" and initial.target.data[1:] == ("ne", 0):
@@ -83,7 +83,7 @@ def at_stores(network: Network, incidence: Incidence, reader: Reader) -> Iterato
             yield from _as_content(initial, reader)
 
 
-def _as_content(initial: Initial, reader: Reader) -> Iterator[Initial]:
+def _as_content(initial: Initial, reader: Rewriter) -> Iterator[Initial]:
     """Where a law tells it, what the store holds at the effort."""
     target = initial.target
     if target.op != "var" or target.data[1:] != ("be", 0) or variables(initial.value):
@@ -103,7 +103,7 @@ def _as_content(initial: Initial, reader: Reader) -> Iterator[Initial]:
             yield replace(initial, target=var(target.data[0], "bq", *target.args), value=value, loops=loops)
 
 
-def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Reader) -> Iterator[Initial]:
+def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> Iterator[Initial]:
     node = initial.target
 
     boxes: dict[Touch | None, list[Box]] = {}
@@ -135,7 +135,7 @@ class Contents:
 
     def __init__(
         self,
-        reader: Reader,
+        reader: Rewriter,
         members: Sequence[Member],
         initials: Sequence[Initial],
         elements: Sequence[Element],

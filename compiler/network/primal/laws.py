@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
-from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Choice, Law, conjugate, own
+from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Causality, Law, conjugate, own
 from sysdyn.compiler.network.primal.fields import field_quantities
 from sysdyn.compiler.network.primal.incidence import Element
 from sysdyn.compiler.network.primal.reading import FUNCTIONS
@@ -86,7 +86,7 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     found = Laws()
     slopes = Slopes(network)
     letters = dict(zip("efqp", "fepq" if reflected else "efqp", strict=True))
-    choices = [(e, Choice(e.branch, slopes, network.tables, e.name in wanted, letters)) for e in elements]
+    choices = [(e, Causality(e.branch, slopes, network.tables, e.name in wanted, letters)) for e in elements]
     chosen = [(e, choice.law()) for e, choice in choices]
     asked = read_functions(network)
     for (e, choice), (_, law) in zip(choices, chosen, strict=True):

@@ -49,7 +49,7 @@ _Anchors = Mapping[str, _Anchor]
 """By family, the anchor itself among them."""
 
 
-def anchored(model: EnergyModel) -> EnergyModel:
+def in_relative_coordinates(model: EnergyModel) -> EnergyModel:
     """The model with every group of floating coordinates counted from one of them."""
     change: dict[str, _Anchor] = {}
     for group in _groups(model):

@@ -13,7 +13,7 @@ from dataclasses import replace
 from sysdyn.compiler.network.primal.bounds import Box, Sizes
 from sysdyn.compiler.network.primal.contents import held_at, meet
 from sysdyn.compiler.network.primal.overlaps import Ranges, beside, meeting, narrowed, ranges_of
-from sysdyn.compiler.network.primal.reading import Reader
+from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
 from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
 
@@ -22,7 +22,7 @@ _SAYING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 
 
 def measured(
-    network: Network, initials: Sequence[Initial], sizes: Sizes, reader: Reader, *, reflected: bool
+    network: Network, initials: Sequence[Initial], sizes: Sizes, reader: Rewriter, *, reflected: bool
 ) -> tuple[tuple[Initial, ...], frozenset[str]]:
     """One guess for the stores of a statement that are measured by their contents; the stores all of whose guesses by
     the text are among them.
@@ -87,7 +87,7 @@ def _tells(i: Initial, b: Branch) -> bool:
     return i.target.data[1] in _SAYING[b.kind] and not i.target.data[2]
 
 
-def _contents(b: Branch, loops: tuple[Loop, ...], reader: Reader) -> Iterator[tuple[tuple[Loop, ...], Node]]:
+def _contents(b: Branch, loops: tuple[Loop, ...], reader: Rewriter) -> Iterator[tuple[tuple[Loop, ...], Node]]:
     """The contents of the elements of a statement over these loops, in coordinates."""
     content = var(b.name, _CONTENT[b.kind], *b.at)
     return reader.cut(loops, b.place, lambda ranges: reader.resolve(content, ranges))
