@@ -168,19 +168,21 @@ def _left(found: Reactions) -> int:
     return left
 
 
+def _around(system: System, state: ConsistentState) -> tuple[Starter, Floats, Floats]:
+    """What starts at a state are sought in, the state there, and how large its displacements are, 0 for all else."""
+    starter = system.starter or Starter(system, remember=True)
+    x = np.concatenate([state.y, state.yd[starter.rates]])
+    return starter, x, np.where(starter.moves(("q",))[: x.size], starter.scale(state.t, x), 0.0)
+
+
 def nearby(system: System, state: ConsistentState) -> list[Floats]:
     """Y at up to POINTS seeded points near the state, displacements consistent with phi."""
-    starter = Starter(system, remember=True)
-    x = np.concatenate([state.y, state.yd[starter.rates]])
-    q = starter.moves(("q",))[: x.size]
-    size = np.where(q, starter.scale(state.t, x), 0.0)
-    random = np.random.default_rng(12)
+    starter, x, size = _around(system, state)
+    q, rows = starter.moves(("q",))[: x.size], starter.groups("phi")
     found = []
-    for _ in range(POINTS):
-        direction = random.standard_normal(x.size)
+    for direction in _directions(system, POINTS)[:, : x.size]:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * size * direction
-            rows = starter.groups("phi")
             if rows.any() and q.any():
                 scale, weight = starter.scale(state.t, shaken), np.ones(shaken.size)
                 problem = weighted(starter, state.t, shaken, rows=rows, free=q, scale=scale, weight=weight)
@@ -221,9 +223,7 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     straight = (here > 0.0) & (here == elsewhere)
     if straight.all():  # rows of J that are the same everywhere vanish nowhere
         return NONE
-    starter = system.starter or Starter(system, remember=True)
-    x = np.concatenate([state.y, state.yd[starter.rates]])
-    size = np.where(starter.moves(("q",))[: x.size], starter.scale(state.t, x), 0.0)
+    starter, x, size = _around(system, state)
     shaken = (x + BESIDE * size * _directions(system, POINTS)[:, : x.size])[:, : starter.n]
     there = sizes(shaken).min(axis=0, initial=np.inf)
     return np.flatnonzero(here <= TOLERANCE * there).astype(np.int32)
