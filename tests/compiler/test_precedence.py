@@ -1,7 +1,8 @@
 """Of several initial values of one element, the one that goes before the others is left."""
 
-from sysdyn.compiler.network.primal import overlaps
+from sysdyn.compiler.network.primal import overlaps, primal
 from sysdyn.compiler.network.primal.precedence import outermost
+from sysdyn.compiler.network.reflection import reflect
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report, SourceText
@@ -65,3 +66,26 @@ def test_ranges_are_held_against_what_may_be_about_their_elements_alone(monkeypa
     found = left(*ranges, *single, head=HEAD.replace("n = 6", "n = 240"))
     assert len(found) == 120
     assert sum(not at.loops for at, *_ in asked) <= 60
+
+
+def rings(number):
+    """A ladder of inductors side by side, each second one said."""
+    nodes = ", ".join(f"n{k}" for k in range(number))
+    lines = ["from std.electrical import capacitor, inductor", "model net {", f"  node {nodes}: electrical"]
+    for k in range(number):
+        end = f"n{k + 1}" if k + 1 < number else "ground"
+        lines += [f"  L{k}: inductor(L = 2 H) n{k} -> {end}", f"  M{k}: inductor(L = 3 H) n{k} -> {end}"]
+        lines += [f"  C{k}: capacitor(C = 1 F) n{k} -> ground", f"  init L{k}.f = {k} A"]
+    report = Report()
+    text = "\n".join([*lines, "}", "scene run of net { time 0 s to 1 s; trace C0.e }\n"])
+    document = load.document(SourceText("text.sd", text), report)
+    network = load.network(document, document.models["net"], document.scenes["run"], report)
+    assert network is not None, report.diagnostics
+    return network
+
+
+def test_constants_of_rings_cost_what_the_text_is_long(effort):
+    """Three times as many inductors in loops: three times the lines of Python run, not more."""
+    with ex.fresh():
+        counts = [effort(lambda net=net: primal(reflect(net), reflected=True))[1] for net in (rings(12), rings(36))]
+    assert counts[1] <= 3.1 * counts[0], counts

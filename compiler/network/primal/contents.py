@@ -13,6 +13,7 @@ nothing is said of it.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 
@@ -143,7 +144,6 @@ class Contents:
         reflected: bool,
     ) -> None:
         self.reader = reader
-        self.members = members
         self.initials = initials
         joining = [e for e in elements if len(e.ends) == 2]
         series = [e for e in joining if e.branch.domain.common == "effort"]
@@ -154,13 +154,21 @@ class Contents:
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box]]] = {}
+        self._leaders: dict[str, list[Member]] = {}
+        self._names: set[str] = set()
         self._pinned: set[Node] = set()
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = tuple(reader.sizes.affine(a, within, initial.place).over(within) for a in initial.target.args)
             self._given.setdefault(initial.target.data[0], []).append((initial, box))
-        for element in dict.fromkeys(m.element for m in members if _follows(m)):
-            self._follower(element, [m for m in members if m.element is element and _follows(m)])
+        followers: dict[int, list[Member]] = {}
+        for m in members:
+            if m.leads:
+                self._leaders.setdefault(m.coordinate, []).append(m)
+            elif m.element.branch.kind == "potential":
+                followers.setdefault(m.element.number, []).append(m)
+        for group in followers.values():
+            self._follower(group[0].element, group)
         self._chords([e for e in between if e.number in self.looped and e.branch.law is not None])
 
     def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
@@ -190,9 +198,9 @@ class Contents:
         if value is not None and is_const(value, 0.0):
             return
         at, _ = _own_indices(element)
-        taken = {p.name for p in self.parameters} | {s.name for s in self.states}
         stem, place = f"{element.name}.content", element.branch.place
-        name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
+        name = next(n for k in itertools.count(1) if (n := stem if k == 1 else f"{stem}.{k}") not in self._names)
+        self._names.add(name)
         unit, shape = element.branch.domain.displacement, shape_of(element.named)
         self.reader.book.contents[element.number] = name, value is not None
         if value is not None:
@@ -233,7 +241,7 @@ class Contents:
 
     def _led(self, coordinate: str) -> bool:
         """Whether a statement gives the content of a leader of the coordinate's classes."""
-        leaders = [m for m in self.members if m.leads and m.coordinate == coordinate]
+        leaders = self._leaders.get(coordinate, ())
         return any(meet(m.box, box) for m in leaders for _, box in self._given.get(m.element.name, []))
 
     def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
@@ -285,10 +293,6 @@ def _own_indices(element: Element) -> tuple[tuple[Node, ...], overlaps.Ranges]:
     """Loop variables over the indices of its name, and their ranges."""
     within = {f"#c{k}": interval for k, interval in enumerate(element.named)}
     return tuple(index(name) for name in within), within
-
-
-def _follows(m: Member) -> bool:
-    return m.element.branch.kind == "potential" and not m.leads
 
 
 def meet(a: Box, b: Box) -> bool:
