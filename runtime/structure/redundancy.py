@@ -77,23 +77,23 @@ class _Places:
     row: Ints
 
 
-def _reacting(system: System, idle: Ints = NONE, kinds: tuple[str, ...] = ("kappa", "mu")) -> _Places:
-    """The multipliers of those kinds, but for the idle ones, and the reactions of each."""
+def _reacting(system: System, idle: Ints = NONE) -> _Places:
+    """The multipliers of constraints, but for the idle ones, and the reactions of each."""
 
     def find() -> _Places:
-        pattern, mine = system.pattern, system.are(*kinds).copy()
+        pattern, mine = system.pattern, system.are("kappa", "mu").copy()
         mine[idle] = False
         columns, multipliers = pattern.columns_of(), np.flatnonzero(mine)
         entry = np.flatnonzero(mine[columns] & system.of_groups("dynamics")[pattern.row])
         places = entry, np.searchsorted(multipliers, columns[entry]), pattern.row[entry]
         return _Places(multipliers, *(place.astype(np.int32) for place in places))
 
-    return system.once(("reacting", kinds, idle.tobytes()), find)
+    return system.once(("reacting places", idle.tobytes()), find)
 
 
-def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu")) -> Reactions:
-    """J from the reactions of the multipliers of those kinds (virtual displacements)."""
-    all_ = _reacting(system, system.idle_multipliers(), kinds)
+def reactions(system: System, jy: Floats) -> Reactions:
+    """J from the reactions of the multipliers (virtual displacements)."""
+    all_ = _reacting(system, system.idle_multipliers())
     value, largest = jy[all_.entry], np.zeros(all_.multipliers.size)
     np.maximum.at(largest, all_.which, np.abs(value))
     real = np.abs(value) > NOISE * largest[all_.which]

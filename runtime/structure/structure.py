@@ -18,15 +18,7 @@ from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.redundancy import (
-    NONE,
-    combination,
-    dependent,
-    independent,
-    nearby,
-    reactions,
-    vanished,
-)
+from sysdyn.runtime.structure.redundancy import combination, dependent, independent, nearby, reactions, vanished
 from sysdyn.values import dataclass
 
 DENSE = 300
@@ -39,6 +31,7 @@ ROUSED = 1e-2
 GENERIC = 0.7310585786300049
 POINTS = tuple(GENERIC * 10.0**power for power in (3, -3, 6, -6, 9, -9))
 """At which a pencil is looked at, after equilibration: at GENERIC first."""
+NONE = np.zeros(0, dtype=np.int32)
 SLIDES = 2.0
 """Of a branch (events/kinks.py)."""
 
