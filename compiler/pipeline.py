@@ -24,18 +24,18 @@ from sysdyn.compiler.binding.counts import check_counts
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.conjugates import with_book_signs
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.forms.floating import anchored
 from sysdyn.compiler.forms.frozen import frozen
 from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.legendre import transformed
+from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates
 from sysdyn.compiler.forms.steepness import scaled
 from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.compiler.model.mirror import word
+from sysdyn.compiler.model.mirror import refusal, word
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.authors import shown, told
 from sysdyn.compiler.network.gathered import gathered
@@ -175,7 +175,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         network, inverted, steps = primal(family, reflected=reflected)
         verify_network(network, coordinates=True)
     with _timed("energies", timings):
-        model = anchored(energies.energies(network))
+        model = in_relative_coordinates(energies.energies(network))
         energies.verify_energies(model)
         as_written = network.scene is not None and network.scene.keeps("keep_flow")
         model, notes = integrate(model) if integrating and not as_written else (model, ())
@@ -189,7 +189,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         legendre = formulation.endswith("hamiltonian")
         own, rests = transformed(model, network.parameters) if legendre else (model, ())
         network = replace(network, slopes=(*network.slopes, *rests))
-        lowered = FORMULATIONS[formulation.removeprefix("co_")](own)
+        lowered = _lowered(own, formulation)
         titles = tuple(replace(r, label=word(formulation, r.label)) if r.block == "audit" else r for r in lowered.rows)
         lowered = replace(lowered, formulation=formulation, rows=titles)
         form, branches = frozen(with_book_signs(lowered), network) if traced else (with_book_signs(lowered), ())
@@ -203,6 +203,17 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *found)
     return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
+
+
+def _lowered(model: EnergyModel, formulation: str) -> DescriptorForm:
+    """The rows of a formulation; ModelError in its own name where they cannot be."""
+    try:
+        return FORMULATIONS[formulation.removeprefix("co_")](model)
+    except ModelError as refused:
+        found = refused.diagnostics
+        texts = [(refusal(formulation, d.message), d.help and refusal(formulation, d.help)) for d in found]
+        told_ = [replace(d, message=m, help=h) for d, (m, h) in zip(found, texts, strict=True)]
+        raise ModelError(told_) from refused
 
 
 def _authored(found: CompiledModel, written: Network) -> CompiledModel:

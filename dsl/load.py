@@ -19,7 +19,8 @@ from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.collecting import at_rest
-from sysdyn.dsl.model.network import Network, Parameter, Scene, nodes_read
+from sysdyn.dsl.model.network import Network, Parameter, Scene
+from sysdyn.dsl.model.rewriting import nodes_read
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.context import Failed

@@ -203,7 +203,7 @@ def formed(
     system = written if form == "3" else written.another(form)
     missing = underlying_form(system, start)[1] if form == "0" else ()
     if missing:
-        still = sorted({name.rstrip("'") for name in missing if name.endswith("'")})[:3]
+        still = list(dict.fromkeys(name.rstrip("'") for name in missing if name.endswith("'")))[:3]
         remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""
         raise NoSuchForm(
             f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import Equation, Summed
 from sysdyn.compiler.equations.joining import joined
-from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Choice, conjugate, own
+from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Causality, conjugate, own
 from sysdyn.compiler.network.primal.slopes import Slopes
 from sysdyn.dsl.model.expression import Node, const, derivative, div, is_const, param, substitute, var, variables
 from sysdyn.dsl.model.network import Branch, Network
@@ -46,7 +46,7 @@ def _functions(
     branch: Branch, slopes: Slopes, network: Network, letters: dict[str, str]
 ) -> Iterator[tuple[Node, Node]]:
     """Each state function with its name, the energy of the diagram's corner first."""
-    choice = Choice(branch, slopes, network.tables, False, letters)
+    choice = Causality(branch, slopes, network.tables, False, letters)
     v, w = own(branch, OWN[branch.kind][0]), conjugate(branch)
     for name, value in choice.functions(choice.law()).items():
         wanted = v if name == ENERGY[branch.kind] else w

@@ -118,13 +118,4 @@ def _renamed(model: EnergyModel, labels: set[str]) -> EnergyModel:
         found = [n for n in local_variables(root, "mu", None) if n.data[0] in labels]
         return substitute(root, {n: var(n.data[0], "kappa", *n.args) for n in found}) if found else root
 
-    def terms(pieces: tuple[Term, ...]) -> tuple[Term, ...]:
-        return tuple(replace(t, expression=new(t.expression)) for t in pieces)
-
-    return replace(
-        model,
-        works=tuple(replace(w, effort=new(w.effort)) for w in model.works),
-        rows=tuple(replace(row, terms=terms(row.terms)) for row in model.rows),
-        initials=tuple(replace(i, target=new(i.target), value=new(i.value)) for i in model.initials),
-        quantities=tuple(replace(q, expression=new(q.expression)) for q in model.quantities),
-    )
+    return model.rewritten(new)

@@ -11,7 +11,7 @@ Returned: an EnergyModel and notes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
 from sysdyn.compiler.model.mirror import PRIMAL, Mirror
@@ -124,6 +124,29 @@ class EnergyModel:
     def of_kind(self, kind: str) -> tuple[Row, ...]:
         """The rows of one kind."""
         return tuple(row for row in self.rows if row.kind == kind)
+
+    def expressions(self) -> Iterator[Node]:
+        """What every statement says."""
+        yield from (t.expression for terms in self.functions.values() for t in terms)
+        yield from (t.expression for row in self.rows for t in row.terms)
+        yield from (n for w in self.works for n in (w.effort, w.on))
+        yield from (n for i in self.initials for n in (i.target, i.value))
+        yield from (q.expression for q in self.quantities)
+
+    def rewritten(self, new: Callable[[Node], Node]) -> EnergyModel:
+        """The model with what every statement says changed."""
+
+        def terms(old: tuple[Term, ...]) -> tuple[Term, ...]:
+            return tuple(replace(t, expression=new(t.expression)) for t in old)
+
+        return replace(
+            self,
+            functions={name: terms(pieces) for name, pieces in self.functions.items()},
+            works=tuple(replace(w, effort=new(w.effort), on=new(w.on)) for w in self.works),
+            rows=tuple(replace(row, terms=terms(row.terms)) for row in self.rows),
+            initials=tuple(replace(i, target=new(i.target), value=new(i.value)) for i in self.initials),
+            quantities=tuple(replace(q, expression=new(q.expression)) for q in self.quantities),
+        )
 
 
 def energies(network: Network) -> EnergyModel:

@@ -6,6 +6,8 @@ that lowers energies takes these names from a `Mirror` and so exists once.
 
 from __future__ import annotations
 
+import re
+
 from sysdyn.dsl.model.expression import Node, substitute, var, variables
 from sysdyn.values import dataclass
 
@@ -57,3 +59,10 @@ def lettered(formulation: str, root: Node) -> Node:
 def word(formulation: str, name: str) -> str:
     """The name of a block or of a kind of rows in the words of its family: momentum is displacement there."""
     return name.replace("momentum", "displacement") if formulation.startswith("co_") else name
+
+
+def refusal(formulation: str, text: str) -> str:
+    """What an arrow says of itself, in the names of the family that it lowers."""
+    if not formulation.startswith("co_"):
+        return text
+    return re.sub(r"\b(lagrangian|hamiltonian|kane)\b", r"co_\1", text)

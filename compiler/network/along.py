@@ -8,12 +8,13 @@ with constant coefficients stays along its expression.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Coupling, Network, NodeFamily, Terminal
+from sysdyn.dsl.model.rewriting import expressions, rewritten
 from sysdyn.values import dataclass
 
 Parts = list[tuple[Node, Node]]
@@ -27,31 +28,6 @@ def along(network: Network, *, complementary: bool) -> Network:
     if complementary:
         network = _with_transformers(network)
     return _in_series(_beside(network))
-
-
-def rewritten(network: Network, change: Callable[[Node], Node]) -> Network:
-    """The network with every expression changed."""
-    return replace(
-        network,
-        energies=tuple(replace(e, expression=change(e.expression)) for e in network.energies),
-        works=tuple(replace(w, effort=change(w.effort), on=change(w.on)) for w in network.works),
-        constraints=tuple(replace(c, expression=change(c.expression)) for c in network.constraints),
-        dynamics=tuple(replace(d, expression=change(d.expression)) for d in network.dynamics),
-        initials=tuple(replace(i, target=change(i.target), value=change(i.value)) for i in network.initials),
-        observations=tuple(replace(o, expression=change(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=change(o.expression)) for o in network.speeds),
-        expectations=tuple(
-            replace(
-                e, left=change(e.left), right=change(e.right), within=None if e.within is None else change(e.within)
-            )
-            for e in network.expectations
-        ),
-        branches=tuple(
-            replace(b, law=None if b.law is None else change(b.law), on=None if b.on is None else change(b.on))
-            for b in network.branches
-        ),
-        couplings=tuple(replace(c, ratio=change(c.ratio)) for c in network.couplings),
-    )
 
 
 def _combination(root: Node) -> Parts | None:
@@ -95,7 +71,7 @@ def _with_transformers(network: Network) -> Network:
         for k, (coefficient, displacement) in enumerate(parts):
             ends = (ground, points[0]) if effort else (points[k], points[k - 1] if k else ground)
             one, two = f"{b.name}.along{k + 1}#1", f"{b.name}.along{k + 1}#2"
-            port = replace(b, kind="port", side=None, law=None, on=None, shift=None)
+            port = replace(b, kind="port", side=None, law=None, on=None)
             domain = common[displacement.data[0]]
             branches.append(replace(port, name=one, plus=ends[0], minus=ends[1]))
             branches.append(replace(port, name=two, domain=domain, plus=None, minus=None, on=displacement))
@@ -189,7 +165,7 @@ def _without(network: Network, found: dict[str, list[tuple[int, Branch]]]) -> Ne
 
 def _bare(network: Network) -> frozenset[str]:
     """Branches without a law over which no energy, work or constraint stands."""
-    roots = [e.expression for e in network.energies] + [w.on for w in network.works]
+    roots = expressions(network, "energies", "works.on")
     roots += [c.expression for c in network.constraints if c.kind != "gamma"]
     used = {n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] in ("be", "bf", "bq", "bp")}
     return frozenset(b.name for b in network.branches if b.kind == "field" and b.name not in used)

@@ -14,7 +14,7 @@ _NAME = re.compile(
 )
 """A family with what follows: (0), [i], [i - 1], [3], [3..7]; looked for where a word begins, once in each."""
 _OVER = re.compile(r" for i in (\d+)\.\.(\d+)$")
-Piece = tuple[str, tuple[tuple[str, Place], ...], int]
+IndexBox = tuple[str, tuple[tuple[str, Place], ...], int]
 """A text, or the elements of which the one so far behind i stands there."""
 
 
@@ -44,9 +44,9 @@ def told(found: Diagnostic, authors: Authors) -> Iterator[Diagnostic]:
         yield Diagnostic(found.code, message, own[k][1], found.help, found.related, found.label, found.edit)
 
 
-def _pieces(text: str, authors: Authors) -> list[Piece]:
+def _pieces(text: str, authors: Authors) -> list[IndexBox]:
     """A text cut at the families in it."""
-    found: list[Piece] = []
+    found: list[IndexBox] = []
     end, matches = 0, list(_NAME.finditer(text))
     near = {m[1]: int(f"{m[4] or ''}{m[5] or 0}") for m in reversed(matches) if m[3]}
     for match in matches:
@@ -64,6 +64,6 @@ def _pieces(text: str, authors: Authors) -> list[Piece]:
     return [*found, (text[end:], (), 0)]
 
 
-def _joined(pieces: list[Piece], at: int) -> str:
+def _joined(pieces: list[IndexBox], at: int) -> str:
     """The text where i is `at`."""
     return "".join(own[min(at + step, len(own) - 1)][0] if own else text for text, own, step in pieces)

@@ -14,11 +14,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.along import rewritten
 from sysdyn.compiler.network.skeleton import Shaped, filled, shaped
 from sysdyn.dsl.model.expression import Node, add, const, index, param, substitute, var, variables
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Initial, Loop, Network, NodeFamily, Parameter, Terminal
+from sysdyn.dsl.model.rewriting import rewritten
 from sysdyn.dsl.model.units import Unit, si
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
@@ -66,7 +66,7 @@ def _free(network: Network) -> set[str]:
         b.name
         for b in network.branches
         if b.name not in held and not (b.loops or b.at or b.stated or MARK in b.name)
-        if None is b.on is b.shift is b.energy and None is not b.law
+        if None is b.on is b.energy and None is not b.law
         if b.plus is not None and b.minus is not None and not (b.plus.at or b.minus.at)
     }
 

@@ -11,22 +11,29 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.initially import initially
 from sysdyn.compiler.network.primal.bounds import Sizes
-from sysdyn.compiler.network.primal.contents import charge
-from sysdyn.compiler.network.primal.overlaps import Ranges, beside, common, count, meeting, narrowed, ranges_of
+from sysdyn.compiler.network.primal.contents import held_at
+from sysdyn.compiler.network.primal.overlaps import (
+    Ranges,
+    beside,
+    common,
+    count,
+    initially,
+    meeting,
+    narrowed,
+    ranges_of,
+    untold,
+)
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, Shape, State, Terminal
+from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, State, Terminal
+from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import Place
-from sysdyn.values import dataclass
 
 Wanted = tuple[str, str]
 """Name and kind (nq, bq) of a displacement."""
-_At = tuple[str, tuple[Node, ...]]
-"""An element of a node family."""
-_Point = tuple[str, tuple[int, ...]] | None
-"""A node, or the ground."""
+_Point = tuple[str, tuple[int | Node, ...]] | None
+"""A node by its name and indices, or the ground."""
 
 
 # -- traced positions --------------------------------------------------------------------------------------
@@ -34,37 +41,19 @@ _Point = tuple[str, tuple[int, ...]] | None
 
 def from_stores(network: Network) -> Network:
     """Traced positions of points that stores hold to the ground, as displacements of these stores."""
-    links: dict[_At | None, list[tuple[_At | None, Node]]] = {}
+    forest = _SpanningForest()
     for b in network.branches:
         single = b.kind == "potential" and b.domain.common == "flow" and not b.loops
         if single and b.plus is not None and b.minus is not None:
             plus, minus = (None if t.node is None else (t.node, t.at) for t in (b.plus, b.minus))
-            content = ex.var(b.name, "bq", *b.at)
-            links.setdefault(plus, []).append((minus, content))
-            links.setdefault(minus, []).append((plus, ex.neg(content)))
-
-    def over_ground(start: _At) -> Node | None:
-        """The shortest way."""
-        paths: dict[_At | None, Node] = {start: ex.const(0.0)}
-        ahead: list[_At | None] = [start]
-        for here in ahead:
-            for there, content in links.get(here, ()):
-                if there not in paths:
-                    paths[there] = ex.add(paths[here], content)
-                    ahead.append(there)
-        return paths.get(None)
+            forest.join(plus, minus, ex.var(b.name, "bq", *b.at))
 
     def read(root: Node) -> Node:
         read = [n for n in ex.topological([root]) if n.op == "var" and n.data[1:] == ("nq", 0)]
-        change = {n: path for n in read if (path := over_ground((n.data[0], n.args))) is not None}
+        change = {n: path for n in read if (path := forest.over_ground((n.data[0], n.args))) is not None}
         return ex.substitute(root, change) if change else root
 
-    return replace(
-        network,
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
-        expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
-    )
+    return rewritten(network, read, TRACED)
 
 
 def from_masses(network: Network) -> Network:
@@ -92,41 +81,46 @@ def from_masses(network: Network) -> Network:
         found = [n for n in ex.topological([root]) if n.op == "var" and n.data[1] == "np"]
         return ex.substitute(root, {n: stores(n) for n in found}) if found else root
 
-    return replace(
-        network,
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
-        expectations=tuple(replace(e, left=read(e.left), right=read(e.right)) for e in network.expectations),
-        dynamics=tuple(replace(d, expression=read(d.expression)) for d in network.dynamics),
-    )
+    return rewritten(network, read, (*TRACED, "dynamics"))
 
 
 # -- quadratures -------------------------------------------------------------------------------------------
 
 
 def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
-    """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of."""
-    roots = [o.expression for o in network.observations] + [d.expression for d in network.dynamics]
-    roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
+    """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of: a dynamic
+    variable NAME.q each, which begins as the displacement is written to begin.
+    """
     stores = _stores(network)
-    wanted: dict[Wanted, None] = {}
-    for node in ex.topological(roots):
-        if node.op == "var" and _is_position(node, stores):
-            wanted.setdefault((node.data[0], node.data[1]))
-    nodes = {n.name: (n.shape, n.domain, n.place) for n in network.nodes}
+    roots = ex.topological(expressions(network, "observations", "dynamics", "expectations"))
+    wanted = dict.fromkeys((n.data[0], n.data[1]) for n in roots if _is_position(n, stores))
+
+    def read(root: Node) -> Node:
+        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] in wanted]
+        return ex.substitute(root, {n: _quadrature(n.data[0], n.args, n.data[2]) for n in found}) if found else root
+
+    families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
+    for n in network.nodes:
+        loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(n.shape))
+        families[n.name, "nq"] = [(loops, tuple(ex.index(x.index) for x in loops), n.domain, n.place)]
+    for b in network.branches:
+        families.setdefault((b.name, "bq"), []).append((b.loops, b.at, b.domain, b.place))
+    states, dynamics = [], []
     for name, kind in wanted:
-        if kind == "nq":
-            shape, domain, place = nodes[name]
-            loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(shape))
-            network = _with_position(
-                network, (name, kind), (shape, loops, tuple(ex.index(x.index) for x in loops)), domain, place
-            )
-        else:
-            for b in network.branches:
-                if b.name == name:
-                    shape = tuple((loop.first, loop.last) for loop in b.loops)
-                    network = _with_position(network, (name, kind), (shape, b.loops, b.at), b.domain, b.place)
-    return network, frozenset(wanted)
+        for loops, at, domain, place in families[name, kind]:
+            shape = tuple((loop.first, loop.last) for loop in loops)
+            states.append(State(f"{name}.q", shape, domain.displacement, place))
+            dynamics.append(Dynamic(_quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
+    starts = (i for i in network.initials if i.target.op == "var" and i.target.data in {(*w, 0) for w in wanted})
+    begun = (replace(i, target=_quadrature(i.target.data[0], i.target.args)) for i in starts)
+    network = rewritten(network, read, (*TRACED, "dynamics"))
+    found = replace(
+        network,
+        states=(*network.states, *states),
+        dynamics=(*network.dynamics, *dynamics),
+        initials=(*network.initials, *begun),
+    )
+    return found, frozenset(wanted)
 
 
 def massive(network: Network) -> frozenset[str]:
@@ -155,56 +149,10 @@ def _quadrature(name: str, at: Sequence[Node], order: int = 0) -> Node:
     return ex.var(f"{name}.q", "s", *at, order=order)
 
 
-def _with_position(
-    network: Network,
-    what: Wanted,
-    family: tuple[Shape, tuple[Loop, ...], tuple[Node, ...]],
-    domain: Domain,
-    place: Place,
-) -> Network:
-    """One dynamic variable NAME.q for a displacement var(name, kind); it begins as that is written to begin."""
-    shape, loops, at = family
-    state = _quadrature(what[0], at)
-    starts = [
-        replace(i, target=_quadrature(what[0], i.target.args))
-        for i in network.initials
-        if i.target.op == "var" and i.target.data == (*what, 0)
-    ]
-
-    def read(root: Node) -> Node:
-        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] == what]
-        return ex.substitute(root, {n: _quadrature(what[0], n.args, n.data[2]) for n in found}) if found else root
-
-    rate = ex.var(what[0], "nf" if what[1] == "nq" else "bf", *at)
-    return replace(
-        network,
-        states=(*network.states, State(f"{what[0]}.q", shape, domain.displacement, place)),
-        dynamics=(
-            *(replace(d, expression=read(d.expression)) for d in network.dynamics),
-            Dynamic(state, rate, loops, place),
-        ),
-        initials=(*network.initials, *starts),
-        observations=tuple(replace(o, expression=read(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=read(o.expression)) for o in network.speeds),
-        expectations=tuple(
-            replace(e, left=read(e.left), right=read(e.right), within=None if e.within is None else read(e.within))
-            for e in network.expectations
-        ),
-    )
+# -- contents ----------------------------------------------------------------------------------------------
 
 UNWRITTEN = 1e-6
 """Weight (of squares) of a guess that the text does not write, as the consistent start has it."""
-
-
-# -- contents ----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """Where the position of a branch's end is known, and what it is there."""
-
-    within: Ranges
-    value: Node
 
 
 def with_contents(network: Network, wanted: frozenset[Wanted]) -> Network:
@@ -226,131 +174,114 @@ class _Contents:
             if initial.target.op == "var" and not initial.target.data[2]:
                 kind = "bq" if initial.target.data[1] == "be" else initial.target.data[1]
                 self.said.setdefault((initial.target.data[0], kind), []).append(initial)
-        self.branches = [b for b in network.branches if b.domain.common == "flow" and self._holds(b)]
+        branches = [(b, b.plus, b.minus) for b in network.branches if b.domain.common == "flow" and self._holds(b)]
+        self.branches = [(b, plus, minus) for b, plus, minus in branches if plus is not None and minus is not None]
+        self.single = [(b, self._point(plus), self._point(minus)) for b, plus, minus in self.branches if not b.loops]
+        ends = [end for b, *both in self.branches if not b.loops for end in both]
+        self.terminals = {self._point(t): t for t in ends if t.node is not None}
 
     def _holds(self, b: Branch) -> bool:
-        """Whether the branch's displacement is an unknown of the start: between two ends."""
-        return b.plus is not None and b.minus is not None and (b.kind == "potential" or (b.name, "bq") in self.wanted)
+        """Whether the branch's displacement is an unknown of the start."""
+        return b.kind == "potential" or (b.name, "bq") in self.wanted
 
     def _content(self, b: Branch) -> Node:
         return ex.var(b.name, "bq", *b.at) if b.kind == "potential" else _quadrature(b.name, b.at)
-
-    def guesses(self) -> Iterator[Initial]:
-        """Contents that nothing is written of, by the positions of their ends, of which something is."""
-        moved = self._moved()
-        for b in self.branches:
-            ends = [self._start(t) for t in (b.plus, b.minus)]
-            if not b.loops and b.plus is not None and b.minus is not None:
-                ends = [moved.get(self._point(t), end) for t, end in zip((b.plus, b.minus), ends, strict=True)]
-            if ends == [None, None]:
-                continue
-            value = ex.sub(ends[0] or ex.const(0.0), ends[1] or ex.const(0.0))
-            within = ranges_of(b.loops, self.sizes, b.place)
-            holes = [m[0] for i in self.said.get((b.name, "bq"), ()) if (m := meeting(i, b.at, within, self.sizes))]
-            for rest in beside(within, holes):
-                yield Initial(self._content(b), value, False, narrowed(b.loops, rest), b.place)
-
-    def _moved(self) -> dict[_Point, Node]:
-        """Positions of points that fixed contents join to others: guesses moved least, written ones less."""
-        forest, guess = _Forest(), dict[_Point, tuple[Node, float]]()
-        for b in (b for b in self.branches if not b.loops and b.kind == "potential"):
-            assert b.plus is not None
-            assert b.minus is not None
-            for t in (b.plus, b.minus):
-                if t.node is not None and self._point(t) not in guess:
-                    found = initially(self.said.get((t.node, "nq"), ()), t.at)
-                    guess[self._point(t)] = (ex.const(0.0), UNWRITTEN) if found is None else (found, 1.0)
-                    for known in itertools.islice(self._fixed(t, {}), 1):
-                        forest.join(self._point(t), None, known.value)
-            for initial in self.said.get((b.name, "bq"), ()):
-                content = self._said_content(b, initial)
-                if content is not None:
-                    forest.join(self._point(b.plus), self._point(b.minus), content)
-        moved: dict[_Point, Node] = {}
-        for points in (points for points in forest.trees.values() if len(points) > 1):
-            over = {p: forest.over[p][1] for p in points}
-            if None in over:
-                shift = ex.neg(over[None])
-            else:
-                total = sum(guess[p][1] for p in points)
-                shift = ex.add(*(ex.scale(guess[p][1] / total, ex.sub(guess[p][0], over[p])) for p in points))
-            moved |= {p: ex.add(over[p], shift) for p in points if p is not None}
-        return moved
-
-    def _said_content(self, b: Branch, initial: Initial) -> Node | None:
-        """The fixed content that a statement gives a single store; None where it gives none."""
-        if not initial.fixed or ex.variables(initial.value) or meeting(initial, b.at, {}, self.sizes) is None:
-            return None
-        return initial.value if initial.target.data[1] == "bq" else charge(b, initial.value)
-
-    def _start(self, terminal: Terminal | None) -> Node | None:
-        """The initial position of a terminal over the branch's loops, as far as it is written."""
-        if terminal is None or terminal.node is None:
-            return None
-        return initially(self.said.get((terminal.node, "nq"), ()), terminal.at)
-
-    def fixed(self) -> Iterator[Initial]:
-        """Contents of the elements of loops between places whose positions are known."""
-        for b in self.branches:
-            if not b.loops:
-                continue
-            within = ranges_of(b.loops, self.sizes, b.place)
-            ends = [self._known(t, within) for t in (b.plus, b.minus)]
-            left, content = count(within), self._content(b)
-            for one, other in itertools.product(*ends):
-                both = {name: common(one.within[name], other.within[name]) for name in within}
-                if left > 0 and count(both):
-                    left -= count(both)
-                    value = ex.sub(one.value, other.value)
-                    loops = narrowed(b.loops, both)
-                    if ex.variables(value):
-                        yield Initial(ex.sub(content, value), ex.const(0.0), True, loops, b.place)
-                    else:
-                        yield Initial(content, value, True, loops, b.place)
-
-    def _known(self, terminal: Terminal | None, within: Ranges) -> Iterator[_Known]:
-        """Positions of a terminal: fixed ones, then its quadrature."""
-        if terminal is None or terminal.node is None:
-            yield _Known(within, ex.const(0.0))
-            return
-        yield from self._fixed(terminal, within)
-        if (terminal.node, "nq") in self.wanted:
-            yield _Known(within, _quadrature(terminal.node, terminal.at))
-
-    def _fixed(self, terminal: Terminal, within: Ranges) -> Iterator[_Known]:
-        """What fixed statements say of the position of a terminal at a node."""
-        for initial in self.said.get((str(terminal.node), "nq"), ()):
-            found = meeting(initial, terminal.at, within, self.sizes) if initial.fixed else None
-            if found is not None:
-                yield _Known(*found)
-
-    def loops(self) -> Iterator[Initial]:
-        """Equations around the loops that fixed positions, quadratures and single stores close."""
-        forest = _Forest()
-        for b in self.branches:
-            for t in () if b.loops else (b.plus, b.minus):
-                if t is not None and t.node is not None and self._point(t) not in forest.over:
-                    known = next(self._known(t, {}), None)
-                    if known is not None:
-                        forest.join(self._point(t), None, known.value)
-        for b in self.branches:
-            if not b.loops and b.plus is not None and b.minus is not None:
-                content = self._content(b)
-                around = forest.join(self._point(b.plus), self._point(b.minus), content)
-                if around is None:
-                    continue
-                if ex.variables(around):
-                    yield Initial(ex.sub(content, around), ex.const(0.0), True, (), b.place)
-                else:
-                    yield Initial(content, around, True, (), b.place)
 
     def _point(self, terminal: Terminal) -> _Point:
         if terminal.node is None:
             return None
         return terminal.node, tuple(self.sizes.bound(a, None).value for a in terminal.at)
 
+    def guesses(self) -> Iterator[Initial]:
+        """Contents that nothing is written of, by the positions of their ends, of which something is."""
+        moved = self._moved()
+        for b, *terminals in self.branches:
+            within = ranges_of(b.loops, self.sizes, b.place)
+            ends = [self._start(t, within) for t in terminals]
+            if not b.loops:
+                ends = [moved.get(self._point(t), end) for t, end in zip(terminals, ends, strict=True)]
+            if ends == [None, None]:
+                continue
+            value = ex.sub(*(end or ex.const(0.0) for end in ends))
+            for rest in untold(self.said.get((b.name, "bq"), ()), b.at, within, self.sizes):
+                yield Initial(self._content(b), value, False, narrowed(b.loops, rest), b.place)
 
-class _Forest:
+    def _moved(self) -> dict[_Point, Node]:
+        """Positions of points that fixed contents join to others: guesses moved least, written ones less."""
+        forest = self._known_points(constant=True)
+        for b, plus, minus in self.single:
+            for i in self.said.get((b.name, "bq"), ()) if b.kind == "potential" else ():
+                if i.fixed and not ex.variables(i.value) and meeting(i, b.at, {}, self.sizes) is not None:
+                    content = held_at(b, i.target.data[1], i.value)
+                    if content is not None:
+                        forest.join(plus, minus, content)
+        moved: dict[_Point, Node] = {}
+        for points in (points for points in forest.trees.values() if len(points) > 1):
+            over = {p: forest.over[p][1] for p in points}
+            if None in over:
+                shift = ex.neg(over[None])
+            else:
+                guess = {p: self._start(self.terminals[p], {}) for p in points}
+                weights = [UNWRITTEN if g is None else 1.0 for g in guess.values()]
+                apart = [ex.sub(g or ex.const(0.0), over[p]) for p, g in guess.items()]
+                shift = ex.add(*(ex.scale(w / sum(weights), a) for w, a in zip(weights, apart, strict=True)))
+            moved |= {p: ex.add(over[p], shift) for p in points if p is not None}
+        return moved
+
+    def _start(self, terminal: Terminal, within: Ranges) -> Node | None:
+        """The initial position of a terminal over the branch's loops, as far as it is written."""
+        return initially(self.said.get((str(terminal.node), "nq"), ()), terminal.at, within, self.sizes)
+
+    def fixed(self) -> Iterator[Initial]:
+        """Contents of the elements of loops between places whose positions are known."""
+        for b, plus, minus in self.branches:
+            within = ranges_of(b.loops, self.sizes, b.place)
+            left = count(within) if b.loops else 0
+            for (here, one), (there, other) in itertools.product(self._known(plus, within), self._known(minus, within)):
+                both = {name: common(here[name], there[name]) for name in within}
+                if left > 0 and count(both):
+                    left -= count(both)
+                    yield self._equal(b, ex.sub(one, other), narrowed(b.loops, both))
+
+    def loops(self) -> Iterator[Initial]:
+        """Equations around the loops that fixed positions, quadratures and single stores close."""
+        forest = self._known_points(constant=False)
+        for b, plus, minus in self.single:
+            around = forest.join(plus, minus, self._content(b))
+            if around is not None:
+                yield self._equal(b, around, ())
+
+    def _equal(self, b: Branch, value: Node, loops: tuple[Loop, ...]) -> Initial:
+        """What a branch holds is fixed at a value, which may read other contents."""
+        content = self._content(b)
+        if ex.variables(value):
+            content, value = ex.sub(content, value), ex.const(0.0)
+        return Initial(content, value, True, loops, b.place)
+
+    def _known(self, terminal: Terminal, within: Ranges) -> Iterator[tuple[Ranges, Node]]:
+        """Where the position of a terminal is known, and what it is there: fixed, then its quadrature."""
+        if terminal.node is None:
+            yield within, ex.const(0.0)
+            return
+        for initial in self.said.get((terminal.node, "nq"), ()):
+            found = meeting(initial, terminal.at, within, self.sizes) if initial.fixed else None
+            if found is not None:
+                yield found
+        if (terminal.node, "nq") in self.wanted:
+            yield within, _quadrature(terminal.node, terminal.at)
+
+    def _known_points(self, *, constant: bool) -> _SpanningForest:
+        """The ends of single branches, joined to the ground where their positions are known; constant: as numbers."""
+        forest = _SpanningForest()
+        for point, terminal in self.terminals.items():
+            values = (value for _, value in self._known(terminal, {}) if not (constant and ex.variables(value)))
+            known = next(values, None)
+            if known is not None:
+                forest.join(point, None, known)
+        return forest
+
+
+class _SpanningForest:
     """Points joined by displacements: the position of each over the root of its tree."""
 
     def __init__(self) -> None:
@@ -368,6 +299,11 @@ class _Forest:
             self.over[point] = other_root, ex.add(self.over[point][1], shift)
             self.trees[other_root].append(point)
         return None
+
+    def over_ground(self, point: _Point) -> Node | None:
+        """The position of a point; None where nothing joins it to the ground."""
+        (root, position), (origin, ground) = self._at(point), self._at(None)
+        return ex.sub(position, ground) if root == origin else None
 
     def _at(self, point: _Point) -> tuple[_Point, Node]:
         if point not in self.over:

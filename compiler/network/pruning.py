@@ -24,7 +24,8 @@ from typing import Any
 from sysdyn.compiler.network.dead_branches import dead_branches
 from sysdyn.compiler.network.influence import EVERYTHING, Link, Quantity, links, quantities, reached, read_by
 from sysdyn.dsl.model.expression import add, variables
-from sysdyn.dsl.model.network import Energy, Network, Observation, nodes_read
+from sysdyn.dsl.model.network import Energy, Network, Observation
+from sysdyn.dsl.model.rewriting import nodes_read
 from sysdyn.values import dataclass
 
 KINDS = {"x": "coordinate", "n": "node", "b": "branch", "u": "implicit", "s": "state", "c": "constraint"}

@@ -15,11 +15,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
-from sysdyn.compiler.network.islands import grounded
-from sysdyn.compiler.network.linkages import with_linkages
 from sysdyn.compiler.network.positions import from_masses, from_stores, massive, with_contents, with_quadratures
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.stated import ALL, as_elements
+from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (
@@ -27,11 +26,11 @@ from sysdyn.dsl.model.network import (
     Coordinate,
     Coupling,
     Domain,
-    Energy,
     Network,
     Slope,
 )
 from sysdyn.dsl.model.paynter import REFLECTED, REFLECTED_FUNCTIONS
+from sysdyn.dsl.model.rewriting import expressions, rewritten
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place
 
 _KINDS = {"be": "bf", "bf": "be", "bq": "bp", "bp": "bq", "ne": "nf", "nf": "ne"}
@@ -46,7 +45,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = with_linkages(from_masses(from_stores(grounded(as_elements(network, ALL)))))
+    bare = from_masses(from_stores(grounded(as_elements(network, ALL))))
     network = with_contents(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
@@ -55,22 +54,11 @@ def reflect(network: Network) -> Network:
 
 def relabelled(network: Network) -> Network:
     """The same statements with the letters of the other family; twice is the network itself."""
+    network = rewritten(network, _node)
     return replace(
         network,
         coordinates=tuple(_coordinate(c) for c in network.coordinates),
-        energies=tuple(
-            replace(e, function=_FUNCTIONS[e.function], expression=_node(e.expression)) for e in network.energies
-        ),
-        works=tuple(replace(w, effort=_node(w.effort), on=_node(w.on)) for w in network.works),
-        constraints=tuple(replace(c, expression=_node(c.expression)) for c in network.constraints),
-        dynamics=tuple(replace(d, expression=_node(d.expression)) for d in network.dynamics),
-        initials=tuple(replace(i, target=_node(i.target)) for i in network.initials),
-        observations=tuple(replace(o, expression=_node(o.expression)) for o in network.observations),
-        speeds=tuple(replace(o, expression=_node(o.expression)) for o in network.speeds),
-        expectations=tuple(
-            replace(e, left=_node(e.left), right=_node(e.right), within=None if e.within is None else _node(e.within))
-            for e in network.expectations
-        ),
+        energies=tuple(replace(e, function=_FUNCTIONS[e.function]) for e in network.energies),
         nodes=tuple(replace(n, domain=_domain(n.domain)) for n in network.nodes),
         branches=tuple(_branch(b) for b in network.branches),
         couplings=tuple(_coupling(c) for c in network.couplings),
@@ -105,25 +93,17 @@ def _coordinate(c: Coordinate) -> Coordinate:
     return replace(c, complementary=not c.complementary)
 
 
-def _energy(e: Energy) -> Energy:
-    return replace(e, function=_FUNCTIONS[e.function], expression=_node(e.expression))
-
-
 def _branch(b: Branch) -> Branch:
-    law = None if b.law is None else _node(b.law)
-    shift = None if b.shift is None else _node(b.shift)
-    energy = None if b.energy is None else _node(b.energy)
     side = None if b.side is None else REFLECTED[b.side]
     kind = _ELEMENTS.get(b.kind, b.kind)
-    return replace(b, domain=_domain(b.domain), kind=kind, side=side, law=law, shift=shift, energy=energy)
+    return replace(b, domain=_domain(b.domain), kind=kind, side=side)
 
 
 def _coupling(c: Coupling) -> Coupling:
-    ratio = _node(c.ratio)
     if c.kind == "transformer":
-        return replace(c, side=REFLECTED[c.side], ratio=ratio)
+        return replace(c, side=REFLECTED[c.side])
     # e1 = r f2 reads f1 = r e2 in the reflection: e2 = f1/r and with e1 f1 + e2 f2 = 0 e1 = -f2/r
-    return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), ratio)))
+    return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), c.ratio)))
 
 
 def _moduli(couplings: Iterable[Coupling]) -> Iterator[Slope]:
@@ -135,9 +115,7 @@ def _moduli(couplings: Iterable[Coupling]) -> Iterator[Slope]:
 
 def _read(network: Network) -> Iterable[str]:
     """Common-flow nodes whose flow an equation reads: common-effort nodes of the reflection."""
-    roots = [c.expression for c in network.constraints] + [d.expression for d in network.dynamics]
-    roots += [b.law for b in network.branches if b.law is not None] + [c.ratio for c in network.couplings]
-    roots += [n for w in network.works for n in (w.effort, w.on)]
+    roots = expressions(network, "constraints", "dynamics", "branches.law", "couplings", "works")
     return (n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] == "nf")
 
 

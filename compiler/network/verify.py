@@ -75,7 +75,7 @@ def _statements(network: Network) -> Iterator[tuple[str, tuple[Loop, ...], list[
     for x in network.expectations:
         yield f"expect {x.text}", (), [n for n in (x.left, x.right, x.within) if n is not None]
     for b in network.branches:
-        own = [n for n in (b.law, b.on, b.shift, b.energy) if n is not None]
+        own = [n for n in (b.law, b.on, b.energy) if n is not None]
         ends = [n for end in (b.plus, b.minus) if end is not None for n in end.at]
         yield f"branch {b.name}", b.loops, [*b.at, *own, *ends]
     for c in network.couplings:

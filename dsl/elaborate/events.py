@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator
 from itertools import product
 
-from sysdyn.dsl.elaborate.parts import Frame
+from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -54,7 +54,7 @@ class Draft:
 # -- discrete variables ------------------------------------------------------------------------------------
 
 
-def discrete(frame: Frame, s: syntax.Discrete) -> None:
+def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
     """`discrete g = 1`: a parameter that events assign."""
     decl, resolver = s.decl, frame.resolver
     if decl.indices or resolver.loops:
@@ -81,7 +81,7 @@ def discrete(frame: Frame, s: syntax.Discrete) -> None:
 # -- when, every -------------------------------------------------------------------------------------------
 
 
-def when(frame: Frame, s: syntax.When) -> None:
+def when(frame: ElaborationContext, s: syntax.When) -> None:
     """`when condition { target := value }`."""
     resolver = frame.resolver
     _outside_loops(frame, s.span, "when")
@@ -95,7 +95,7 @@ def when(frame: Frame, s: syntax.When) -> None:
     frame.parts.events.append(event)
 
 
-def every(frame: Frame, s: syntax.Every) -> None:
+def every(frame: ElaborationContext, s: syntax.Every) -> None:
     """`every period { target := value }`."""
     _outside_loops(frame, s.span, "every")
     message = "the period of 'every' is in {}, wants s"
@@ -109,16 +109,16 @@ def every(frame: Frame, s: syntax.Every) -> None:
     frame.parts.events.append(Event(f"every {name}", None, period, _actions(frame, s.actions), place))
 
 
-def _outside_loops(frame: Frame, span: syntax.Span, what: str) -> None:
+def _outside_loops(frame: ElaborationContext, span: syntax.Span, what: str) -> None:
     if frame.resolver.loops:
         raise frame.resolver.fail("N608", f"'{what}' in a 'for' is not supported yet", span)
 
 
-def _discretes(frame: Frame, root: Node) -> bool:
+def _discretes(frame: ElaborationContext, root: Node) -> bool:
     return any(n.op == "param" and n.data in frame.parts.discretes for n in ex.topological([root]))
 
 
-def _watched(frame: Frame, condition: Node, place: Place) -> Node:
+def _watched(frame: ElaborationContext, condition: Node, place: Place) -> Node:
     """The condition with every comparison as one of an observation with zero."""
     change: dict[Node, Node] = {}
     for node in ex.topological([condition]):
@@ -130,14 +130,14 @@ def _watched(frame: Frame, condition: Node, place: Place) -> Node:
     return ex.substitute(condition, change)
 
 
-def watch(frame: Frame, node: Node, dimension: Dimension | None, place: Place) -> str:
+def watch(frame: ElaborationContext, node: Node, dimension: Dimension | None, place: Place) -> str:
     """The name of an observation of a node."""
     name = f"event {len(frame.parts.watched)}"
     frame.parts.watched.append(Observation(name, node, si(dimension or NONE), name, place, stored=False))
     return name
 
 
-def _actions(frame: Frame, actions: tuple[syntax.Action, ...]) -> tuple[Action, ...]:
+def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> tuple[Action, ...]:
     """Assignments of an event, each to a state, a discrete or a flow, of its kind and dimension."""
     found: list[Action] = []
     for action in actions:
@@ -159,7 +159,7 @@ def _actions(frame: Frame, actions: tuple[syntax.Action, ...]) -> tuple[Action, 
     return tuple(found)
 
 
-def _target(frame: Frame, action: syntax.Action) -> tuple[Typed, bool]:
+def _target(frame: ElaborationContext, action: syntax.Action) -> tuple[Typed, bool]:
     """What an action assigns: the param of a discrete variable, a state, a flow; and whether it is a condition."""
     value = frame.resolver.scalar_or_truth(action.target)
     node = value.node
@@ -182,7 +182,7 @@ def _target(frame: Frame, action: syntax.Action) -> tuple[Typed, bool]:
 # -- constraints that hold at times --------------------------------------------------------------------------
 
 
-def guarded(frame: Frame, s: syntax.Constraint, constraint: Constraint) -> Constraint:
+def guarded(frame: ElaborationContext, s: syntax.Constraint, constraint: Constraint) -> Constraint:
     """The constraint as a row; where it holds at times only, the switch that says when."""
     guard = restitution = None
     for item in s.guards:
@@ -215,7 +215,7 @@ def guarded(frame: Frame, s: syntax.Constraint, constraint: Constraint) -> Const
     )
 
 
-def _guard(frame: Frame, guard: syntax.Guard) -> Node:
+def _guard(frame: ElaborationContext, guard: syntax.Guard) -> Node:
     node = frame.resolver.condition(guard.expr)
     if ex.variables(node) or not _discretes(frame, node):
         raise frame.resolver.fail(
@@ -224,7 +224,9 @@ def _guard(frame: Frame, guard: syntax.Guard) -> Node:
     return node
 
 
-def sticking(frame: Frame, root: Node, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place) -> Node:
+def sticking(
+    frame: ElaborationContext, root: Node, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place
+) -> Node:
     """A law or content with its set-valued terms c*setsign(u), c*abs(u) as c*sense and c*sense*u; the switches that
     say which sense, and psi: u = 0 for sticking.
     """
@@ -243,7 +245,7 @@ def sticking(frame: Frame, root: Node, label: str, at: tuple[Node, ...], loops: 
     return root
 
 
-def set_valued(frame: Frame, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:
+def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:
     """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language)."""
     at = tuple(ex.index(loop.index) for loop in loops)
     for node in ex.topological([root]):
@@ -267,7 +269,7 @@ def set_valued(frame: Frame, root: Node, loops: tuple[Loop, ...], place: Place) 
 
 
 def _stick_in_plane(
-    frame: Frame,
+    frame: ElaborationContext,
     name: str,
     where: tuple[tuple[Node, ...], tuple[Loop, ...]],
     what: tuple[Node, Node, Node],
@@ -300,7 +302,7 @@ def _rates(root: Node) -> bool:
     return any(n.op == "var" and (n.data[1] in ("f", "nf", "bf") or n.data[2] == 1) for n in ex.variables(root))
 
 
-def _sense(frame: Frame, name: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place) -> Node:
+def _sense(frame: ElaborationContext, name: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place) -> Node:
     """A parameter that holds the sense of a slip: 1, -1, or 0 while it sticks."""
     shape = tuple((loop.first, loop.last) for loop in loops) if at else ()
     indices = tuple(loop.index for loop in loops) if at else ()
@@ -311,7 +313,7 @@ def _sense(frame: Frame, name: str, at: tuple[Node, ...], loops: tuple[Loop, ...
 
 
 def _stick(
-    frame: Frame,
+    frame: ElaborationContext,
     name: str,
     where: tuple[tuple[Node, ...], tuple[Loop, ...]],
     what: tuple[Node, Node, Node],
@@ -331,7 +333,7 @@ def _stick(
 # -- switches of arrays, one by one --------------------------------------------------------------------------
 
 
-def expanded(frame: Frame, known: Values) -> None:
+def expanded(frame: ElaborationContext, known: Values) -> None:
     """Switches and their observations, an array's element by element."""
     for draft in frame.parts.drafts:
         for change in _iterations(draft.loops, known):
@@ -361,7 +363,7 @@ def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, N
         yield {ex.index(loop.index): ex.const(float(i)) for loop, i in zip(loops, at, strict=True)}
 
 
-def _switch(frame: Frame, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:
+def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:
     """One element of a set-valued law with its watched values."""
     def of(node: Node) -> Node:
         return ex.substitute(node, change)

@@ -8,7 +8,7 @@ from sysdyn.dsl.elaborate.parts import Nested
 from sysdyn.dsl.tree import syntax
 
 
-class Head:
+class Interface:
     """What a component asks of its user: parameters, inputs, ports, branches."""
 
     def __init__(self, body: Sequence[Nested]) -> None:

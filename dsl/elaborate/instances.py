@@ -12,7 +12,7 @@ from contextlib import contextmanager
 
 from sysdyn.dsl.elaborate.elements import Elements
 from sysdyn.dsl.elaborate.files import FileScope, exported
-from sysdyn.dsl.elaborate.head import Head
+from sysdyn.dsl.elaborate.head import Interface
 from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.parameters import Argument
 from sysdyn.dsl.elaborate.parts import Nested, flatten
@@ -156,7 +156,7 @@ class Instances(Elements):
         self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: list[Nested]
     ) -> None:
         """Arguments and connections, then the statements of the body, in the space of the instance."""
-        head = Head(body)
+        head = Interface(body)
         with self._unread(any(isinstance(statement, syntax.Broken) for statement, _ in body)):
             arguments = self._arguments(s, component, head, space)
             inputs = self._connect(s, component, head, space)
@@ -192,7 +192,7 @@ class Instances(Elements):
             before.extend(d for d in silent if not d.code.startswith("E4"))
 
     def _arguments(
-        self, s: syntax.Instance, component: ComponentSymbol, head: Head, space: Space
+        self, s: syntax.Instance, component: ComponentSymbol, head: Interface, space: Space
     ) -> dict[str, Argument]:
         """Values of parameters; those that a level chosen by the scene has no use for are left out."""
         found: dict[str, Argument] = {}
@@ -221,7 +221,9 @@ class Instances(Elements):
             found[arg.name] = (arg.value, self.resolver.resolve(arg.value), self.resolver.bare(arg.value))
         return found
 
-    def _required(self, s: syntax.Instance, component: ComponentSymbol, head: Head, given: dict[str, Argument]) -> None:
+    def _required(
+        self, s: syntax.Instance, component: ComponentSymbol, head: Interface, given: dict[str, Argument]
+    ) -> None:
         for name, statement in head.parameters.items():
             if statement.value is None and name not in given:
                 place = Place(self._outer_source(s), s.span)
@@ -234,7 +236,7 @@ class Instances(Elements):
         return self._instance_source
 
     def _connect(
-        self, s: syntax.Instance, component: ComponentSymbol, head: Head, space: Space
+        self, s: syntax.Instance, component: ComponentSymbol, head: Interface, space: Space
     ) -> dict[str, syntax.Expr]:
         """Bind ports and branches; the inputs' expressions come back."""
         self._instance_source = self.resolver.source
@@ -267,7 +269,7 @@ class Instances(Elements):
         return inputs
 
     def _by_name(
-        self, s: syntax.Instance, component: ComponentSymbol, head: Head, connection: syntax.Connection
+        self, s: syntax.Instance, component: ComponentSymbol, head: Interface, connection: syntax.Connection
     ) -> Failed:
         """Report E402: nodes in a row where each belongs to a port of its own."""
         ports = [*head.ports, *filter(None, head.branches)]
@@ -285,7 +287,7 @@ class Instances(Elements):
         self,
         s: syntax.Instance,
         component: ComponentSymbol,
-        head: Head,
+        head: Interface,
         space: Space,
         connection: syntax.Bind,
         inputs: dict[str, syntax.Expr],
@@ -308,7 +310,7 @@ class Instances(Elements):
                 "E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_
             )
 
-    def _bind_port(self, s: syntax.Instance, head: Head, space: Space, name: str, value: syntax.Expr) -> None:
+    def _bind_port(self, s: syntax.Instance, head: Interface, space: Space, name: str, value: syntax.Expr) -> None:
         word = head.ports[name].domain
         wanted = space.scope.find(word.name)
         place = self.place(value.span)
@@ -346,7 +348,7 @@ class Instances(Elements):
         self,
         s: syntax.Instance,
         component: ComponentSymbol,
-        head: Head,
+        head: Interface,
         space: Space,
         name: str,
         connection: syntax.Connection,
@@ -376,7 +378,7 @@ class Instances(Elements):
             space.bound.update(own_variables(symbol, space.prefix))
         bound.add(name)
 
-    def _bind_inputs(self, s: syntax.Instance, space: Space, head: Head, inputs: dict[str, syntax.Expr]) -> None:
+    def _bind_inputs(self, s: syntax.Instance, space: Space, head: Interface, inputs: dict[str, syntax.Expr]) -> None:
         sight = self.resolver.sight()
         for name, statement in head.inputs.items():
             with self.entering(space):

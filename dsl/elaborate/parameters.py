@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sysdyn.dsl.elaborate.parts import Frame, Nested
+from sysdyn.dsl.elaborate.parts import ElaborationContext, Nested
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -21,7 +21,7 @@ Argument = tuple[syntax.Expr, Typed | Vector, str | None]
 """As written, its value where the instance stands, and the name of the bare number that it is."""
 
 
-class Parameters(Frame):
+class Parameters(ElaborationContext):
     """Declares parameters."""
 
     def declare_parameters(self, statements: Sequence[Nested], given: dict[str, Argument]) -> None:

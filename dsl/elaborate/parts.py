@@ -53,7 +53,7 @@ class Requirement:
 
 
 @dataclass(slots=True)
-class Parts:
+class NetworkBuilder:
     """The statements of a network as they are found."""
 
     parameters: dict[str, Parameter] = field(default_factory=dict)
@@ -82,13 +82,13 @@ class Parts:
     given: set[str] = field(default_factory=set)  # states that have a dynamic, sound or not
 
 
-class Frame:
+class ElaborationContext:
     """Shared by the rooms of elaboration: where we are, and how statements are walked through."""
 
     def __init__(self, report: Report) -> None:
         self.report = report
         self.resolver = Resolver(report)
-        self.parts = Parts()
+        self.parts = NetworkBuilder()
         self.resolver.branches = self.parts.branches
         self.scope = Scope()
         self.current = Space("", self.scope, self.scope, self.resolver.source)

@@ -16,7 +16,7 @@ from sysdyn.dsl.names.symbols import Space, Typed
 from sysdyn.dsl.tree import syntax
 
 if TYPE_CHECKING:
-    from sysdyn.dsl.elaborate.head import Head
+    from sysdyn.dsl.elaborate.head import Interface
     from sysdyn.dsl.elaborate.instances import Instances
 
 Equation = tuple[dict[str, Fraction], Dimension, str]  # exponents of the variables, what is left, who says so
@@ -26,7 +26,7 @@ def solve_units(
     frame: Instances,
     s: syntax.Instance,
     space: Space,
-    head: Head,
+    head: Interface,
     arguments: dict[str, Argument],
     inputs: dict[str, syntax.Expr],
 ) -> None:

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any
 
-from sysdyn.dsl.model.expression import Node, is_const, topological
+from sysdyn.dsl.model.expression import Node, is_const
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
@@ -83,7 +82,6 @@ class Branch:
     minus: Terminal | None
     on: Node | None
     place: Place
-    shift: Node | None = None  # the law is over the own variable plus this constant
     stated: bool = False  # its energy stands among the state functions, kept for the audit
     energy: Node | None = None  # the state function of its own variable, where the author wrote that instead of the law
 
@@ -429,11 +427,3 @@ class Network:
     levels: tuple[LevelChoice, ...] = ()
     authors: Mapping[str, tuple[tuple[str, Place], ...]] = field(default_factory=dict)  # elements of gathered families
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
-
-
-def nodes_read(said: Any) -> frozenset[str]:
-    """Common-effort nodes whose effort a statement (not a trace) reads; said: a Network, or the parts of one."""
-    roots = [e.expression for e in said.energies] + [c.expression for c in said.constraints]
-    roots += [n for w in said.works for n in (w.effort, w.on)] + [d.expression for d in said.dynamics]
-    roots += [b.law for b in said.branches if b.law is not None] + [c.ratio for c in said.couplings]
-    return frozenset(n.data[0] for n in topological(roots) if n.op == "var" and n.data[1] == "ne")

@@ -57,8 +57,7 @@ def _branch(b: Branch) -> str:
     ends = f"on {b.on}" if b.on is not None else f"{_terminal(b, b.plus)} -> {_terminal(b, b.minus)}"
     name = b.name + _at(b.at)
     law = "" if b.law is None else f": {name}.{b.side} = {b.law}"
-    over = "" if b.shift is None else f" over {b.shift} + its own variable"
-    return f"{b.kind} {name} {ends}{law}{over}"
+    return f"{b.kind} {name} {ends}{law}"
 
 
 def _terminal(b: Branch, end: Terminal | None) -> str:

@@ -15,6 +15,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Expectation, Observation
+from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.text.diagnostics import Place, Report
 
 SHARED = 1e-9
@@ -62,9 +63,7 @@ def _loose(model: Elaborator) -> list[tuple[str, ...]]:
         ends = _ends(branch)
         if all(e in names for e in ends):
             joined.join(*ends)
-    tied = [c.expression for c in parts.constraints] + [e.expression for e in parts.energies]
-    tied += [n for w in parts.works for n in (w.effort, w.on)]
-    for node in ex.topological(tied):
+    for node in ex.topological(expressions(parts, "constraints", "energies", "works")):
         family = _effort(node)
         if family in names and family is not None:
             joined.join(family, "")

@@ -11,6 +11,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
+from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
@@ -64,9 +65,7 @@ def _lonely(node: NodeFamily, count: float, names: list[str], report: Report) ->
 
 def _mentioned(model: Elaborator) -> frozenset[str]:
     """Nodes whose quantities stand in energies, works and constraints, and those that components hang on."""
-    roots = [e.expression for e in model.parts.energies] + [c.expression for c in model.parts.constraints]
-    roots += [n for w in model.parts.works for n in (w.effort, w.on)]
-    roots += [b.on for b in model.parts.branches if b.on is not None]
+    roots = expressions(model.parts, "energies", "constraints", "works", "branches.on")
     return frozenset(
         n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] in ("ne", "nq", "nf", "np")
     )
@@ -110,9 +109,7 @@ def _cutsets(model: Elaborator, report: Report) -> None:
 
 def _idle_branches(model: Elaborator, report: Report) -> None:
     """E306: a branch without a law that stands in nothing."""
-    roots = [e.expression for e in model.parts.energies] + [c.expression for c in model.parts.constraints]
-    roots += [n for w in model.parts.works for n in (w.effort, w.on)]
-    roots += [b.on for b in model.parts.branches if b.on is not None]
+    roots = expressions(model.parts, "energies", "constraints", "works", "branches.on")
     used = {n.data[0] for n in ex.topological(roots) if n.op == "var" and n.data[1] in ("be", "bf", "bq", "bp")}
     for branch in model.parts.branches:
         if branch.kind == "field" and branch.name not in used:

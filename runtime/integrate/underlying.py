@@ -25,6 +25,7 @@ from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.levels import undifferentiated
+from sysdyn.runtime.structure.matching import matched
 from sysdyn.values import dataclass
 
 SMALL = 32
@@ -322,12 +323,7 @@ def _unmatched(pattern: Pattern) -> NDArray[np.float64]:
 
     Round-off makes pivots of what is singular by structure: a line of 20000 sections passes for regular by its values.
     """
-    matched = np.zeros(pattern.unknowns, dtype=np.int32)
-    looks = np.zeros(1, dtype=np.int64)
-    places = (lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(matched), lib.pointer(looks))
-    if lib.core.sd_match(pattern.rows, pattern.unknowns, *places) < 0:
-        raise MemoryError
-    return np.asarray(matched < 0, dtype=np.float64)
+    return np.asarray(matched(pattern) < 0, dtype=np.float64)
 
 
 def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:

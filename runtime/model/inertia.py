@@ -20,6 +20,11 @@ def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
 
 def _places(system: System, group: str, kind: str) -> NDArray[np.int64]:
     """Places in the pattern of the entries of each unknown of a kind in its coordinate's row of a group."""
+    return np.flatnonzero(own_unknown(system, group, kind)[system.pattern.row] == system.pattern.columns_of())
+
+
+def own_unknown(system: System, group: str, kind: str) -> NDArray[np.int64]:
+    """The unknown of a kind in whose coordinate's row of a group each row is [rows]; -1 elsewhere."""
     families = system.description.families
     own = {family.owner: k for k, family in enumerate(families) if family.kind == kind}
     place = np.full(system.rows, -1, dtype=np.int64)
@@ -28,7 +33,7 @@ def _places(system: System, group: str, kind: str) -> NDArray[np.int64]:
         unknown = own.get(row.owner)
         if name == group and unknown is not None and families[unknown].size == row.size:
             place[first : first + row.size] = system.form.at[unknown] + np.arange(row.size)
-    return np.flatnonzero(place[system.pattern.row] == system.pattern.columns_of())
+    return place
 
 
 def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:

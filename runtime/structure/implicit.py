@@ -49,20 +49,8 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
         found &= np.isfinite(there) & (there > 0.0) & (here <= VANISHING * there)
     if not found.any() or system.rows > DENSE:
         return ()
-    at, off = _conditions([_matrix(system, state.t, point, yd) for point in (y, beside)])
+    iterated = (system.dense(np.add(*system.jacobian(state.t, point, yd))) for point in (y, beside))
+    at, off = (decomposed(matrix)[1][-1] for matrix in equilibrated(*iterated))
     if at > VANISHING * off:
         return ()
     return tuple(system.name(int(k)) for k in implicit[found])
-
-
-def _matrix(system: System, t: float, y: Floats, yd: Floats) -> Floats:
-    """The iteration's matrix dF/dy + dF/dy'."""
-    jy, jyd = system.jacobian(t, y, yd)
-    matrix = np.zeros((system.rows, system.unknowns))
-    np.add.at(matrix, (system.pattern.row, system.pattern.columns_of()), jy + jyd)
-    return matrix
-
-
-def _conditions(matrices: list[Floats]) -> list[float]:
-    """The smallest singular value of each, rows and columns scaled alike."""
-    return [float(decomposed(m)[1][-1]) for m in equilibrated(*matrices)]

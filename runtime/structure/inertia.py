@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 
@@ -32,23 +33,13 @@ def negative_inertia(system: System, state: ConsistentState) -> tuple[str, float
 
 def _places(system: System) -> tuple[Longs, tuple[Longs, Longs], Longs, NDArray[np.bool_]]:
     """Flows; the entries of M: row and column among these, place in the pattern, whether in a row of momentum."""
-    flows = np.flatnonzero(system.are("f"))
-    place = np.full(system.unknowns, -1, dtype=np.int64)
-    place[flows] = np.arange(flows.size)
-    rows = np.full(system.rows, -1, dtype=np.int64)
-    momentum = np.zeros(system.rows, dtype=bool)
-    owners = {f.owner: k for k, f in enumerate(system.description.families) if f.kind == "f"}
-    for group, family, first in system.form.groups:
-        row = system.description.rows[family]
-        owner = owners.get(row.owner)
-        if group not in ("dynamics", "momentum") or owner is None:
-            continue
-        rows[first : first + row.size] = place[system.form.at[owner] + np.arange(row.size)]
-        momentum[first : first + row.size] = group == "momentum"
-    columns = system.pattern.columns_of()
-    take = np.flatnonzero((rows[system.pattern.row] >= 0) & (place[columns] >= 0))
-    at = system.pattern.row[take]
-    return flows, (rows[at], place[columns[take]]), take, momentum[at]
+    moving, columns, row = system.are("f"), system.pattern.columns_of(), system.pattern.row
+    number = np.cumsum(moving) - 1
+    balance, momentum = (own_unknown(system, group, "f")[row] for group in ("dynamics", "momentum"))
+    owner = np.maximum(balance, momentum)
+    take = np.flatnonzero((owner >= 0) & moving[columns])
+    places = number[owner[take]], number[columns[take]]
+    return np.flatnonzero(moving), places, take, momentum[take] >= 0
 
 
 def _least(

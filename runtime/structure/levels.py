@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.structure.matching import matched
 
 LARGE = 4000
 """Unknowns beyond which the paths are not sought."""
@@ -63,8 +65,8 @@ class _Rows:
         self._flow = settled.are("f")[columns]
         self._sizes = settled.rows, settled.unknowns
 
-    def _reached(self) -> list[list[int]]:
-        """Of each equation the unknowns whose highest derivative stands in it."""
+    def _entries_now(self) -> tuple[Longs, Longs]:
+        """Equation and unknown of each entry: of each equation the unknowns whose highest derivative stands in it."""
         row, column, in_y, in_rate = self._entries
         number = np.full(self._sizes[0], -1, dtype=np.int64)
         number[self.row[self.level, np.arange(self.level.size)]] = np.arange(self.level.size)
@@ -73,18 +75,22 @@ class _Rows:
         moved = np.zeros(self._sizes[1], dtype=bool)
         moved[column[rates]] = True
         take = rates | (mine & in_y & (self._plain | (self._flow & ~moved[column])))
-        found: list[list[int]] = [[] for _ in range(self.level.size)]
-        for equation, unknown in zip(number[row[take]].tolist(), column[take].tolist(), strict=True):
-            found[equation].append(unknown)
-        return found
+        return number[row[take]], column[take].astype(np.int64)
 
     def unmatched(self) -> set[int]:
         """Equations on the alternating paths of those for which no unknown is left."""
-        reached, owner, matched = self._reached(), dict[int, int](), dict[int, int]()
-        failed: set[int] = set()
-        for equation in range(len(reached)):
-            failed |= _augmented(equation, reached, owner, matched)
-        return failed
+        equation, unknown = self._entries_now()
+        order, unknowns = np.lexsort((unknown, equation)), self._sizes[1]
+        first = np.searchsorted(equation[order], np.arange(self.level.size + 1))
+        pattern = Pattern(unknowns, self.level.size, first.astype(np.int32), unknown[order].astype(np.int32))
+        own = matched(pattern)
+        met, grown = own < 0, True
+        while grown:
+            known = np.zeros(unknowns + 1, dtype=bool)  # the last: of those without an unknown
+            known[unknown[met[equation]]] = True
+            grown = bool((known[own] & ~met).any())
+            met |= known[own]
+        return set(np.flatnonzero(met).tolist())
 
     def differentiate(self, failed: set[int]) -> bool:
         """The families of these equations go to level 1; False where one of them cannot."""
@@ -97,36 +103,3 @@ class _Rows:
     def as_they_are(self) -> tuple[int, ...]:
         """Families of constraints at level 0."""
         return tuple(sorted({int(k) for k in self.family[(self.level == 0) & (self.family >= 0)]}))
-
-
-def _augmented(equation: int, reached: list[list[int]], owner: dict[int, int], matched: dict[int, int]) -> set[int]:
-    """Matches one more equation along the shortest path; where there is none, the equations that were met.
-
-    owner: the equation of each matched unknown, matched: the unknown of each equation.
-    """
-    came: dict[int, int] = {}  # unknown -> the equation from which it was met
-    ahead = [equation]
-    for here in ahead:
-        for unknown in reached[here]:
-            if unknown in came:
-                continue
-            came[unknown] = here
-            if unknown not in owner:
-                _exchange(unknown, equation, came, owner, matched)
-                return set()
-            ahead.append(owner[unknown])
-    return set(ahead)
-
-
-def _exchange(
-    unknown: int, equation: int, came: dict[int, int], owner: dict[int, int], matched: dict[int, int]
-) -> None:
-    """Each equation of the path takes the unknown at which it was left."""
-    while True:
-        here = came[unknown]
-        before = matched.get(here)
-        owner[unknown], matched[here] = here, unknown
-        if here == equation:
-            return
-        assert before is not None
-        unknown = before

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.least_change import solve
 from sysdyn.runtime.numerics.points import normal
 from sysdyn.runtime.numerics.rank import TOLERANCE, least_squares
@@ -23,6 +24,7 @@ from sysdyn.runtime.start.starter import Starter, weighted
 from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
+NONE = np.zeros(0, dtype=np.int32)
 DENSE = 300
 """Constraints up to which matrices are full."""
 NOISE = 1e-11
@@ -46,82 +48,83 @@ class Reactions:
     in y.
     """
 
-    which: Longs
+    which: Ints
     place: Longs
     value: Floats
     multipliers: Longs
-    rows: Longs
+    rows: Ints
     scale: Floats
 
+    @property
+    def large(self) -> bool:
+        """Whether J is too large to be looked at as a full matrix."""
+        return self.multipliers.size > DENSE or self.rows.size > 4 * DENSE
 
-def reactions(system: System, jy: Floats, kinds: tuple[str, ...] = ("kappa", "mu")) -> Reactions:
-    """J from the reactions of the multipliers of those kinds (virtual displacements)."""
-    pattern = system.pattern
-    columns = pattern.columns_of()
-    idle = system.idle_multipliers()
-    multipliers, mine = system.once(("reacting", kinds, idle.tobytes()), lambda: _of(system, kinds, idle))
-    take = mine[jy[mine] != 0.0]
-    which, value = np.searchsorted(multipliers, columns[take]), jy[take]
-    largest = np.zeros(multipliers.size)
-    np.maximum.at(largest, which, np.abs(value))
-    real = np.abs(value) > NOISE * largest[which]
-    take, which, value = take[real], which[real], value[real]
-    rows, place = np.unique(pattern.row[take].astype(np.int64), return_inverse=True)
-    scale = np.ones(multipliers.size)
-    for _ in range(4):
-        for number, index in ((multipliers.size, which), (rows.size, place)):
-            size = np.zeros(number)
-            np.maximum.at(size, index, np.abs(value))
-            shrink = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
-            value = value * shrink[index]
-            scale *= shrink if index is which else 1.0
-    return Reactions(which, place, value, multipliers, rows, scale)
+    def full(self) -> Floats:
+        """J [multipliers, rows]."""
+        found = np.zeros((self.multipliers.size, self.rows.size))
+        np.add.at(found, (self.which, self.place), self.value)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Places of multipliers in y; of each entry of J its place in the pattern, its multiplier's number, its row."""
+
+    multipliers: Longs
+    entry: Ints
+    which: Ints
+    row: Ints
+
+
+def _reacting(system: System, idle: Ints = NONE) -> _Places:
+    """The multipliers of constraints, but for the idle ones, and the reactions of each."""
+
+    def find() -> _Places:
+        pattern, mine = system.pattern, system.are("kappa", "mu").copy()
+        mine[idle] = False
+        columns, multipliers = pattern.columns_of(), np.flatnonzero(mine)
+        entry = np.flatnonzero(mine[columns] & system.of_groups("dynamics")[pattern.row])
+        places = entry, np.searchsorted(multipliers, columns[entry]), pattern.row[entry]
+        return _Places(multipliers, *(place.astype(np.int32) for place in places))
+
+    return system.once(("reacting places", idle.tobytes()), find)
+
+
+def reactions(system: System, jy: Floats) -> Reactions:
+    """J from the reactions of the multipliers (virtual displacements)."""
+    all_ = _reacting(system, system.idle_multipliers())
+    value, largest = jy[all_.entry], np.zeros(all_.multipliers.size)
+    np.maximum.at(largest, all_.which, np.abs(value))
+    real = np.abs(value) > NOISE * largest[all_.which]
+    which, value = all_.which[real], value[real]
+    rows, place = np.unique(all_.row[real], return_inverse=True)
+    scale, other = sparse_factors(which, place, np.abs(value), (all_.multipliers.size, rows.size))
+    return Reactions(which, place, scale[which] * value * other[place], all_.multipliers, rows, scale)
 
 
 def independent(system: System, jy: Floats) -> bool:
     """Whether the constraints that hold now are few, and independent beyond doubt."""
-    idle = system.idle_multipliers()
-    key = "reacting places", idle.tobytes()
-    multipliers, mine, row, column = system.once(key, lambda: _reacting_places(system, idle))
-    if not multipliers or multipliers > DENSE or system.rows > 4 * DENSE:
-        return not multipliers
-    value = jy[mine]
-    arrays = lib.pointer(row), lib.pointer(column), lib.pointer(value)
-    found = lib.core.sd_independent(multipliers, system.rows, value.size, *arrays, NOISE, TOLERANCE)
-    if found < 0:
+    found = _reacting(system, system.idle_multipliers())
+    number, value = found.multipliers.size, jy[found.entry]
+    if not number or number > DENSE or system.rows > 4 * DENSE:
+        return not number
+    arrays = lib.pointer(found.which), lib.pointer(found.row), lib.pointer(value)
+    sure = lib.core.sd_independent(number, system.rows, value.size, *arrays, NOISE, TOLERANCE)
+    if sure < 0:
         raise MemoryError
-    return bool(found)
-
-
-def _reacting_places(system: System, idle: Ints) -> tuple[int, Longs, Ints, Ints]:
-    """How many multipliers react; the places of J's entries in the pattern, the multiplier and the row of each."""
-    multipliers, mine = _of(system, ("kappa", "mu"), idle)
-    which = np.searchsorted(multipliers, system.pattern.columns_of()[mine])
-    return multipliers.size, mine, which.astype(np.int32), system.pattern.row[mine].astype(np.int32)
-
-
-def _of(system: System, kinds: tuple[str, ...], idle: Ints) -> tuple[Longs, Longs]:
-    """Multipliers of those kinds but for the idle ones, and the places in the pattern of their reactions."""
-    reacting = system.are(*kinds).copy()
-    reacting[idle] = False
-    multipliers = np.flatnonzero(reacting)
-    pattern, mine = system.pattern, np.zeros(system.unknowns, dtype=bool)
-    mine[multipliers] = True
-    return multipliers, np.flatnonzero(mine[pattern.columns_of()] & system.of_groups("dynamics")[pattern.row])
+    return bool(sure)
 
 
 def dependent(found: Reactions) -> Ints:
     """Constraints (places in `multipliers`) that depend on those before them."""
-    m, n = found.multipliers.size, found.rows.size
-    if m == 0:
-        return np.zeros(0, dtype=np.int32)
-    if m > DENSE or n > 4 * DENSE:
+    if not found.multipliers.size:
+        return NONE
+    if found.large:
         return _sparse_dependent(found)
-    rows = np.zeros((m, n))
-    np.add.at(rows, (found.which, found.place), found.value)
-    basis = np.zeros((0, n))
+    basis = np.zeros((0, found.rows.size))
     left = []
-    for k, row in enumerate(rows):
+    for k, row in enumerate(found.full()):
         size = float(np.linalg.norm(row))
         rest = row
         for _ in range(2):  # twice is enough (Kahan)
@@ -139,7 +142,7 @@ def _sparse_dependent(found: Reactions) -> Ints:
     rows; eliminated in the order written they name them.
     """
     if not _left(found):
-        return np.zeros(0, dtype=np.int32)
+        return NONE
     from scipy.sparse import block_array, csc_array, eye_array
     from scipy.sparse.linalg import splu
 
@@ -148,7 +151,7 @@ def _sparse_dependent(found: Reactions) -> Ints:
     matrix = block_array([[eye_array(n), j.T], [j, -_EPS * eye_array(m)]], format="csc")
     pivots = np.abs(splu(matrix, permc_spec="COLAMD").U.diagonal())
     if not (pivots < 1e3 * _EPS).any():
-        return np.zeros(0, dtype=np.int32)
+        return NONE
     lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.flatnonzero(np.abs(lu.U.diagonal())[n:] < 1e3 * _EPS).astype(np.int32)
 
@@ -165,19 +168,21 @@ def _left(found: Reactions) -> int:
     return left
 
 
+def _around(system: System, state: ConsistentState) -> tuple[Starter, Floats, Floats]:
+    """What starts at a state are sought in, the state there, and how large its displacements are, 0 for all else."""
+    starter = system.starter or Starter(system, remember=True)
+    x = np.concatenate([state.y, state.yd[starter.rates]])
+    return starter, x, np.where(starter.moves(("q",))[: x.size], starter.scale(state.t, x), 0.0)
+
+
 def nearby(system: System, state: ConsistentState) -> list[Floats]:
     """Y at up to POINTS seeded points near the state, displacements consistent with phi."""
-    starter = Starter(system, remember=True)
-    x = np.concatenate([state.y, state.yd[starter.rates]])
-    q = starter.moves(("q",))[: x.size]
-    size = np.where(q, starter.scale(state.t, x), 0.0)
-    random = np.random.default_rng(12)
+    starter, x, size = _around(system, state)
+    q, rows = starter.moves(("q",))[: x.size], starter.groups("phi")
     found = []
-    for _ in range(POINTS):
-        direction = random.standard_normal(x.size)
+    for direction in _directions(system, POINTS)[:, : x.size]:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * size * direction
-            rows = starter.groups("phi")
             if rows.any() and q.any():
                 scale, weight = starter.scale(state.t, shaken), np.ones(shaken.size)
                 problem = weighted(starter, state.t, shaken, rows=rows, free=q, scale=scale, weight=weight)
@@ -196,16 +201,17 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     zero on phi alone (a circle of radius 0) has its size.
     """
     y, yd = state.for_form(system)
-    take, which, number = system.once("sizes of J", lambda: _reacting(system))
+    reacting = _reacting(system)
+    entry, which, number = reacting.entry, reacting.which, reacting.multipliers.size
     if not number:
-        return np.zeros(0, dtype=np.int32)
+        return NONE
 
     def sizes(points: Floats) -> Floats:
         """The largest entry of each row of J, as written, at points [k, unknowns]: [k, number]."""
         found = np.zeros((len(points), number))
         a, b = np.zeros((len(points), system.form.extended)), system._buffer(yd)
         a[:, : points.shape[1]] = points
-        places = take.size, lib.pointer(take), lib.pointer(which), number, lib.pointer(found)
+        places = entry.size, lib.pointer(entry), lib.pointer(which), number, lib.pointer(found)
         at = state.t, *a.shape, lib.pointer(a), lib.pointer(b)
         if lib.core.sd_row_sizes(c.byref(system.core), *at, *places):
             raise MemoryError
@@ -216,10 +222,8 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     here, elsewhere = sizes(np.stack([y, anywhere]))
     straight = (here > 0.0) & (here == elsewhere)
     if straight.all():  # rows of J that are the same everywhere vanish nowhere
-        return np.zeros(0, dtype=np.int32)
-    starter = system.starter or Starter(system, remember=True)
-    x = np.concatenate([state.y, state.yd[starter.rates]])
-    size = np.where(starter.moves(("q",))[: x.size], starter.scale(state.t, x), 0.0)
+        return NONE
+    starter, x, size = _around(system, state)
     shaken = (x + BESIDE * size * _directions(system, POINTS)[:, : x.size])[:, : starter.n]
     there = sizes(shaken).min(axis=0, initial=np.inf)
     return np.flatnonzero(here <= TOLERANCE * there).astype(np.int32)
@@ -230,24 +234,14 @@ def _directions(system: System, number: int) -> Floats:
     return system.once_if_small(("directions", number), lambda: normal(number, 2 * system.form.written))
 
 
-def _reacting(system: System) -> tuple[Ints, Ints, int]:
-    """Places in the pattern of J's entries, the multiplier of each, and how many of these there are."""
-    multipliers, take = _of(system, ("kappa", "mu"), np.zeros(0, dtype=np.int32))
-    which = np.searchsorted(multipliers, system.pattern.columns_of()[take])
-    return take.astype(np.int32), which.astype(np.int32), multipliers.size
-
-
 def combination(found: Reactions, left: Ints) -> Floats:
     """Coefficients [multipliers] of a vanishing combination of rows as written: the first left-out one and those before
     it; () where there is none.
     """
-    m, n = found.multipliers.size, found.rows.size
-    if not left.size or m > DENSE or n > 4 * DENSE:
+    if not left.size or found.large:
         return np.zeros(0)
-    rows = np.zeros((m, n))
-    np.add.at(rows, (found.which, found.place), found.value)
-    last = int(left[0])
-    weights = np.zeros(m)
+    rows, last = found.full(), int(left[0])
+    weights = np.zeros(len(rows))
     weights[:last] = -least_squares(rows[:last].T, rows[last])
     weights[last] = 1.0
     weights *= found.scale

@@ -121,19 +121,27 @@ def test_displacement_constraints_keep_their_multipliers(tmp_path):
         assert np.max(np.abs(kane[name].values - wanted)) <= 1e-6 * np.max(np.abs(wanted)), name
 
 
-def test_what_it_cannot_leave_out_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("formulation", "coordinates", "energy"),
+    [("kane", "coord X: translation", "T* = 1/2*1 kg"), ("co_kane", "cocoord X: electrical", "V* = 1/2*1 F")],
+)
+def test_what_it_cannot_leave_out_is_refused_in_its_own_name(tmp_path, formulation, coordinates, energy):
     path = tmp_path / "model.sd"
-    path.write_text("""model m {
-  coord x: translation = 0 m
-  coord v[1..3]: translation
-  energy T* = 1/2*1 kg*(x'^2 + sum(i in 1..3: v[i]'^2))
+    path.write_text(f"""model m {{
+  {coordinates.replace("X", "x")}
+  {coordinates.replace("X", "v[1..3]")}
+  energy {energy}*(x'^2 + sum(i in 1..3: v[i]'^2))
   psi one: x' = sum(i in 1..3: v[i]')
-}
+}}
 """)
     report = Report()
-    assert run(Request(str(path), formulation="kane", until="1", output=str(tmp_path / "t.h5")), report) is None
-    assert [d.code for d in report if d.severity == "error"] == ["E607"]
-    assert "several elements" in next(d.message for d in report)
+    assert run(Request(str(path), formulation=formulation, until="1", output=str(tmp_path / "t.h5")), report) is None
+    (found,) = [d for d in report if d.severity == "error"]
+    assert found.code == "E607"
+    assert "several elements" in found.message
+    assert f"formulation {formulation}:" in found.message
+    others = [formulation.replace("kane", name) for name in ("lagrangian", "hamiltonian")]
+    assert found.help == f"formulation {', '.join(others)}"
 
 
 @pytest.mark.parametrize("model", ["lead_filter", "two_tank", "electrical_transformer", "fluid_transformer"])

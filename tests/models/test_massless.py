@@ -77,4 +77,7 @@ def test_what_would_need_rates_of_balances_says_so(tmp_path):
     assert ran is None
     (found,) = [d for d in report if d.code == "E607"]
     assert "a balance without it would have to be differentiated too): inertia on " in found.message
+    listed, advised = found.message.split(" not determined")[0], found.message.split("inertia on ")[-1]
+    names = [word.rstrip("',") for word in listed.split(": ")[1].split() if word.rstrip(",").endswith("'")]
+    assert advised.split(", constraints")[0].split(", ") == list(dict.fromkeys(names))[:3]  # in one order
     assert trace_of(tmp_path, text, scene="run", formulation="co_lagrangian", method="dopri").attributes["index"] == "0"

@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
+from sysdyn.runtime.structure.matching import matched
 from sysdyn.runtime.structure.structure import _growth_index, null_vectors, pencil_index, structure
 
 # differential index of the seed's catalogue (seed/README.md, sections 3 and 4)
@@ -83,3 +85,11 @@ def test_a_singular_pencil_is_told_from_one_whose_entries_lie_far_apart(spread, 
             e[k], b[k] = 3.0 * e[2 * n - 1], 3.0 * b[2 * n - 1]
         columns, rows = null_vectors(e, b)
         assert columns.shape[1] == rows.shape[0] == int(singular)
+
+
+def test_a_matching_is_as_large_as_it_can_be_and_leaves_what_has_none():
+    """Three columns that two rows are left for, and one with a row of its own."""
+    column, row = np.array([0, 2, 4, 6, 7], dtype=np.int32), np.array([0, 1, 0, 1, 0, 1, 2], dtype=np.int32)
+    found = matched(Pattern(3, 4, column, row))
+    assert sorted(found) == [-1, 0, 1, 2]
+    assert found[3] == 2

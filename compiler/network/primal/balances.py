@@ -3,7 +3,7 @@
     psi node[at]: sum of the flows into the node = 0
 
 so that the multiplier is the node's effort against the reference: e = multiplier(plus) - multiplier(minus).  Connected
-components are found by index classes (`alike`); where copies of a component stand along an index, each has a reference.
+components are found by `index_classes`; where copies of a component stand along an index, each has a reference.
 The effort of a node is read from its multiplier, is zero at a reference, and is found along the series class elsewhere.
 """
 
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.primal.alike import Cell, End, Likeness, Link
 from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, box_holds, parts, union, without
 from sysdyn.compiler.network.primal.incidence import (
     MINUS,
@@ -24,6 +23,7 @@ from sysdyn.compiler.network.primal.incidence import (
     indices,
     unrolled,
 )
+from sysdyn.compiler.network.primal.index_classes import Cell, End, IndexClasses, Link
 from sysdyn.dsl.model.expression import Node, index, linear, reduction, var
 from sysdyn.dsl.model.network import Constraint, Loop
 from sysdyn.values import dataclass
@@ -69,7 +69,7 @@ class _Components:
         ]
         boxes = [incidence.boxes[name] for name in self.names]
         links = [Link(e.box, self._end(e, e.ends[0]), self._end(e, e.ends[1])) for e in branches]
-        self.likeness = Likeness(boxes, links, cuts)
+        self.likeness = IndexClasses(boxes, links, cuts)
         self._refused(branches, links)
 
     def _end(self, element: Element, contact: Contact) -> End:
@@ -163,7 +163,7 @@ def _reference(free: list[Held], held: list[Held], earth: Held | None, merged: s
     return earth or next(iter(held))
 
 
-def _corner(cell: Cell, like: Likeness) -> Box:
+def _corner(cell: Cell, like: IndexClasses) -> Box:
     """One node of each copy of a component: indices along which the nodes are tied together at their first value."""
     loose = {d for d, _, _ in like.extended(cell)}
     return tuple(i if d in loose else Interval(i.first, i.first) for d, i in enumerate(like.box(cell)))

@@ -14,11 +14,9 @@ from sysdyn.compiler.network.primal.inverses import Inverse, inverse
 from sysdyn.compiler.network.primal.slopes import Slopes
 from sysdyn.dsl.model.expression import (
     Node,
-    add,
     const,
     is_const,
     mul,
-    neg,
     param,
     sub,
     substitute,
@@ -60,7 +58,7 @@ def own(branch: Branch, kind: str) -> Node:
     return var(branch.name, kind, *branch.at)
 
 
-class Choice:
+class Causality:
     """How one branch enters."""
 
     def __init__(
@@ -133,7 +131,7 @@ class Choice:
         energy = antiderivative(law, v, rests, valued=valued)
         if energy is None or not self._rest_on(rests):
             return None
-        return self._from_rest(energy, v) if law is self.branch.law else self._from_origin(energy, v)
+        return energy if law is self.branch.law else self._from_origin(energy, v)
 
     def _from_origin(self, energy: Node, v: Node) -> Node:
         """The integral of an inverted law from where that of the law as written begins: its own variable is zero."""
@@ -154,23 +152,17 @@ class Choice:
         v, w = own(branch, OWN[branch.kind][0]), conjugate(branch)
         name = ENERGY[branch.kind]
         transform = STATE_FUNCTIONS[name].transform
-        whole = v if branch.shift is None else add(v, branch.shift)
         if law.how == "energy" and law.stated is not None:
-            return {name: law.stated, transform: sub(mul(whole, w), law.stated)}
+            return {name: law.stated, transform: sub(mul(v, w), law.stated)}
         if law.kept is not None:
             kept = {"kinetic": transform, "potential": name}[branch.kind]
-            return {kept: law.kept, STATE_FUNCTIONS[kept].transform: sub(mul(whole, w), law.kept)}
+            return {kept: law.kept, STATE_FUNCTIONS[kept].transform: sub(mul(v, w), law.kept)}
         given, rests = (v if branch.side == OWN[branch.kind][1] else w), Rests()
         area = branch.energy or antiderivative(branch.law, given, rests, valued=True)
         if area is None or not self._rest_on(rests):
             return {}
-        area = self._from_rest(area, v) if given is v else sub(mul(v, w), area)
-        return {name: area, transform: sub(mul(whole, w), area)}
-
-    def _from_rest(self, area: Node, v: Node) -> Node:
-        """An integral over the own variable from where that and its shift cancel."""
-        shift = self.branch.shift
-        return area if shift is None else sub(area, substitute(area, {v: neg(shift)}))
+        area = area if given is v else sub(mul(v, w), area)
+        return {name: area, transform: sub(mul(v, w), area)}
 
     def _rest_on(self, rests: Sequence[tuple[Node, int]]) -> bool:
         """Keep what a result rests on; False where that is not so."""

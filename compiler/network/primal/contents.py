@@ -1,28 +1,33 @@
-"""Initial conditions of a network as those of its coordinates; stores in series that start with different contents.
+"""Initial conditions of a network as those of its coordinates; stores whose contents these do not tell alone.
 
-In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + c, with c its own
-initial content less +- that of the first (language, section 11, 11): a parameter `branch.content`; a dynamic variable
-of rate zero where not all of these are fixed and a loop of stores and efforts may ask for others.
+Contents of potential stores are c = B x + k: x the coordinates, which are one choice of tree; k one constant for each
+store beside it (language, section 11, 11), a parameter `branch.content` where the text tells it, else a dynamic
+variable of rate zero, which the start chooses.
+
+In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + k, with k its own
+initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
+efforts may ask for others.  A store between two nodes of the reflection (an inductor) holds their difference: where
+such stores close loops in which contents are said, each has its own initial content as k; it is chosen where
+nothing is said of it.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 
+from sysdyn.compiler.network.primal import overlaps
 from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
+from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.network.primal.integrals import line
-from sysdyn.compiler.network.primal.overlaps import cut_off
-from sysdyn.compiler.network.primal.reading import Piece, Ranges, Reader, touches_network
-from sysdyn.compiler.network.primal.rings import closes
+from sysdyn.compiler.network.primal.overlaps import cut_off, initially, inside, ranges_of
+from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
     Node,
-    both,
-    compare,
-    conditional,
     const,
     index,
     is_const,
@@ -69,16 +74,37 @@ def momentum(branch: Branch, flow: Node) -> Node | None:
     return None if straight is None else straight.inverse(flow)
 
 
-def at_stores(network: Network, incidence: Incidence, reader: Reader) -> Iterator[Initial]:
-    """Initial conditions; those of a node's effort as those of a linear store between that node and ground."""
+def at_stores(network: Network, incidence: Incidence, reader: Rewriter) -> Iterator[Initial]:
+    """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents."""
     for initial in network.initials:
         if initial.target.op == "var" and initial.target.data[1:] == ("ne", 0):
-            yield from _at_store(initial, incidence.cells.get(initial.target.data[0], ()), reader)
+            for part in _at_store(initial, incidence.cells.get(initial.target.data[0], ()), reader):
+                yield from _as_content(part, reader)
         else:
-            yield initial
+            yield from _as_content(initial, reader)
 
 
-def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Reader) -> Iterator[Initial]:
+def _as_content(initial: Initial, reader: Rewriter) -> Iterator[Initial]:
+    """Where a law tells it, what the store holds at the effort."""
+    target = initial.target
+    if target.op != "var" or target.data[1:] != ("be", 0) or variables(initial.value):
+        yield initial
+        return
+    mark = index("#v")  # the value is over the statement's own loops: put in after the law's were replaced
+
+    def content(ranges: Ranges) -> Node | None:
+        piece = reader.piece(target.data[0], target.args, ranges)
+        found = charge(piece.element.branch, mark)
+        return None if found is None else substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
+
+    for loops, value in reader.cut(initial.loops, initial.place, content):
+        if value is None:
+            yield replace(initial, loops=loops)
+        else:
+            yield replace(initial, target=var(target.data[0], "bq", *target.args), value=value, loops=loops)
+
+
+def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> Iterator[Initial]:
     node = initial.target
 
     boxes: dict[Touch | None, list[Box]] = {}
@@ -109,99 +135,85 @@ class Contents:
     """Initial contents of potential stores: constants of followers, and the initial conditions that remain."""
 
     def __init__(
-        self, reader: Reader, members: Sequence[Member], initials: Sequence[Initial], branches: Sequence[Branch]
+        self,
+        reader: Rewriter,
+        members: Sequence[Member],
+        initials: Sequence[Initial],
+        elements: Sequence[Element],
+        *,
+        reflected: bool,
     ) -> None:
         self.reader = reader
-        self.members = members
         self.initials = initials
-        self.stiff = [b for b in branches if b.kind in ("potential", "effort")]
+        joining = [e for e in elements if len(e.ends) == 2]
+        series = [e for e in joining if e.branch.domain.common == "effort"]
+        between = [e for e in joining if e.branch.domain.common == "flow"] if reflected else []
+        between = [e for e in between if e.branch.kind == "potential"]
+        self.looped = in_loops([*(e for e in series if e.branch.kind in ("potential", "effort")), *between])
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
-        self._given: dict[str, list[tuple[Initial, Box, Node]]] = {}
+        self._given: dict[str, list[tuple[Initial, Box]]] = {}
+        self._leaders: dict[str, list[Member]] = {}
+        self._names: set[str] = set()
         self._pinned: set[Node] = set()
-        for initial in initials:
-            for part, box, content in self._contents(initial):
-                self._given.setdefault(part.target.data[0], []).append((part, box, content))
-        for element in dict.fromkeys(m.element for m in members if _follows(m)):
-            self._constant(element, [m for m in members if m.element is element and _follows(m)])
+        for initial in filter(_is_content, initials):
+            within = ranges_of(initial.loops, reader.sizes, initial.place)
+            box = tuple(reader.sizes.affine(a, within, initial.place).over(within) for a in initial.target.args)
+            self._given.setdefault(initial.target.data[0], []).append((initial, box))
+        followers: dict[int, list[Member]] = {}
+        for m in members:
+            if m.leads:
+                self._leaders.setdefault(m.coordinate, []).append(m)
+            elif m.element.branch.kind == "potential":
+                followers.setdefault(m.element.number, []).append(m)
+        for group in followers.values():
+            self._follower(group[0].element, group)
+        self._chords([e for e in between if e.number in self.looped and e.branch.law is not None])
 
-    def _contents(self, initial: Initial) -> Iterator[tuple[Initial, Box, Node]]:
-        """The displacements that an initial condition gives to potential stores of series classes."""
-        target = initial.target
-        if target.op != "var" or target.data[1:] not in (("be", 0), ("bq", 0)) or variables(initial.value):
-            return
-
-        def found(ranges: Ranges) -> tuple[Box, Node] | None:
-            piece = self.reader.piece(target.data[0], target.args, ranges)
-            content = None if piece.member is None else self._charge(piece, initial)
-            held = {name: r.interval for name, r in ranges.items()}
-            box = tuple(a.over(held) for a in self.reader.affine(target.args, ranges))
-            return None if content is None else (box, content)
-
-        for loops, pair in self.reader.cut(initial.loops, initial.place, found):
-            if pair is not None:
-                yield replace(initial, loops=loops), *pair
-
-    def _charge(self, piece: Piece, initial: Initial) -> Node | None:
-        branch = piece.element.branch
-        if branch.kind != "potential":
-            return None
-        if initial.target.data[1] == "bq":
-            return initial.value
-        mark = index("#v")  # the value is over the statement's own loops: put in after the law's were replaced
-        found = charge(branch, mark)
-        if found is None:
-            return None
-        return substitute(self.reader.at_piece(found, piece, initial.target.args), {mark: initial.value})
-
-    def start(self, name: str, at: tuple[Node, ...]) -> Node:
+    def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
-        value: Node = const(0.0)
-        for initial, box, content in self._given.get(name, []):
-            loops = [loop.index for loop in initial.loops]
-            places = [self.reader.sizes.affine(a, loops, initial.place) for a in initial.target.args]
-            pairs = zip(places, at, strict=True)
-            change = {index(a.loop): sub(node, a.offset.node) for a, node in pairs if a.loop is not None}
-            own_value = substitute(content, change)
-            if any(n.op == "index" for a in at for n in _leaves(a)):
-                value = _within(box, at, own_value, value)
-            elif all(i.holds(k) for i, k in zip(box, self._point(at, initial), strict=True)):
-                value = own_value
-        return value
+        given = [initial for initial, _ in self._given.get(name, ())]
+        return initially(given, at, within, self.reader.sizes) or const(0.0)
 
-    def _point(self, at: tuple[Node, ...], initial: Initial) -> Box:
-        bounds = [self.reader.sizes.bound(a, initial.place) for a in at]
-        return tuple(Interval(b, b) for b in bounds)
-
-    def _constant(self, element: Element, members: Sequence[Member]) -> None:
-        """A parameter, unless it is zero by the text."""
-        counters = tuple(f"#c{k}" for k in range(len(element.at)))
-        at = tuple(index(name) for name in counters)
+    def _follower(self, element: Element, members: Sequence[Member]) -> None:
+        """The constant of stores in series with others, unless it is zero by the text."""
+        at, whole = _own_indices(element)
         value: Node = const(0.0)
         for m in members:
-            first = self.start(m.leader.name, m.leader_at(at))
-            value = _within(m.box, at, sub(self.start(element.name, at), scale(m.sign, first)), value)
+            part = dict(zip(whole, m.box, strict=True))
+            first = self.start(m.leader.name, m.leader_at(at), part)
+            value = inside(part, whole, sub(self.start(element.name, at, part), scale(m.sign, first)), value)
         fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
-        fixed |= not closes(element.branch, self.stiff)
-        if fixed and is_const(value, 0.0):
+        self._constant(element, value if fixed or element.number not in self.looped else None)
+
+    def _chords(self, looped: Sequence[Element]) -> None:
+        """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
+        given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
+        for e in looped if given else ():
+            self._constant(e, self.start(e.name, *_own_indices(e)) if e.number in given else None)
+
+    def _constant(self, element: Element, value: Node | None) -> None:
+        """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
+        if value is not None and is_const(value, 0.0):
             return
-        taken = {p.name for p in self.parameters} | {s.name for s in self.states}
+        at, _ = _own_indices(element)
         stem, place = f"{element.name}.content", element.branch.place
-        name = next(n for k in range(1, len(taken) + 2) if (n := stem if k == 1 else f"{stem}.{k}") not in taken)
+        name = next(n for k in itertools.count(1) if (n := stem if k == 1 else f"{stem}.{k}") not in self._names)
+        self._names.add(name)
         unit, shape = element.branch.domain.displacement, shape_of(element.named)
-        self.reader.book.contents[element.number] = name, fixed
-        if fixed:
-            self.parameters.append(Parameter(name, shape, unit, (value,), counters, place))
+        self.reader.book.contents[element.number] = name, value is not None
+        if value is not None:
+            self.parameters.append(Parameter(name, shape, unit, (value,), tuple(a.data for a in at), place))
             return
-        loops = tuple(Loop(c, low, high) for c, (low, high) in zip(counters, shape, strict=True))
+        loops = tuple(Loop(a.data, low, high) for a, (low, high) in zip(at, shape, strict=True))
         self.states.append(State(name, shape, unit, place))
         self.dynamics.append(Dynamic(var(name, "s", *at), const(0.0), loops, place))
 
     def _fixed(self, name: str, box: Box) -> bool:
         """Whether the text fixes the contents of all these elements."""
         left = [box]
-        for initial, said, _ in self._given.get(name, ()):
+        for initial, said in self._given.get(name, ()):
             if initial.fixed:
                 left = [part for rest in left for part in cut_off(rest, said)]
         return not left
@@ -229,8 +241,8 @@ class Contents:
 
     def _led(self, coordinate: str) -> bool:
         """Whether a statement gives the content of a leader of the coordinate's classes."""
-        leaders = [m for m in self.members if m.leads and m.coordinate == coordinate]
-        return any(meet(m.box, box) for m in leaders for _, box, _ in self._given.get(m.element.name, []))
+        leaders = self._leaders.get(coordinate, ())
+        return any(meet(m.box, box) for m in leaders for _, box in self._given.get(m.element.name, []))
 
     def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
         """The loops that the target still follows."""
@@ -240,26 +252,25 @@ class Contents:
     def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
         """Where one piece is read: (pin | class | drop, target, value); class: the coordinate of the store's class."""
         target = initial.target
-        piece = None
-        if target.op == "var" and target.data[1] in ("be", "bq") and not variables(initial.value):
+        if _is_content(initial):
             piece = self.reader.piece(target.data[0], target.args, ranges)
-        content = None if piece is None else self._charge(piece, initial)
-        if piece is not None and piece.member is not None and content is not None:
-            m = piece.member
-            if not self.reader.book.contents.get(piece.element.number, ("", True))[1]:
-                return "pin", self.reader.resolve(var(target.data[0], "bq", *target.args), ranges), content
-            q = var(m.coordinate, "q", *m.indices(target.args))
-            first = self.start(m.leader.name, m.leader_at(target.args))
-            if m.leads and len(m.index) == len(target.args):
-                return "pin", q, content
-            return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
-        if piece is not None and piece.member is None and content is not None:
-            moved = self.reader.resolve(var(target.data[0], "bq", *target.args), ranges)
-            return "pin", *_pin(moved, content)
+            m, (_, fixed) = piece.member, self.reader.book.contents.get(piece.element.number, ("", True))
+            if m is not None and fixed and piece.element.branch.kind == "potential":
+                q = var(m.coordinate, "q", *m.indices(target.args))
+                if m.leads and len(m.index) == len(target.args):
+                    return "pin", q, initial.value
+                within = {name: r.interval for name, r in ranges.items()}
+                first = self.start(m.leader.name, m.leader_at(target.args), within)
+                return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
         new, value = (self.reader.resolve(node, ranges) for node in (target, initial.value))
         if not variables(value):
             return "pin", *_pin(new, value)
         return "pin", new, value
+
+
+def _is_content(initial: Initial) -> bool:
+    """Whether a statement tells a displacement of a branch by itself."""
+    return initial.target.op == "var" and initial.target.data[1:] == ("bq", 0) and not variables(initial.value)
 
 
 def _pin(target: Node, value: Node) -> tuple[Node, Node]:
@@ -278,21 +289,15 @@ def _led_by(m: Member) -> Box:
     return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
 
 
-def _follows(m: Member) -> bool:
-    return m.element.branch.kind == "potential" and not m.leads
+def _own_indices(element: Element) -> tuple[tuple[Node, ...], overlaps.Ranges]:
+    """Loop variables over the indices of its name, and their ranges."""
+    within = {f"#c{k}": interval for k, interval in enumerate(element.named)}
+    return tuple(index(name) for name in within), within
 
 
 def meet(a: Box, b: Box) -> bool:
     """Whether boxes have elements in common."""
     return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))
-
-
-def _within(box: Box, at: tuple[Node, ...], value: Node, other: Node) -> Node:
-    """The value at indices in the box, the other elsewhere."""
-    pairs = list(zip(box, at, strict=True))
-    low = [compare("<=", i.first.node, node) for i, node in pairs]
-    high = [compare("<=", node, i.last.node) for i, node in pairs]
-    return conditional(both(*low, *high), value, other) if pairs else value
 
 
 def _leaves(node: Node) -> Iterator[Node]:

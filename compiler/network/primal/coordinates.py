@@ -20,9 +20,9 @@ from sysdyn.compiler.network.primal.incidence import Element, Incidence
 from sysdyn.compiler.network.primal.laws import Laws, laws
 from sysdyn.compiler.network.primal.potentials import Potentials
 from sysdyn.compiler.network.primal.precedence import foremost
-from sysdyn.compiler.network.primal.reading import Book, Piece, Reader
+from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter
 from sysdyn.compiler.network.primal.series import Series, series
-from sysdyn.compiler.network.primal.unsaid import measured
+from sysdyn.compiler.network.primal.unspecified import measured
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
@@ -41,11 +41,11 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     said = laws(network, incidence.elements, sizes, reflected=reflected)
     potentials = Potentials(nodes.efforts)
     pieces = _pieces(incidence.elements, classes)
-    book = Book(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
+    book = EliminationTable(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
     book.sticking = _sticking(network)
-    reader = Reader(sizes, book)
+    reader = Rewriter(sizes, book)
     initials = foremost(tuple(at_stores(network, incidence, reader)), network.branches, sizes)
-    contents = Contents(reader, classes.members, initials, network.branches)
+    contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected)
     guesses, stores = measured(network, initials, sizes, reader, reflected=reflected)
     found = replace(
         network,
@@ -75,15 +75,15 @@ def _sticking(network: Network) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _pieces(elements: tuple[Element, ...], classes: Series) -> dict[str, list[Piece]]:
+def _pieces(elements: tuple[Element, ...], classes: Series) -> dict[str, list[IndexBox]]:
     """How each branch family is cut: by its statements, and by the classes these belong to."""
-    found: dict[str, list[Piece]] = {}
+    found: dict[str, list[IndexBox]] = {}
     cut = {m.element.number for m in classes.members}
     for m in classes.members:
-        found.setdefault(m.element.name, []).append(Piece(m.box, m.element, m))
+        found.setdefault(m.element.name, []).append(IndexBox(m.box, m.element, m))
     for e in elements:
         if e.number not in cut:
-            found.setdefault(e.name, []).append(Piece(e.named, e))
+            found.setdefault(e.name, []).append(IndexBox(e.named, e))
     return found
 
 
@@ -97,7 +97,7 @@ def _node_coordinates(network: Network) -> Iterator[Coordinate]:
             )
 
 
-def _statements(network: Network, said: Laws, nodes: tuple[Constraint, ...], reader: Reader) -> dict[str, Any]:
+def _statements(network: Network, said: Laws, nodes: tuple[Constraint, ...], reader: Rewriter) -> dict[str, Any]:
     """All statements in coordinates, those of the text first."""
     return {
         "energies": tuple(r for e in (*network.energies, *said.energies) for r in _energy(e, reader)),
@@ -114,27 +114,27 @@ def _statements(network: Network, said: Laws, nodes: tuple[Constraint, ...], rea
     }
 
 
-def _energy(e: Energy, reader: Reader) -> Iterator[Energy]:
+def _energy(e: Energy, reader: Rewriter) -> Iterator[Energy]:
     for loops, (expression,) in reader.statement(e.loops, (e.expression,), e.place):
         yield replace(e, expression=_still(expression, e.expression, e.place), loops=loops)
 
 
-def _work(w: Work, reader: Reader) -> Iterator[Work]:
+def _work(w: Work, reader: Rewriter) -> Iterator[Work]:
     for loops, (effort, on) in reader.statement(w.loops, (w.effort, w.on), w.place):
         yield replace(w, effort=_still(effort, w.effort, w.place), on=on, loops=loops)
 
 
-def _constraint(c: Constraint, reader: Reader) -> Iterator[Constraint]:
+def _constraint(c: Constraint, reader: Rewriter) -> Iterator[Constraint]:
     for loops, (expression,) in reader.statement(c.loops, (c.expression,), c.place):
         yield replace(c, expression=_still(expression, c.expression, c.place), loops=loops)
 
 
-def _dynamic(d: Dynamic, reader: Reader) -> Iterator[Dynamic]:
+def _dynamic(d: Dynamic, reader: Rewriter) -> Iterator[Dynamic]:
     for loops, (expression,) in reader.statement(d.loops, (d.expression,), d.place):
         yield replace(d, expression=_still(expression, d.expression, d.place), loops=loops)
 
 
-def _expectation(e: Expectation, reader: Reader) -> Expectation:
+def _expectation(e: Expectation, reader: Rewriter) -> Expectation:
     within = None if e.within is None else reader.scalar(e.within, e.place)
     return replace(e, left=reader.scalar(e.left, e.place), right=reader.scalar(e.right, e.place), within=within)
 

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
-from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Choice, Law, conjugate, own
+from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Causality, Law, conjugate, own
 from sysdyn.compiler.network.primal.fields import field_quantities
 from sysdyn.compiler.network.primal.incidence import Element
 from sysdyn.compiler.network.primal.reading import FUNCTIONS
@@ -52,6 +52,7 @@ from sysdyn.dsl.model.network import (
     Work,
 )
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
+from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions
 from sysdyn.dsl.model.units import Unit, si
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
@@ -85,7 +86,7 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     found = Laws()
     slopes = Slopes(network)
     letters = dict(zip("efqp", "fepq" if reflected else "efqp", strict=True))
-    choices = [(e, Choice(e.branch, slopes, network.tables, e.name in wanted, letters)) for e in elements]
+    choices = [(e, Causality(e.branch, slopes, network.tables, e.name in wanted, letters)) for e in elements]
     chosen = [(e, choice.law()) for e, choice in choices]
     asked = read_functions(network)
     for (e, choice), (_, law) in zip(choices, chosen, strict=True):
@@ -111,12 +112,7 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
 
 def read_functions(network: Network) -> set[str]:
     """Families of branches a state function of which is read."""
-    roots = [o.expression for o in network.observations] + [d.expression for d in network.dynamics]
-    roots += [n for e in network.expectations for n in (e.left, e.right, e.within) if n is not None]
-    roots += [n for w in network.works for n in (w.effort, w.on)] + [c.expression for c in network.constraints]
-    roots += [e.expression for e in network.energies] + [c.ratio for c in network.couplings]
-    roots += [root for b in network.branches for root in (b.law, b.on) if root is not None]
-    roots += [n for i in network.initials for n in (i.target, i.value)]
+    roots = expressions(network, *EXPRESSIONS)
     return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] in FUNCTIONS}
 
 
@@ -142,10 +138,8 @@ def integrate_powers(elements: Sequence[Element], found: Laws, *, reflected: boo
 
 def _read_efforts(network: Network) -> set[str]:
     """Families whose effort a law or statement (not a trace) reads: a kinetic store's must then be no rate."""
-    roots = [root for b in network.branches for root in (b.law, b.on) if root is not None]
-    roots += [c.ratio for c in network.couplings] + [e.expression for e in network.energies]
-    roots += [w.effort for w in network.works] + [c.expression for c in network.constraints]
-    roots += [d.expression for d in network.dynamics]
+    sorts = "branches.law", "branches.on", "couplings", "energies", "works.effort", "constraints", "dynamics"
+    roots = expressions(network, *sorts)
     return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] == "be"}
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, without
-from sysdyn.dsl.model.expression import Node, index, sub, substitute
+from sysdyn.dsl.model.expression import Node, both, compare, conditional, const, index, sub, substitute
 from sysdyn.dsl.model.network import Initial, Loop
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 
@@ -46,13 +46,39 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
                 if not reach.holds(Interval(b.offset, b.offset)):
                     return None
                 continue
-            both = common(found[b.loop], reach.minus(b.offset))
-            if not both.size:
+            shared = common(found[b.loop], reach.minus(b.offset))
+            if not shared.size:
                 return None
-            found[b.loop] = both
+            found[b.loop] = shared
     except ModelError:
         return None
     return found, substitute(initial.value, change)
+
+
+def untold(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Iterator[Ranges]:
+    """The parts of the ranges in which no statement is about elements `at`."""
+    found = (meeting(initial, at, within, sizes) for initial in initials)
+    return beside(within, [m[0] for m in found if m is not None])
+
+
+def initially(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Node | None:
+    """What statements of one family, of which no two are about one element (`precedence`), say of its elements `at`:
+    the value over the ranges, zero where nothing is said; None where nothing is.
+    """
+    value: Node | None = None
+    for initial in initials:
+        found = meeting(initial, at, within, sizes)
+        if found is not None:
+            value = inside(found[0], within, found[1], value or const(0.0))
+    return value
+
+
+def inside(part: Ranges, within: Ranges, value: Node, other: Node) -> Node:
+    """The value in that part of the ranges, the other elsewhere."""
+    named = [(index(name), i) for name, i in part.items() if not i.holds(within[name])]
+    low = [compare("<=", i.first.node, k) for k, i in named]
+    high = [compare("<=", k, i.last.node) for k, i in named]
+    return conditional(both(*low, *high), value, other) if named else value
 
 
 def common(a: Interval, b: Interval) -> Interval:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from sysdyn.compiler.network.primal.balances import MULTIPLIER, WALK, ZERO, Effort
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Interval
 from sysdyn.compiler.network.primal.incidence import PLUS, Touch, unrolled
-from sysdyn.compiler.network.primal.reading import Range, Ranges, Reader
+from sysdyn.compiler.network.primal.reading import Range, Ranges, Rewriter
 from sysdyn.dsl.model.expression import Node, add, const, index, linear, neg, reduction, sub, var
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
@@ -46,7 +46,7 @@ class Potentials:
             self.efforts.setdefault(e.node, []).append(e)
         self._serial = 0
 
-    def read(self, reader: Reader, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
+    def read(self, reader: Rewriter, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
         """Effort of a node: against the reference, less that of the ground where this is not the reference."""
         effort = self.known(reader, node.data[0], node.args, ranges)
         value = self._raw(reader, effort, node.args, ranges)
@@ -54,14 +54,14 @@ class Potentials:
             value = sub(value, self._raw(reader, self.efforts[effort.ground][0], (), ranges))
         return reader.resolve(value, ranges, active)
 
-    def known(self, reader: Reader, name: str, at: tuple[Node, ...], ranges: Ranges) -> Effort:
+    def known(self, reader: Rewriter, name: str, at: tuple[Node, ...], ranges: Ranges) -> Effort:
         """How the effort of a node is read."""
         found = self.efforts.get(name, [])
         if not found:
             raise ModelError([Diagnostic("E409", f"node {name} touches no element: it has no effort", reader.place)])
         return found[reader.locate(name, at, [e.box for e in found], ranges)]
 
-    def _raw(self, reader: Reader, effort: Effort, at: tuple[Node, ...], ranges: Ranges) -> Node:
+    def _raw(self, reader: Rewriter, effort: Effort, at: tuple[Node, ...], ranges: Ranges) -> Node:
         """Effort against the component's reference."""
         if effort.how == MULTIPLIER:
             return var(effort.label, "mu", *at)
@@ -71,7 +71,7 @@ class Potentials:
         best = min(paths, key=lambda p: (p.kinetic, len(p.terms)))
         return add(best.base, *best.terms)
 
-    def _path(self, reader: Reader, effort: Effort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
+    def _path(self, reader: Rewriter, effort: Effort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
         terms: list[Node] = []
         visits: list[_Visit] = []
         kinetic = 0
@@ -94,7 +94,7 @@ class Potentials:
 
     def _run(
         self,
-        reader: Reader,
+        reader: Rewriter,
         visits: list[_Visit],
         start: _Visit,
         now: tuple[Effort, tuple[Node, ...]],

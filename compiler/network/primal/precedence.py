@@ -8,12 +8,15 @@ momentum and flow of one kinetic store or coordinate too.
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Sizes
-from sysdyn.compiler.network.primal.overlaps import beside, meeting, narrowed, ranges_of
+from sysdyn.compiler.network.primal.overlaps import narrowed, ranges_of, untold
 from sysdyn.dsl.model.network import Branch, Initial, Network
+from sysdyn.dsl.text.diagnostics import ModelError
 
 _SAME = {"p": "f", "np": "nf"}
 _OF_STORE = {("potential", "be"): "bq", ("kinetic", "bp"): "bf"}
@@ -60,18 +63,24 @@ class _Statements:
     def __init__(self, found: Sequence[_Ranked], sizes: Sizes) -> None:
         self.sizes = sizes
         self.running = [item for item in found if item[1].loops]
-        self.single: dict[tuple[int, ...], list[_Ranked]] = {}
-        for item in found:
-            if not item[1].loops:
-                self.single.setdefault(self._indices(item[1]), []).append(item)
+        single = [(self._reach(item[1])[0], item) for item in found if not item[1].loops]
+        single.sort(key=lambda pair: pair[0])
+        self.single = [item for _, item in single]
+        self.at = [at for at, _ in single]
 
-    def _indices(self, initial: Initial) -> tuple[int, ...]:
-        return tuple(self.sizes.bound(a, initial.place).value for a in initial.target.args)
+    def _reach(self, initial: Initial) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The least and the greatest of each index; all there is where a range follows another index."""
+        try:
+            within = ranges_of(initial.loops, self.sizes, initial.place)
+            box = [self.sizes.affine(a, within, initial.place).over(within) for a in initial.target.args]
+        except ModelError:
+            return (), (math.inf,)
+        return tuple(i.first.value for i in box), tuple(i.last.value for i in box)
 
     def before(self, one: _Ranked) -> list[Initial]:
-        """The statements that go before one where they are about its elements."""
-        single = [item for items in self.single.values() for item in items]
-        near = single if one[1].loops else self.single[self._indices(one[1])]
+        """The statements that go before one and may be about its elements."""
+        low, high = self._reach(one[1])
+        near = self.single[bisect_left(self.at, low) : bisect_right(self.at, high)]
         above = [other for k, other in (*self.running, *near) if _rank(k, other) < _rank(*one)]
         return [other for other in above if not one[1].fixed or other.depth < one[1].depth]
 
@@ -82,13 +91,6 @@ def _rank(k: int, initial: Initial) -> tuple[int, bool, int]:
 
 def _left(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """What no statement that goes before is about."""
-    if not others:
-        yield initial
-        return
     within = ranges_of(initial.loops, sizes, initial.place)
-    holes = [m[0] for other in others if (m := meeting(other, initial.target.args, within, sizes))]
-    if not initial.loops:
-        yield from () if holes else (initial,)
-        return
-    for rest in beside(within, holes):
+    for rest in untold(others, initial.target.args, within, sizes):
         yield replace(initial, loops=narrowed(initial.loops, rest))

@@ -1,7 +1,7 @@
 """Quantities of branches and nodes replaced by coordinates, multipliers and implicit unknowns.
 
 A family may be cut into pieces that read differently.  Where an index runs over several pieces, `resolve` raises
-`_StraddleError` with the cut, and whoever owns the loop (a statement or a sum) cuts it there and begins again.  Bounds
+`_BoxSplitError` with the cut, and whoever owns the loop (a statement or a sum) cuts it there and begins again.  Bounds
 stay symbolic, so a statement becomes as many loops as there are pieces, whatever their size.
 """
 
@@ -60,7 +60,7 @@ class Range:
 Ranges = Mapping[str, Range]
 
 
-class _StraddleError(Exception):
+class _BoxSplitError(Exception):
     """An index runs over two pieces: its loop is to be cut before `at`."""
 
     def __init__(self, loop: str, at: Bound, name: str) -> None:
@@ -69,7 +69,7 @@ class _StraddleError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class IndexBox:
     """Branches of a family that read alike."""
 
     box: Box
@@ -78,16 +78,16 @@ class Piece:
 
 
 @dataclass(slots=True)
-class Book:
+class EliminationTable:
     """All that is needed to read: pieces by family, efforts and momenta by element, contents by element.
 
     A content is the name of a constant, and whether that is a parameter.  functions: state functions by name.
     """
 
-    pieces: dict[str, list[Piece]]
+    pieces: dict[str, list[IndexBox]]
     efforts: dict[int, Node]
     momenta: dict[int, Node]
-    nodes: Callable[[Reader, Node, Ranges, tuple[Node, ...]], Node]
+    nodes: Callable[[Rewriter, Node, Ranges, tuple[Node, ...]], Node]
     contents: dict[int, tuple[str, bool]] = field(default_factory=dict)
     functions: dict[int, dict[str, Node]] = field(default_factory=dict)
     sticking: dict[str, tuple[str, ...]] = field(default_factory=dict)  # labels of what holds the branches of a family
@@ -98,10 +98,10 @@ def touches_network(root: Node) -> bool:
     return any(n.op == "var" and n.data[1] in KINDS for n in variables(root))
 
 
-class Reader:
+class Rewriter:
     """Resolves expressions of one network."""
 
-    def __init__(self, sizes: Sizes, book: Book) -> None:
+    def __init__(self, sizes: Sizes, book: EliminationTable) -> None:
         self.sizes = sizes
         self.book = book
         self.place: Place | None = None
@@ -130,7 +130,7 @@ class Reader:
                 return
         try:
             result = work(ranges)
-        except _StraddleError as found:
+        except _BoxSplitError as found:
             self._check(found, ranges)
             k = next(k for k, loop in enumerate(loops) if loop.index == found.loop)
             for part in _halves(loops[k], found.at):
@@ -143,7 +143,7 @@ class Reader:
         ((_, (resolved,)),) = self.statement((), (root,), place)
         return resolved
 
-    def _check(self, found: _StraddleError, ranges: Ranges) -> None:
+    def _check(self, found: _BoxSplitError, ranges: Ranges) -> None:
         if found.loop not in ranges or not ranges[found.loop].cuttable:
             text = f"{found.name} changes its meaning along {found.loop}, whose range follows another index"
             raise ModelError([Diagnostic("E806", f"{text}: it would have to be unrolled", self.place)])
@@ -181,7 +181,7 @@ class Reader:
             return const(0.0 if operator == "sum" else 1.0)
         try:
             return reduction(operator, name, *ends, self.resolve(body, {**ranges, name: own}, active))
-        except _StraddleError as found:
+        except _BoxSplitError as found:
             if found.loop != name:
                 raise
             self._check(found, {name: own})
@@ -236,31 +236,32 @@ class Reader:
             text = f"{to_text(node)}: the derivative of {cause} is not known"
             raise ModelError([Diagnostic("E518", text, self.place)]) from None
 
-    def _moving(self, node: Node, piece: Piece, ranges: Ranges, active: tuple[Node, ...]) -> Node:
+    def _moving(self, node: Node, piece: IndexBox, ranges: Ranges, active: tuple[Node, ...]) -> Node:
         """Displacement or flow of a branch."""
         kind, branch = node.data[1], piece.element.branch
-        if piece.member is not None:
-            m = piece.member
-            value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args)))
-            content = self.book.contents.get(piece.element.number)
-            if kind == "bf" or content is None:
-                return value
-            constant, fixed = content
-            return add(value, param(constant, *node.args) if fixed else var(constant, "s", *node.args))
         if branch.on is not None:
             value = self.at_piece(branch.on, piece, node.args)
             return self.resolve(value if kind == "bq" else self._derivative(value, node), ranges, active)
-        ends = [self._end(c, "n" + kind[1], piece, node.args) for c in piece.element.ends]
-        return self.resolve(sub(*ends), ranges, active)
+        if piece.member is not None:
+            m = piece.member
+            value = scale(m.sign, var(m.coordinate, kind[1], *m.indices(node.args)))
+        else:
+            ends = [self._end(c, "n" + kind[1], piece, node.args) for c in piece.element.ends]
+            value = self.resolve(sub(*ends), ranges, active)
+        content = self.book.contents.get(piece.element.number)
+        if kind == "bf" or content is None:
+            return value
+        constant, fixed = content
+        return add(value, param(constant, *node.args) if fixed else var(constant, "s", *node.args))
 
-    def _end(self, contact: Contact, kind: str, piece: Piece, at: tuple[Node, ...]) -> Node:
+    def _end(self, contact: Contact, kind: str, piece: IndexBox, at: tuple[Node, ...]) -> Node:
         """A quantity of the node at one end; that of a common-flow ground is zero."""
         if contact.node.startswith("#ground ") and kind != "ne":
             return const(0.0)
         loops = piece.element.loops_at(at)
         return var(contact.node, kind, *(a.at(loops) for a in contact.at))
 
-    def at_piece(self, root: Node, piece: Piece, at: tuple[Node, ...]) -> Node:
+    def at_piece(self, root: Node, piece: IndexBox, at: tuple[Node, ...]) -> Node:
         """An expression over an element's loops at the indices of its name; sums inside get variables of their own."""
         change = {index(name): node for name, node in piece.element.loops_at(at).items()}
         return substitute(self._renamed(root), change)
@@ -286,13 +287,13 @@ class Reader:
         """Indices as affine forms."""
         return tuple(self.sizes.affine(node, ranges.keys(), self.place) for node in at)
 
-    def piece(self, name: str, at: tuple[Node, ...], ranges: Ranges) -> Piece:
+    def piece(self, name: str, at: tuple[Node, ...], ranges: Ranges) -> IndexBox:
         """The piece of a branch family that a reference lies in."""
         pieces = self.book.pieces.get(name, [])
         return pieces[self.locate(name, at, [p.box for p in pieces], ranges)]
 
     def locate(self, name: str, at: tuple[Node, ...], boxes: Sequence[Box], ranges: Ranges) -> int:
-        """The box that holds a reference; _StraddleError where it runs over several, E805 where over none."""
+        """The box that holds a reference; _BoxSplitError where it runs over several, E805 where over none."""
         places = self.affine(at, ranges)
         held = {loop: r.interval for loop, r in ranges.items()}
         reach = tuple(a.over(held) for a in places)
@@ -305,7 +306,7 @@ class Reader:
                 k = next(k for k, (b, r) in enumerate(zip(box, reach, strict=True)) if not b.holds(r))
                 loop = places[k].loop
                 assert loop is not None
-                raise _StraddleError(loop, box[k].last.plus(1).minus(places[k].offset), name)
+                raise _BoxSplitError(loop, box[k].last.plus(1).minus(places[k].offset), name)
         text = ", ".join(str(i.first.value) for i in reach)
         raise ModelError([Diagnostic("E805", f"{name}[{text}] is outside its range", self.place)])
 

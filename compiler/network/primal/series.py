@@ -1,7 +1,7 @@
 """Rule P2: one displacement coordinate per series class of branches of common-effort domains.
 
-Two branches that meet at a node of degree 2 carry the same flow, the sense kept.  The relation is followed by index
-classes (`alike`); a node of degree 2 that they cannot follow keeps its row, which says the same.  A node that a law
+Two branches that meet at a node of degree 2 carry the same flow, the sense kept.  The relation is followed by
+`index_classes`; a node of degree 2 that they cannot follow keeps its row, which says the same.  A node that a law
 reads keeps its row because its multiplier is what is read.
 
 Received: the incidence and the names of nodes that are read.  Returned: coordinates, for each element the members of
@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.alike import Cell, End, Likeness, Link
 from sysdyn.compiler.network.primal.bounds import Bound, Box, number, parts, shape_of, union
 from sysdyn.compiler.network.primal.incidence import Element, Incidence, NodeCell, Touch, ground
+from sysdyn.compiler.network.primal.index_classes import Cell, End, IndexClasses, Link
 from sysdyn.dsl.model.expression import Node, add
 from sysdyn.dsl.model.network import Coordinate, Shape
 from sysdyn.values import dataclass
@@ -65,7 +65,7 @@ def series(incidence: Incidence, read: frozenset[str]) -> Series:
     number_of = {e.number: k for k, e in enumerate(flowing)}
     while True:
         links = [_link(cell, number_of) for cell in candidates]
-        likeness = Likeness([e.box for e in flowing], links)
+        likeness = IndexClasses([e.box for e in flowing], links)
         if not likeness.refused:
             break
         plain = {_key(link) for link in likeness.refused}
@@ -124,7 +124,7 @@ class _Class:
     kept: tuple[int, ...]  # indices of the leader's name that the coordinate has
 
 
-def _classes(flowing: Sequence[Element], likeness: Likeness) -> tuple[tuple[Coordinate, ...], tuple[Member, ...]]:
+def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[Coordinate, ...], tuple[Member, ...]]:
     classes = sorted((_class(m, flowing, likeness) for m in likeness.groups().values()), key=lambda c: c.leader)
     named = [_family(c, flowing, likeness) for c in classes]
     plain = [(name, box) for name, box, whole in named if whole]
@@ -150,7 +150,7 @@ def _unused(name: str, taken: set[str]) -> str:
     return next(n for k in range(2, len(taken) + 3) if (n := f"{name}.{k}") not in taken)
 
 
-def _class(members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness: Likeness) -> _Class:
+def _class(members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness: IndexClasses) -> _Class:
     """The leader is the first potential store, else the first branch; runs lose the index they run along."""
     stores = [m for m in members if flowing[m[0][0]].branch.kind == "potential"]
     leader, sign = (stores or members)[0]
@@ -162,11 +162,11 @@ def _class(members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness
     return _Class(leader, sign, tuple(members), kept)
 
 
-def _tied(cell: Cell, likeness: Likeness) -> bool:
+def _tied(cell: Cell, likeness: IndexClasses) -> bool:
     return any(likeness.collapsed(cell, likeness.axis(cell[0], d)[0], k) for d, k in enumerate(cell[1]))
 
 
-def _family(c: _Class, flowing: Sequence[Element], likeness: Likeness) -> tuple[str, Box, bool]:
+def _family(c: _Class, flowing: Sequence[Element], likeness: IndexClasses) -> tuple[str, Box, bool]:
     element = flowing[c.leader[0]]
     box = _named(element, likeness.box(c.leader))
     return element.name, box, len(c.kept) == len(element.at)
@@ -183,7 +183,7 @@ def _coordinate(name: str, shape: Shape, leader: Element) -> Coordinate:
     return Coordinate(name, shape, False, d.displacement, d.flow, d.momentum, d.effort, None, leader.branch.place)
 
 
-def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: Likeness) -> Iterable[Member]:
+def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexClasses) -> Iterable[Member]:
     leader = flowing[c.leader[0]]
     first = likeness.box(c.leader)
     for cell, sign in c.members:

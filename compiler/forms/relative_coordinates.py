@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from sysdyn.compiler.model.energies import EnergyModel, Family, Row, tangible
-from sysdyn.compiler.model.terms import Nest, Term, has_reduction, local_variables, vanishes
+from sysdyn.compiler.model.energies import EnergyModel, Family, tangible
+from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -29,6 +29,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
+from sysdyn.dsl.model.joined import Joined
 from sysdyn.values import dataclass
 
 
@@ -48,7 +49,7 @@ _Anchors = Mapping[str, _Anchor]
 """By family, the anchor itself among them."""
 
 
-def anchored(model: EnergyModel) -> EnergyModel:
+def in_relative_coordinates(model: EnergyModel) -> EnergyModel:
     """The model with every group of floating coordinates counted from one of them."""
     change: dict[str, _Anchor] = {}
     for group in _groups(model):
@@ -60,20 +61,14 @@ def anchored(model: EnergyModel) -> EnergyModel:
 
 def _groups(model: EnergyModel) -> Iterator[list[Family]]:
     """Families of coordinates that terms of T* join, in the order of the model."""
-    m = model.mirror
-    of = {c.name: {c.name} for c in model.coordinates}
-    massive: set[str] = set()
-    for term in model.function(m.coenergy):
-        names = {n.data[0] for n in local_variables(term.expression, m.rate)}
-        massive |= names
-        joined: set[str] = set().union(*(of[name] for name in names))
-        for name in joined:
-            of[name] = joined
-    seen: set[str] = set()
+    joined, groups = Joined[str](), dict[str, list[Family]]()
+    for term in model.function(model.mirror.coenergy):
+        names = [n.data[0] for n in local_variables(term.expression, model.mirror.rate)]
+        for name in names:
+            joined.join(names[0], name)
     for c in model.coordinates:
-        if c.name in massive and c.name not in seen and len(of[c.name]) > 1:
-            seen |= of[c.name]
-            yield [k for k in model.coordinates if k.name in of[c.name]]
+        groups.setdefault(joined.first(c.name), []).append(c)
+    return (group for group in groups.values() if len(group) > 1)
 
 
 def _anchors(model: EnergyModel, group: list[Family]) -> _Anchors:
@@ -180,11 +175,7 @@ def _meet(a: tuple[tuple[Node, Node], ...], b: tuple[tuple[Node, Node], ...]) ->
 def _unknowns(model: EnergyModel) -> Iterable[Node]:
     """Every variable of a coordinate that any statement reads."""
     names = {c.name for c in model.coordinates}
-    roots = [t.expression for name in model.functions for t in model.function(name)]
-    roots += [t.expression for row in model.rows for t in row.terms]
-    roots += [n for w in model.works for n in (w.effort, w.on)] + [q.expression for q in model.quantities]
-    roots += [n for i in model.initials for n in (i.target, i.value)]
-    return (n for root in roots for n in variables(root) if n.op == "var" and n.data[0] in names)
+    return (n for root in model.expressions() for n in variables(root) if n.op == "var" and n.data[0] in names)
 
 
 def _changed(model: EnergyModel, change: _Anchors) -> EnergyModel:
@@ -198,19 +189,6 @@ def _changed(model: EnergyModel, change: _Anchors) -> EnergyModel:
             pairs[n] = add(n, var(anchor.name, n.data[1], *anchor.at(n.args), order=n.data[2]))
         return substitute(root, pairs) if pairs else root
 
-    def terms(old: tuple[Term, ...]) -> tuple[Term, ...]:
-        return tuple(replace(t, expression=new(t.expression)) for t in old)
-
-    def row(old: Row) -> Row:
-        return replace(old, terms=terms(old.terms))
-
-    found = replace(
-        model,
-        functions={name: terms(pieces) for name, pieces in model.functions.items()},
-        works=tuple(replace(w, effort=new(w.effort), on=new(w.on)) for w in model.works),
-        rows=tuple(row(r) for r in model.rows),
-        initials=tuple(replace(i, target=new(i.target), value=new(i.value)) for i in model.initials),
-        quantities=tuple(replace(q, expression=new(q.expression)) for q in model.quantities),
-    )
+    found = model.rewritten(new)
     touched = tangible(found)
     return replace(found, coordinates=tuple(replace(c, tangible=c.name in touched) for c in found.coordinates))

@@ -7,7 +7,7 @@ neighbours (a run: `R[i]: m[i-1] -> m[i]`).  All ends of intervals cut the axes,
 intervals, all elements are alike.  Cells are then united; an axis along which the elements of a cell are all tied
 together is *collapsed* there.
 
-Received: items, links.  Returned: a Likeness; links that this method cannot follow are in `refused`.
+Received: items, links.  Returned: a IndexClasses; links that this method cannot follow are in `refused`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class _Option:
     axis: Key | None
 
 
-class Likeness:
+class IndexClasses:
     """Cells of items and the groups that they form."""
 
     def __init__(self, items: Sequence[Box], links: Sequence[Link], cuts: Iterable[Cut] = ()) -> None:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from sysdyn.compiler.network.primal.bounds import Box, Sizes
 from sysdyn.compiler.network.primal.contents import held_at, meet
 from sysdyn.compiler.network.primal.overlaps import Ranges, beside, meeting, narrowed, ranges_of
-from sysdyn.compiler.network.primal.reading import Reader
+from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
 from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
 
@@ -22,7 +22,7 @@ _SAYING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 
 
 def measured(
-    network: Network, initials: Sequence[Initial], sizes: Sizes, reader: Reader, *, reflected: bool
+    network: Network, initials: Sequence[Initial], sizes: Sizes, reader: Rewriter, *, reflected: bool
 ) -> tuple[tuple[Initial, ...], frozenset[str]]:
     """One guess for the stores of a statement that are measured by their contents; the stores all of whose guesses by
     the text are among them.
@@ -65,29 +65,29 @@ def _over(node: Node, loops: Sequence[Loop], sizes: Sizes, b: Branch) -> Box:
 def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """Guesses of the contents of a statement's elements: by the text, and zero where it guesses nothing.
 
-    Left out is what it guesses in words that tell no content; where a content is fixed, zero is one guess like another.
+    Left out is what it guesses in words that tell no content; what is fixed is guessed as well.
     """
     within, told = ranges_of(b.loops, sizes, b.place), list[Ranges]()
-    for initial in (i for i in initials if _guesses(i, b)):
+    for initial in (i for i in initials if _tells(i, b)):
         found = meeting(initial, b.at, within, sizes)
         if found is None:
             continue
         told.append(found[0])
-        content = held_at(b, initial.target.data[1], found[1])
+        content, fixed = held_at(b, initial.target.data[1], found[1]), initial.fixed
         if content is not None:
-            yield replace(initial, value=content, loops=narrowed(b.loops, found[0]))
+            yield replace(initial, value=content, loops=narrowed(b.loops, found[0]), fixed=False, said=not fixed)
     zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
     yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in beside(within, told))
 
 
-def _guesses(i: Initial, b: Branch) -> bool:
-    """Whether an initial condition guesses what a store holds."""
-    if i.fixed or i.target.op != "var" or i.target.data[0] != b.name:
+def _tells(i: Initial, b: Branch) -> bool:
+    """Whether an initial condition is about what a store holds."""
+    if i.target.op != "var" or i.target.data[0] != b.name:
         return False
     return i.target.data[1] in _SAYING[b.kind] and not i.target.data[2]
 
 
-def _contents(b: Branch, loops: tuple[Loop, ...], reader: Reader) -> Iterator[tuple[tuple[Loop, ...], Node]]:
+def _contents(b: Branch, loops: tuple[Loop, ...], reader: Rewriter) -> Iterator[tuple[tuple[Loop, ...], Node]]:
     """The contents of the elements of a statement over these loops, in coordinates."""
     content = var(b.name, _CONTENT[b.kind], *b.at)
     return reader.cut(loops, b.place, lambda ranges: reader.resolve(content, ranges))
