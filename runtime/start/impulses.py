@@ -69,7 +69,7 @@ class Impulses:
 
         aims [rows]: what the constraints on flows shall be; None: zero.
         """
-        y, start = y.copy(), y.copy()
+        y, start = self._sloping(t, y, yd, magnitude), y.copy()
         impulse = np.zeros(y.size)
         use = self._flows() | self._state_rows | self._balance
         acts = self._impulse.copy()
@@ -94,6 +94,14 @@ class Impulses:
             y[self._moving] += step[self._moving]
             impulse[self._impulse] += step[self._impulse]
         return y, impulse
+
+    def _sloping(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
+        """Y with implicit efforts at their magnitudes where their laws are flat: a flat one decides about the flows."""
+        steepest = np.zeros(y.size)
+        jy, _ = self.system.jacobian(t, y, yd)
+        mine = self._state_rows[self._rows]
+        np.maximum.at(steepest, self._columns[mine], np.abs(jy[mine]))
+        return np.where((self.system.kinds == "e") & (steepest == 0.0), y + magnitude, y)
 
     def _solve(self, value: Floats, aim: Floats, number: NDArray[np.int64], magnitude: Floats) -> Floats:
         """Least change of the columns that take part."""

@@ -1,7 +1,7 @@
 """Across an instant at which the text of the model jumps: the state is kept, what follows from it is found anew.
 
 Displacements, momenta, flows with inertia and dynamic variables keep their values unless a constraint forces them
-(impulses.py); multipliers, implicit efforts, flows without inertia and rates are solved for on the far side.
+(impulses.py, displacements.py); multipliers, implicit efforts, flows without inertia and rates are found behind it.
 """
 
 from __future__ import annotations
@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import Problem, solve
+from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.start.displacements import Displacements
 from sysdyn.runtime.start.impulses import Impulses, group_rows
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 
 STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
+GUESSES = (0.0, *(sign * size for size in (1.0, 0.1, 1e-2, 1e-3, 10.0) for sign in (1.0, -1.0)))
+"""Of their magnitudes: what flows without inertia and implicit efforts are moved by before a state is."""
 EXACT = 1e-9
 """Scaled residual with which the slower search is content."""
 
@@ -25,11 +29,17 @@ def still(
     settler: Settler, t: float, point: tuple[Floats, Floats], state: NDArray[np.bool_], magnitude: Floats
 ) -> tuple[Floats, Floats] | None:
     """Y, yd [unknowns as written] settled at t where no state [unknowns] moves for it; None where one does."""
-    y, yd = point
+    found, moved = _held(settler, t, point, magnitude)
+    return None if found is None or moved[state].any() else found
+
+
+def _held(
+    settler: Settler, t: float, point: tuple[Floats, Floats], magnitude: Floats
+) -> tuple[tuple[Floats, Floats] | None, NDArray[np.bool_]]:
+    """The point settled at t with the state held as far as it may be (None: it does not settle), and what moves."""
     settler.core.contents.ready = 0
-    found, rate, done = settler.held(t, y, yd)
-    stays = done and bool((np.abs(found - y)[state] <= STILL * magnitude[state]).all())
-    return (found, rate) if stays else None
+    found, rate, done = settler.held(t, *point)
+    return (found, rate) if done else None, ~(np.abs(found - point[0]) <= STILL * magnitude)
 
 
 class Restart:
@@ -39,6 +49,7 @@ class Restart:
         self.settler, self.state = settler, state
         self.impulses = Impulses(settler.system)
         self._starter: Starter | None = None
+        self._displacements: Displacements | None = None
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
@@ -49,11 +60,17 @@ class Restart:
         """The same with the impulses [unknowns as written] that took the flows there."""
         magnitude = self.magnitude(y.size)
         impulse = np.zeros(y.size)
-        same = still(self.settler, t, (y, yd), self.state, magnitude)
-        if same is not None:  # no state need jump: there is no impulse
+        same, moved = _held(self.settler, t, (y, yd), magnitude)
+        moved &= self.state
+        if same is not None and not moved.any():  # no state need jump: there is no impulse
             return *same, impulse
+        if same is None or moved[self.settler.system.kinds == "q"].any():
+            y = self._displaced(t, y, yd, magnitude)
         if self.impulses.broken(t, y, yd, magnitude):
             y, impulse = self.impulses.after(t, y, yd, magnitude)
+        kept = self._kept(t, y, yd, magnitude)
+        if kept is not None:
+            return *kept, impulse
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
         for hold in (HELD, 1.0):
             self.settler.core.contents.ready = 0
@@ -62,6 +79,26 @@ class Restart:
                 return found, rate, impulse
         searched = self._search(t, y, yd, magnitude)
         return None if searched is None else (*searched, impulse)
+
+    def _kept(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
+        """The point settled without a move of the state, searched from flows and efforts of either sign and several
+        sizes: at rest a law may be flat, and a state that moves is then the nearest way out, though nothing forces it.
+        """
+        follows = np.isin(self.settler.system.kinds, ("f", "e")) & ~self.state
+        for part in GUESSES if follows.any() else GUESSES[:1]:
+            found, moved = _held(self.settler, t, (np.where(follows, y + part * magnitude, y), yd), magnitude)
+            if found is not None and not moved[self.state].any():
+                return found
+        return None
+
+    def _displaced(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
+        """Y with its displacements behind the jump; as it is where slopes have no bound."""
+        if self._displacements is None:
+            self._displacements = Displacements(self.settler.system)
+        try:
+            return self._displacements.after(t, y, yd, magnitude, self._rates(magnitude))
+        except NotFiniteError:
+            return y
 
     def _rates(self, magnitude: Floats) -> Floats:
         """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""

@@ -44,27 +44,30 @@ def _rates(settled: System) -> Ints:
     return np.flatnonzero(used).astype(np.int32)
 
 
-def inertial_rates(settled: System) -> NDArray[np.bool_]:
-    """Rows [rows] that are rates of balances with inertia: a point does not know them.  A momentum that nothing moves
-    with is none.
-    """
+def inertial_rows(settled: System) -> NDArray[np.bool_]:
+    """Rows [rows] that hold a rate of inertia, balances among them.  A momentum that nothing moves with is none."""
     pattern, groups = settled.pattern, settled.form.groups
-    size = {family: settled.description.rows[family].size for _, family, _ in groups}
     momentum = np.zeros(settled.rows, dtype=bool)
     for group, family, first in groups:
-        momentum[first : first + size[family]] |= group == "momentum"
+        momentum[first : first + settled.description.rows[family].size] |= group == "momentum"
     in_y, in_rate = settled.structural()
     columns = pattern.columns_of()
     alone = in_y & momentum[pattern.row]
     alone &= (np.bincount(pattern.row[alone], minlength=settled.rows) == 1)[pattern.row]
-    inertial = np.zeros(settled.rows, dtype=bool)
-    inertial[pattern.row[in_rate & ~np.isin(columns, columns[alone])]] = True
+    found = np.zeros(settled.rows, dtype=bool)
+    found[pattern.row[in_rate & ~np.isin(columns, columns[alone])]] = True
+    return found
+
+
+def inertial_rates(settled: System) -> NDArray[np.bool_]:
+    """Rows [rows] that are rates of balances with inertia: a point does not know them."""
+    inertial, groups = inertial_rows(settled), settled.form.groups
     balances = {family: first for group, family, first in groups if group == "dynamics"}
     mask = np.zeros(settled.rows, dtype=bool)
     for group, family, first in groups:
         if group == "dynamics_rate":
-            own = balances[family]
-            mask[first : first + size[family]] = inertial[own : own + size[family]]
+            own, size = balances[family], settled.description.rows[family].size
+            mask[first : first + size] = inertial[own : own + size]
     return mask
 
 
