@@ -6,18 +6,17 @@ stay implicit and multipliers (impulses E, Lambda):
 
     dF/df dq + dF/de E + dF/dkappa Lambda = 0    of balances F without inertia, of psi and gamma alike
 
-while every settled row holds behind it: the limit of a fast rise.  So no charge passes a resistor at once, and a damper
-takes along what hangs on it.
+while what holds between displacements and efforts holds behind it: the limit of a fast rise.  So no charge passes a
+resistor at once, and a damper takes along what hangs on it.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import Mask, System
 from sysdyn.runtime.numerics.least_change import least_norm
-from sysdyn.runtime.start.settled import inertial_rows, rates_of
+from sysdyn.runtime.start.settled import inertial_rows
 
 FOLLOWS = ("f", "p", "e", "kappa", "mu")
 FORCES = ("e", "kappa", "mu")
@@ -29,31 +28,32 @@ _ITERATIONS = 3
 class Displacements:
     """settled: the System in form "settled".
 
-    Unknowns of the jump: y, the rates that occur, impulses of FORCES.  Rows: the settled ones, balances of the instant.
+    Unknowns of the jump: y, impulses of FORCES.  Rows: the settled ones without flows and rates, by which those are
+    found; the balances of the instant.
     """
 
     def __init__(self, settled: System) -> None:
         self.system, n = settled, settled.unknowns
         pattern, form = settled.pattern, settled.another("3").form
         self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
-        self.rates = rates_of(settled)
-        self.moves = n + self.rates.size
         kinds = settled.kinds
         self._follows, self._places = np.isin(kinds, FOLLOWS), kinds == "q"
         forces = np.isin(kinds, FORCES)
-        self._rate = _numbered(n, self.rates, n)
-        self._impulse = _numbered(n, np.flatnonzero(forces), self.moves)
-        self.number = self.moves + int(forces.sum())
+        self._impulse = np.where(forces, n + np.cumsum(forces) - 1, -1)
+        self.number = n + int(forces.sum())
         self._moved = np.full(n, -1, dtype=np.int64)
         self._moved[form.k_f] = form.k_q
         self._flows = self._moved >= 0
-        self._given = ~settled.of_groups("initial")
-        self._summed = settled.of_groups("dynamics", "psi", "gamma") & ~inertial_rows(settled)
+        inertial, (in_y, in_rate) = inertial_rows(settled), settled.structural()
+        self._summed = settled.of_groups("dynamics", "psi", "gamma") & ~inertial
+        answered = inertial.copy()
+        answered[self._row[in_rate | (in_y & self._flows[self._column])]] = True
+        self._given = settled.of_groups("phi", "dynamics", "gamma") & ~answered
 
-    def after(self, t: float, y: Floats, yd: Floats, magnitude: Floats, rate: Floats) -> Floats:
+    def after(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
         """Y with the displacements behind the jump at t; as it is where nothing resists an impulse of flow.
 
-        magnitude, rate [unknowns]: of y and yd.  Raises NotFiniteError.
+        magnitude [unknowns]: of y.  Raises NotFiniteError.
         """
         fast = np.where(self._flows, y + magnitude, y)
         resisting, forced, slope = self._instant(t, y, yd, fast)
@@ -64,28 +64,22 @@ class Displacements:
         rows = np.concatenate([place[self._row[resisting]], place[self._row[forced]]])
         columns = np.concatenate([through, force])
         slopes = np.concatenate([slope[resisting], slope[forced]])
-        scale = self._scale(magnitude, rate)
+        scale = np.append(magnitude * np.where(self._follows, LOOSE, 1.0), np.ones(self.number - y.size))
         most = np.zeros(self.number)
         np.maximum.at(most, force, np.abs(slope[forced]))
         scale[most > 0.0] = 1.0 / most[most > 0.0]
-        now, now_d = np.where(self._flows & self._follows, fast, y), yd.copy()  # a law may be flat at rest
+        now = y.copy()
         aim = np.zeros(self.system.rows + int(self._summed.sum()))
         for _ in range(_ITERATIONS):
-            i, j, v = self._settled(t, now, now_d)
-            i, j, v = np.append(i, rows), np.append(j, columns), np.append(v, slopes)
+            here = self._given[self._row]
+            i, j = np.append(self._row[here], rows), np.append(self._column[here], columns)
+            v = np.append(self.system.jacobian(t, now, yd)[0][here], slopes)
             aim[:] = 0.0
-            aim[: self.system.rows] = np.where(self._given, -self.system.residual(t, now, now_d), 0.0)
+            aim[: self.system.rows] = np.where(self._given, -self.system.residual(t, now, yd), 0.0)
             np.add.at(aim, rows[: through.size], -slope[resisting] * (now - y)[through])
             step = scale * least_norm((aim.size, self.number), (i, j, v * scale[j]), aim)
-            now, now_d[self.rates] = now + step[: y.size], now_d[self.rates] + step[y.size : self.moves]
+            now = now + step[: y.size]
         return np.where(self._places, now, y)
-
-    def _scale(self, magnitude: Floats, rate: Floats) -> Floats:
-        """Of the unknowns of the jump."""
-        found = np.ones(self.number)
-        found[: magnitude.size] = magnitude * np.where(self._follows, LOOSE, 1.0)
-        found[magnitude.size : self.moves] = LOOSE * rate[self.rates]
-        return found
 
     def _instant(self, t: float, y: Floats, yd: Floats, fast: Floats) -> tuple[Mask, Mask, Floats]:
         """Entries of the balances of the instant that resist a flow, and those of forces; slopes [entries] at `fast`,
@@ -98,21 +92,3 @@ class Displacements:
         summed[self.system.held[0]] = False
         here = summed[self._row] & (slope != 0.0)
         return here & self._flows[self._column], here & (self._impulse[self._column] >= 0), slope
-
-    def _settled(self, t: float, y: Floats, yd: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-        """Entries of the settled rows."""
-        jy, jyd = self.system.jacobian(t, y, yd)
-        here = self._given[self._row] & (jy != 0.0)
-        with_rate = self._given[self._row] & (self._rate[self._column] >= 0) & (jyd != 0.0)
-        return (
-            np.append(self._row[here], self._row[with_rate]),
-            np.append(self._column[here], self._rate[self._column[with_rate]]),
-            np.append(jy[here], jyd[with_rate]),
-        )
-
-
-def _numbered(n: int, places: NDArray[np.integer], first: int) -> NDArray[np.int64]:
-    """Numbers from `first` on at these places, -1 elsewhere [n]."""
-    found = np.full(n, -1, dtype=np.int64)
-    found[places] = first + np.arange(places.size)
-    return found

@@ -96,7 +96,7 @@ class Restart:
         if self._displacements is None:
             self._displacements = Displacements(self.settler.system)
         try:
-            return self._displacements.after(t, y, yd, magnitude, self._rates(magnitude))
+            return self._displacements.after(t, y, yd, magnitude)
         except NotFiniteError:
             return y
 

@@ -103,3 +103,35 @@ def test_a_damper_takes_along_what_hangs_on_it(tmp_path, formulation):
     trace = trace_of(tmp_path, DAMPER, formulation=formulation)
     late = trace.time > 0.5
     assert np.abs(trace["v"].values[late] - np.exp(-2.5 * (trace.time[late] - 0.5))).max() < 3e-9
+
+
+LADDER = """from std.electrical import resistor, capacitor
+model ladder {
+  param n = 300
+  node v[0..n]: electrical
+  source: effort(e = 1 V*step(t - 0.5 s)) v[0] -> ground
+  C0: capacitor(C = 0.1 F) v[0] -> ground
+  for i in 1..n {
+    R[i]: resistor(R = 1 ohm / n) v[i - 1] -> v[i]
+    C[i]: capacitor(C = 1 F / n) v[i] -> ground
+    init C[i].e = 0 V
+  }
+}
+scene s of ladder {
+  time 0 s to 1 s
+  accuracy 1e-9
+  trace v[n/2].e as half, v[n].e as whole every 0.5 s
+}
+"""
+
+
+def test_beside_a_ladder_nothing_jumps(tmp_path):
+    """Its voltages by the eigenvectors of its rates."""
+    n = 300
+    rates = n**2 * (np.diag(np.full(n - 1, 1.0), 1) + np.diag(np.full(n - 1, 1.0), -1) - 2.0 * np.eye(n))
+    rates[-1, -1] = -(n**2)
+    value, vector = np.linalg.eigh(rates)
+    voltages = vector @ (np.expm1(0.5 * value) / value * vector[0] * n**2)
+    trace = trace_of(tmp_path, LADDER, formulation="lagrangian")
+    assert trace["half"].values[-1] == pytest.approx(voltages[n // 2 - 1], rel=3e-9)
+    assert trace["whole"].values[-1] == pytest.approx(voltages[-1], rel=3e-9)
