@@ -4,7 +4,8 @@ A step of an effort across a capacitor moves charge at once, a step of a positio
 inertia moves by an impulse of flow, dq = the integral of f, in which finite terms do not count; so do efforts e that
 stay implicit and multipliers (impulses E, Lambda):
 
-    dF/df dq + dF/de E + dF/dkappa Lambda = 0    of balances F without inertia, of psi and gamma alike
+    dF/df dq + dF/de E + dF/dkappa Lambda = 0    of balances F without inertia, of psi and gamma alike,
+    M dq = 0                                     of those with inertia, and of momenta p - M f,
 
 while what holds between displacements and efforts holds behind it: the limit of a fast rise.  So no charge passes a
 resistor at once, and a damper takes along what hangs on it.
@@ -46,6 +47,13 @@ class Displacements:
         self._flows = self._moved >= 0
         inertial, (in_y, in_rate) = inertial_rows(settled), settled.structural()
         self._summed = settled.of_groups("dynamics", "psi", "gamma") & ~inertial
+        flow, momentum = self._flows[self._column], settled.of_groups("momentum")[self._row]
+        self._heavy = in_rate & flow & (settled.of_groups("dynamics") & inertial)[self._row]
+        self._carried = in_y & flow & momentum
+        instant = self._summed.copy()
+        instant[self._row[self._heavy | self._carried]] = True
+        self._place = settled.rows + np.cumsum(instant) - 1
+        self.rows = settled.rows + int(instant.sum())
         answered = inertial.copy()
         answered[self._row[in_rate | (in_y & self._flows[self._column])]] = True
         self._given = settled.of_groups("phi", "dynamics", "gamma") & ~answered
@@ -55,40 +63,38 @@ class Displacements:
 
         magnitude [unknowns]: of y.  Raises NotFiniteError.
         """
-        fast = np.where(self._flows, y + magnitude, y)
-        resisting, forced, slope = self._instant(t, y, yd, fast)
+        resisting, forced, slope = self._instant(t, y, yd, magnitude)
         if not resisting.any():
             return y
-        place = self.system.rows + np.cumsum(self._summed) - 1
         through, force = self._moved[self._column[resisting]], self._impulse[self._column[forced]]
-        rows = np.concatenate([place[self._row[resisting]], place[self._row[forced]]])
-        columns = np.concatenate([through, force])
-        slopes = np.concatenate([slope[resisting], slope[forced]])
+        rows = self._place[np.append(self._row[resisting], self._row[forced])]
+        columns, slopes = np.append(through, force), np.append(slope[resisting], slope[forced])
         scale = np.append(magnitude * np.where(self._follows, LOOSE, 1.0), np.ones(self.number - y.size))
         most = np.zeros(self.number)
         np.maximum.at(most, force, np.abs(slope[forced]))
         scale[most > 0.0] = 1.0 / most[most > 0.0]
-        now = y.copy()
-        aim = np.zeros(self.system.rows + int(self._summed.sum()))
+        now, here = y.copy(), self._given[self._row]
         for _ in range(_ITERATIONS):
-            here = self._given[self._row]
+            aim = np.zeros(self.rows)
+            aim[: self._given.size] = np.where(self._given, -self.system.residual(t, now, yd), 0.0)
+            np.add.at(aim, rows[: through.size], -slope[resisting] * (now - y)[through])
             i, j = np.append(self._row[here], rows), np.append(self._column[here], columns)
             v = np.append(self.system.jacobian(t, now, yd)[0][here], slopes)
-            aim[:] = 0.0
-            aim[: self.system.rows] = np.where(self._given, -self.system.residual(t, now, yd), 0.0)
-            np.add.at(aim, rows[: through.size], -slope[resisting] * (now - y)[through])
-            step = scale * least_norm((aim.size, self.number), (i, j, v * scale[j]), aim)
+            step = scale * least_norm((self.rows, self.number), (i, j, v * scale[j]), aim)
             now = now + step[: y.size]
         return np.where(self._places, now, y)
 
-    def _instant(self, t: float, y: Floats, yd: Floats, fast: Floats) -> tuple[Mask, Mask, Floats]:
-        """Entries of the balances of the instant that resist a flow, and those of forces; slopes [entries] at `fast`,
-        whose flows are large as those of an impulse are.
+    def _instant(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Mask, Mask, Floats]:
+        """Entries of the balances of the instant that resist a flow, and those of forces; slopes [entries] at flows as
+        large as those of an impulse.
         """
-        slope = self.system.jacobian(t, fast, yd)[0]
+        slope, inertia = self.system.jacobian(t, np.where(self._flows, y + magnitude, y), yd)
         at_rest = self.system.jacobian(t, y, yd)[0]
         slope = np.where(np.isfinite(slope), slope, np.where(np.isfinite(at_rest), at_rest, 0.0))
+        slope = np.where(self._heavy, inertia, slope)
         summed = self._summed.copy()
         summed[self.system.held[0]] = False
-        here = summed[self._row] & (slope != 0.0)
-        return here & self._flows[self._column], here & (self._impulse[self._column] >= 0), slope
+        here = summed[self._row]
+        resisting = (here & self._flows[self._column]) | self._heavy | self._carried
+        forced = here & (self._impulse[self._column] >= 0)
+        return resisting & (slope != 0.0), forced & (slope != 0.0), slope

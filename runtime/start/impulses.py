@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import Mask, System
 from sysdyn.runtime.numerics.least_change import least_norm
+from sysdyn.runtime.numerics.rank import count, decomposed, least_squares
 
 BROKEN = 1e-10
 """Scaled residual of a constraint row above which its constraint has jumped."""
-_ITERATIONS = 3
+LARGE = 600
+"""Rows or unknowns up to which inertia is asked for what it leaves open."""
+_ITERATIONS, _BALANCED = 3, 6
 
 
 def group_rows(system: System, *names: str) -> Mask:
@@ -94,6 +97,48 @@ class Impulses:
             y[self._moving] += step[self._moving]
             impulse[self._impulse] += step[self._impulse]
         return y, impulse
+
+    def balanced(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
+        """Y with the flows that inertia leaves open (directions n with M n = 0: nodes that stores only tie together)
+        where their balances n^T F hold, M f being what it is.  Raises NotFiniteError.
+        """
+        jyd = self.system.jacobian(t, y, yd)[1]
+        heavy = self._balance[self._rows] & (self.system.kinds == "f")[self._columns] & (jyd != 0.0)
+        rows, flows = np.unique(self._rows[heavy]), np.unique(self._columns[heavy])
+        if not rows.size or max(self.system.rows, y.size) > LARGE:
+            return y
+        inertia = self._dense(jyd)[np.ix_(rows, flows)] * magnitude[flows]
+        size = np.abs(inertia).max(axis=1)
+        left, sigma, right = decomposed(inertia / size[:, None])
+        known = count(sigma)
+        if known == flows.size:
+            return y
+        ways = np.zeros((y.size, flows.size - known))
+        ways[flows] = magnitude[flows, None] * right[known:].T
+        follows = np.isin(self.system.kinds, ("f", "e", "kappa", "mu"))
+        follows[flows] = False
+        ways = np.hstack([ways, np.diag(magnitude)[:, follows]])
+        others = (self._flows() | self._state_rows | self._balance) & ~np.isin(np.arange(self.system.rows), rows)
+        sums = np.vstack([self._summing(rows, left[:, known:] / size[:, None]), np.eye(self.system.rows)[others]])
+        for _ in range(_BALANCED):
+            slopes = sums @ self._dense(self.system.jacobian(t, y, yd)[0]) @ ways
+            most = np.abs(slopes).max(axis=1, initial=0.0)
+            most = np.where(most > 0.0, most, 1.0)
+            aim = sums @ self.system.residual(t, y, yd) / most
+            y = y - ways @ least_squares(slopes / most[:, None], aim)
+        return y
+
+    def _dense(self, values: Floats) -> Floats:
+        """Entries as a matrix [rows, unknowns]."""
+        found = np.zeros((self.system.rows, self.system.unknowns))
+        found[self._rows, self._columns] = values
+        return found
+
+    def _summing(self, rows: NDArray[np.int64], weights: Floats) -> Floats:
+        """Sums of rows by weights [rows, k] as a matrix [k, all rows]."""
+        found = np.zeros((weights.shape[1], self.system.rows))
+        found[:, rows] = weights.T
+        return found
 
     def _sloping(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
         """Y with implicit efforts at their magnitudes where their laws are flat: a flat one decides about the flows."""

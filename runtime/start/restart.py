@@ -6,6 +6,8 @@ Displacements, momenta, flows with inertia and dynamic variables keep their valu
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
@@ -21,6 +23,8 @@ STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
 GUESSES = (0.0, *(sign * size for size in (1.0, 0.1, 1e-2, 1e-3, 10.0) for sign in (1.0, -1.0)))
 """Of their magnitudes: what flows without inertia and implicit efforts are moved by before a state is."""
+ROUND_OFF = 1e-14
+"""Of its magnitude: what a search moves an unknown by that stays where it is."""
 EXACT = 1e-9
 """Scaled residual with which the slower search is content."""
 
@@ -65,9 +69,12 @@ class Restart:
         if same is not None and not moved.any():  # no state need jump: there is no impulse
             return *same, impulse
         if same is None or moved[self.settler.system.kinds == "q"].any():
-            y = self._displaced(t, y, yd, magnitude)
+            if self._displacements is None:
+                self._displacements = Displacements(self.settler.system)
+            y = self._sought(self._displacements.after, t, y, yd, magnitude)
         if self.impulses.broken(t, y, yd, magnitude):
             y, impulse = self.impulses.after(t, y, yd, magnitude)
+        y = self._sought(self.impulses.balanced, t, y, yd, magnitude)
         kept = self._kept(t, y, yd, magnitude)
         if kept is not None:
             return *kept, impulse
@@ -91,14 +98,14 @@ class Restart:
                 return found
         return None
 
-    def _displaced(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
-        """Y with its displacements behind the jump; as it is where slopes have no bound."""
-        if self._displacements is None:
-            self._displacements = Displacements(self.settler.system)
+    def _sought(self, found: Callable[..., Floats], t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
+        """What a search finds, without its round-off; y where it finds no numbers."""
         try:
-            return self._displacements.after(t, y, yd, magnitude)
+            new = found(t, y, yd, magnitude)
         except NotFiniteError:
             return y
+        jumps = np.abs(new - y) > ROUND_OFF * magnitude
+        return np.where(jumps, new, y) if np.isfinite(new).all() else y
 
     def _rates(self, magnitude: Floats) -> Floats:
         """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""
