@@ -20,7 +20,7 @@ from sysdyn.runtime.numerics.rank import count, decomposed, least_squares
 
 BROKEN = 1e-10
 """Scaled residual of a constraint row above which its constraint has jumped."""
-LARGE = 600
+LARGE = 1500
 """Rows or unknowns up to which inertia is asked for what it leaves open."""
 _ITERATIONS, _BALANCED = 3, 6
 

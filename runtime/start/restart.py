@@ -23,6 +23,8 @@ STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
 GUESSES = (0.0, *(sign * size for size in (1.0, 0.1, 1e-2, 1e-3, 10.0) for sign in (1.0, -1.0)))
 """Of their magnitudes: what flows without inertia and implicit efforts are moved by before a state is."""
+SLACK = 1e-6
+"""Of its magnitude: what a state may move by where rows hold only nearly."""
 ROUND_OFF = 1e-14
 """Of its magnitude: what a search moves an unknown by that stays where it is."""
 EXACT = 1e-9
@@ -82,10 +84,14 @@ class Restart:
         for hold in (HELD, 1.0):
             self.settler.core.contents.ready = 0
             found, rate, done = self.settler.settle(t, y, yd, hold=hold)
-            if done:
+            if done and self._stays(found, y, magnitude):
                 return found, rate, impulse
         searched = self._search(t, y, yd, magnitude)
-        return None if searched is None else (*searched, impulse)
+        return (*searched, impulse) if searched is not None and self._stays(searched[0], y, magnitude) else None
+
+    def _stays(self, found: Floats, y: Floats, magnitude: Floats) -> bool:
+        """Whether the state is where the balances of the instant put it; one that moves besides is no answer."""
+        return bool((np.abs(found - y) <= SLACK * magnitude)[self.state].all())
 
     def _kept(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
         """The point settled without a move of the state, searched from flows and efforts of either sign and several
