@@ -24,7 +24,6 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import least_squares
-from sysdyn.runtime.start.impulses import group_rows
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.values import dataclass
 
@@ -488,7 +487,7 @@ class Handler:
     def _momenta(self, t: float, y: Floats, yd: Floats) -> Floats:
         """Momenta that follow from flows that were assigned: the rows of block momentum, solved for p."""
         settled = self.restart.impulses.system if self.restart else self.system
-        rows = np.flatnonzero(group_rows(settled, "momentum"))
+        rows = np.flatnonzero(settled.of_groups("momentum"))
         p = np.flatnonzero(settled.kinds == "p")
         for _ in range(3 if rows.size else 0):
             jy, _ = settled.jacobian(t, y, yd)

@@ -25,23 +25,14 @@ LARGE = 1500
 _ITERATIONS, _BALANCED = 3, 6
 
 
-def group_rows(system: System, *names: str) -> Mask:
-    """Rows of the named groups."""
-    mask = np.zeros(system.rows, dtype=bool)
-    for group, family, first in system.form.groups:
-        if group in names:
-            mask[first : first + system.description.rows[family].size] = True
-    return mask
-
-
 class Impulses:
     """settled: the System in form "settled"; magnitude [unknowns] of y; rate [unknowns] of yd."""
 
     def __init__(self, settled: System) -> None:
         self.system = settled
-        self._flow_rows = group_rows(settled, "phi_rate", "psi")
-        self._state_rows = group_rows(settled, "momentum", "gamma")
-        self._balance = group_rows(settled, "dynamics")
+        self._flow_rows = settled.of_groups("phi_rate", "psi")
+        self._state_rows = settled.of_groups("momentum", "gamma")
+        self._balance = settled.of_groups("dynamics")
         kinds = settled.kinds
         self._moving = np.isin(kinds, ("f", "p", "e"))
         self._impulse = np.isin(kinds, ("kappa", "mu"))
@@ -107,7 +98,7 @@ class Impulses:
         rows, flows = np.unique(self._rows[heavy]), np.unique(self._columns[heavy])
         if not rows.size or max(self.system.rows, y.size) > LARGE:
             return y
-        inertia = self._dense(jyd)[np.ix_(rows, flows)] * magnitude[flows]
+        inertia = self.system.dense(jyd)[np.ix_(rows, flows)] * magnitude[flows]
         size = np.abs(inertia).max(axis=1)
         left, sigma, right = decomposed(inertia / size[:, None])
         known = count(sigma)
@@ -121,18 +112,12 @@ class Impulses:
         others = (self._flows() | self._state_rows | self._balance) & ~np.isin(np.arange(self.system.rows), rows)
         sums = np.vstack([self._summing(rows, left[:, known:] / size[:, None]), np.eye(self.system.rows)[others]])
         for _ in range(_BALANCED):
-            slopes = sums @ self._dense(self.system.jacobian(t, y, yd)[0]) @ ways
+            slopes = sums @ self.system.dense(self.system.jacobian(t, y, yd)[0]) @ ways
             most = np.abs(slopes).max(axis=1, initial=0.0)
             most = np.where(most > 0.0, most, 1.0)
             aim = sums @ self.system.residual(t, y, yd) / most
             y = y - ways @ least_squares(slopes / most[:, None], aim)
         return y
-
-    def _dense(self, values: Floats) -> Floats:
-        """Entries as a matrix [rows, unknowns]."""
-        found = np.zeros((self.system.rows, self.system.unknowns))
-        found[self._rows, self._columns] = values
-        return found
 
     def _summing(self, rows: NDArray[np.int64], weights: Floats) -> Floats:
         """Sums of rows by weights [rows, k] as a matrix [k, all rows]."""

@@ -15,7 +15,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import Problem, solve
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.displacements import Displacements
-from sysdyn.runtime.start.impulses import Impulses, group_rows
+from sysdyn.runtime.start.impulses import Impulses
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 
@@ -144,7 +144,7 @@ class Restart:
                 rows=starter.rows,
                 columns=starter.columns,
                 number=starter.settled.rows,
-                use=~group_rows(starter.settled, "initial"),
+                use=~starter.groups("initial"),
                 free=free,
                 guess=guess,
                 scale=np.concatenate([magnitude, rate]),

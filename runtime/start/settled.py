@@ -46,10 +46,7 @@ def _rates(settled: System) -> Ints:
 
 def inertial_rows(settled: System) -> NDArray[np.bool_]:
     """Rows [rows] that hold a rate of inertia, balances among them.  A momentum that nothing moves with is none."""
-    pattern, groups = settled.pattern, settled.form.groups
-    momentum = np.zeros(settled.rows, dtype=bool)
-    for group, family, first in groups:
-        momentum[first : first + settled.description.rows[family].size] |= group == "momentum"
+    pattern, momentum = settled.pattern, settled.of_groups("momentum")
     in_y, in_rate = settled.structural()
     columns = pattern.columns_of()
     alone = in_y & momentum[pattern.row]
