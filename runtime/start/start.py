@@ -219,8 +219,10 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
 
 
 def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """X on the rows as written: far from a solution the derivative of an exponential hides what itself is after."""
-    rows = starter.every & ~starter.groups(*HIDDEN)
+    """X on the rows as written and on such derivatives as are linear: far from a solution the derivative of an
+    exponential hides what itself is after.
+    """
+    rows = starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
     for _ in range(_RESCALINGS):
         found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
         if not np.isfinite(found.residual) or (found.x == x).all():
