@@ -49,6 +49,12 @@ STRETCH = 1.5
 differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
 TIMING, SHARE = 1e-9, 1e-3
 """Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
+HOLDS, SHORTEN = 1.2, 1.0 / 32.0
+"""Steps of a run over those of the longest length, up to which that length holds them and the tolerance does not (what
+algebra alone determines has no error that a step could test); the least that the next run's is of it."""
+BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
+"""The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
+steps of a run behind which none is shortened."""
 PARTED, MUCH = 10.0, 0.3
 BEND = 4.0
 LOOSE, TAME = 1e-5, 1e-6
@@ -264,12 +270,17 @@ class _Estimate:
         self._before: tuple[float, float] | None = None
         self._power: float | None = None
 
-    def compare(self, coarse: Sampled, fine: Sampled) -> float:
-        """Takes the pair in; returns the plain difference."""
+    def compare(self, coarse: Sampled, fine: Sampled, shorter: float | None = None) -> float:
+        """Takes the pair in; returns the plain difference.  shorter: the longest step of the finer over that of the
+        coarser run, where it holds both.
+        """
         step = float(np.log10(coarse.tolerance / fine.tolerance))
         apart, over = difference(coarse, fine, self.target)
         shrink = None
-        if self._before is not None:
+        if shorter is not None:
+            part = shorter**BY_STEPS
+            shrink = SAFETY * part / (1.0 - part)
+        elif self._before is not None:
             over_before, step_before = self._before
             if over > over_before:
                 shrink = 1.0  # no convergence seen: no credit for the smaller tolerance
@@ -278,9 +289,13 @@ class _Estimate:
         if shrink is None:
             credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, SHORT_CREDIT)
             shrink = _shrink(credit if self._power is None else min(self._power, credit), step, self.law.far)
-        self._before = over, step
+        self._before = (over, step) if shorter is None else None
         self.over, self.apart = over * shrink, apart * shrink
         return apart
+
+    def shorter(self) -> float:
+        """How much shorter the longest step of the next run is where that is what holds the steps."""
+        return float(np.clip((AIM * self.over) ** (-1.0 / TOWARDS), SHORTEN, 1.0 / STRETCH))
 
     def next_tolerance(self, tolerance: float) -> float:
         """The tolerance at which the next run should do, with the estimate's own safety.
@@ -307,6 +322,7 @@ def control(
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, tolerance, law)
     estimate, longest = _Estimate(law, target), LONGEST
+    shorter: float | None = None
     number = 1
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
@@ -317,15 +333,17 @@ def control(
         now = _finer(run, last, tolerance, longest, law, compared=bool(np.isfinite(estimate.over)))
         if now is None:
             break
-        apart = estimate.compare(last, now)
+        apart = estimate.compare(last, now, shorter)
         if now.steps == last.steps and apart < ROUND_OFF:
             return _shifted(run, now, target, number)
         away = parted(last, now)
         if estimate.over <= 1.0 and not (doubted and number == 2) and not away:
             return _achieved(estimate.apart, True, number, now.tolerance)
-        last, longest = now, longest / STRETCH
-        if now.tolerance <= 1.01 * law.finest:
+        held = now.steps * longest < HOLDS and now.steps < ENOUGH
+        if now.tolerance <= 1.01 * law.finest and not held:
             break
+        shorter = estimate.shorter() if held else None
+        last, longest = now, longest * (shorter or 1.0 / STRETCH)
         tolerance = min(estimate.next_tolerance(now.tolerance), TAME if away else 1.0)
     return _achieved(estimate.apart, False, number, last.tolerance)
 

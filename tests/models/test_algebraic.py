@@ -1,0 +1,54 @@
+"""Models, or parts, without a motion of their own: all follows a source at once, and no step has an error that its
+test could see.  The accuracy asked holds all the same, and the ledgers, which are sums over the steps, balance.
+"""
+
+import numpy as np
+import pytest
+from model_runs import FOUR, trace_of
+
+TEXT = """
+model still {{
+  node a: electrical
+  node x: translation
+  V: effort(e = 3 V*sin(2 rad/s*t)^5) a -> ground
+  R: dissipator(e = 2 ohm*f) a -> ground
+  F: effort(e = 0.2 N*sin(3 rad/s*t)^5) ground -> x
+  K: potential(e = 1.9 N/m*q) x -> ground
+  {more}
+}}
+scene run of still {{
+  time 0 s to 2 s
+  trace R.f, K.e, K.f every 0.1 s
+  accuracy 1e-7
+}}
+"""
+MORE = {"alone": "", "beside a capacitor": "C: potential(q = 0.1 F*e) a -> ground"}
+
+
+@pytest.mark.parametrize("more", MORE)
+@pytest.mark.parametrize("formulation", FOUR)
+def test_what_follows_its_source_at_once(tmp_path, formulation, more):
+    """f = v/R; a spring under a force: its rate is that of the force over k."""
+    trace = trace_of(tmp_path, TEXT.format(more=MORE[more]), scene="run", formulation=formulation)
+    t = trace.time
+    assert trace.attributes["met"] == 1
+    for name, law in {
+        "R.f": 1.5 * np.sin(2 * t) ** 5,
+        "K.e": 0.2 * np.sin(3 * t) ** 5,
+        "K.f": 3.0 / 1.9 * np.sin(3 * t) ** 4 * np.cos(3 * t),
+    }.items():
+        assert np.abs(trace[name].values - law).max() < 1e-7 * np.abs(law).max(), name
+
+
+def test_energy_is_asked_of_the_ledger_alone(tmp_path):
+    """A resistor behind a source: the accuracy is met by any step, its energy by short ones."""
+    lines = TEXT.format(more="").splitlines()
+    text = "\n".join(line for line in lines if not line.lstrip().startswith(("node x", "F:", "K:")))
+    text = text.replace(", K.e, K.f", ", audit.dissipated, audit.energy")
+    trace = trace_of(tmp_path, text, scene="run", formulation="lagrangian")
+    # the integral of sin^10 over s: 63/256 s and sines of 2s to 10s
+    s = 4.0
+    sines = zip((-210, 120, -45, 10, -1), (2, 4, 6, 8, 10), strict=True)
+    work = (126 * s + sum(c * np.sin(k * s) / k for c, k in sines)) / 512
+    assert abs(trace["audit.dissipated"].values[-1] - 4.5 / 2 * work) < 1e-5
+    assert np.abs(trace["audit.energy"].values).max() < 1e-6 * 4.5
