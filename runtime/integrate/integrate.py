@@ -11,6 +11,7 @@ import ctypes as c
 import time
 from collections.abc import Callable
 from dataclasses import fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitude
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.start.restart import Restart, still
-from sysdyn.runtime.start.settled import Settler
+from sysdyn.runtime.start.settled import Settler, flows_open
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, null_place
 
@@ -101,10 +102,7 @@ class Integration:
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
         self.forms = self._condensed()
         self._linear()
-        # flows without inertia in loops of stores follow from the rate of their balance alone
-        contacts = request.events.contacts if request.events is not None else ()
-        rated = bool(contacts) and "dynamics_rate" in system.description.blocks
-        self.settler = self._settler("rated" if rated else "settled", self.roles.state[: system.form.written])
+        self.settler = self._settler("settled" if self.forms is not None else self._whole_form, self._keeps)
         # the least change shares what is open: flows between contacts, potentials where all laws at a node are faint
         if request.events is None and not self._steep_balances:
             sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
@@ -158,12 +156,26 @@ class Integration:
         if not self.linear:
             raise MemoryError
 
-    def _settler(self, name: str, state: NDArray[np.bool_], *, whole: bool = False) -> Settler:
-        """Of the rows of a form; whole: with every unknown, whatever leaves the runs."""
+    @property
+    def _keeps(self) -> NDArray[np.bool_]:
+        """Unknowns as written that carry the state."""
+        return self.roles.state[: self.system.form.written]
+
+    @cached_property
+    def _whole_form(self) -> str:
+        """All rows that hold at a point, with every unknown.  Events change what they leave open."""
+        if "dynamics_rate" not in self.system.description.blocks:
+            return "settled"
+        settled, n = self.system.another("settled"), self.system.form.written
+        point = self.start.t, self.y[:n], self.yd[:n]
+        return "rated" if self.request.events or flows_open(settled, *point, self._keeps) else "settled"
+
+    def _settler(self, name: str, state: NDArray[np.bool_]) -> Settler:
+        """Of the rows of a form."""
         form = self.system.form
         n = form.written
         kinematics = (form.k_q, form.k_f)
-        left = self.forms.settled if self.forms is not None and name == "settled" and not whole else None
+        left = self.forms.settled if self.forms is not None and name == "settled" else None
         system = self.system.another(name)
         return Settler(system, kinematics, self.magnitude[:n], self._time, state, self._light[:n], left)
 
@@ -378,14 +390,13 @@ class Integration:
     def restart(self) -> Restart:
         """Finds consistent points behind jumps, with every unknown."""
         if self._restart is None:
-            state = self.roles.state[: self.system.form.written]
-            settler = self.settler if self.forms is None else self._settler("settled", state, whole=True)
-            self._restart = Restart(settler, state)
+            settler = self.settler if self.forms is None else self._settler(self._whole_form, self._keeps)
+            self._restart = Restart(settler, self._keeps)
         return self._restart
 
     def _across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """The point behind a jump of the text at t (s); where no state jumps, what is left of the unknowns tells."""
-        if self.forms is not None:
+        if self.forms is not None and self._whole_form == "settled":
             n = self.system.form.written
             found = still(self.settler, t, (y, yd), self.roles.state[:n], self.magnitude[:n])
             if found is not None:

@@ -17,7 +17,9 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.ordering import column_order, tall_order
+from sysdyn.runtime.numerics.rank import NotFiniteError, null_space
 
 LARGE = 100_000
 """Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before."""
@@ -25,6 +27,12 @@ LIGHT = 1e-3
 """Weight (of squares) of displacements without inertia: they follow those that have some."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
+FULL = 400
+"""Unknowns up to which full matrices tell what the rows leave open."""
+PASSES = 20
+"""Rounds in which rows tell one unknown after the other."""
+OPEN = 1e-6
+"""Of a unit vector: a part of it that is open."""
 RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
 HELD = 1e8
 """Weight (of squares) of a state that moves only where the rows leave nothing else."""
@@ -66,6 +74,46 @@ def inertial_rates(settled: System) -> NDArray[np.bool_]:
             own, size = balances[family], settled.description.rows[family].size
             mask[first : first + size] = inertial[own : own + size]
     return mask
+
+
+def flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_]) -> bool:
+    """Whether settled rows leave a flow open that carries no state [unknowns]: in loops of stores it follows from the
+    rate of their balance (form "rated").  Asked once of a text, at a point y, yd [unknowns as written].
+    """
+    return settled.once("flows open", lambda: _flows_open(settled, t, y, yd, state))
+
+
+def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_]) -> bool:
+    jy, jyd = settled.jacobian(t, y, yd)
+    flow = (settled.kinds == "f") & ~state
+    if _told(settled, (jy, jyd), state)[flow].all():
+        return False
+    if settled.unknowns > FULL:
+        return True
+    matrix = np.hstack([settled.dense(jy)[:, ~state], settled.dense(jyd)[:, rates_of(settled)]])
+    try:
+        open_ = null_space(equilibrated(matrix)[0])
+    except NotFiniteError:
+        return True
+    return bool((np.abs(open_[: flow[~state].size][flow[~state]]) > OPEN).any())
+
+
+def _told(settled: System, values: tuple[Floats, Floats], state: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """[unknowns]: those that rows with but one unknown left determine, one after the other, and the state."""
+    in_y, in_rate = (item != 0.0 for item in values)
+    row, n = settled.pattern.row, settled.unknowns
+    columns = settled.pattern.columns_of()
+    row, column = np.concatenate([row[in_y], row[in_rate]]), np.concatenate([columns[in_y], n + columns[in_rate]])
+    known = np.zeros(2 * n, dtype=bool)
+    known[:n] = state
+    for _ in range(PASSES):
+        left = ~known[column]
+        single = np.bincount(row[left], minlength=settled.rows) == 1
+        now = column[left & single[row]]
+        if not now.size:
+            break
+        known[now] = True
+    return np.asarray(known[:n])
 
 
 class Settler:
