@@ -201,9 +201,11 @@ static void emit_compared(sd_run *run, double *row)
     memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
 }
 
-/* The point moved onto the equations; where only runs are compared by it, roughly. */
+/* The point moved onto the equations; where only runs are compared by it, roughly, or not where states alone are seen. */
 static void settle_row(sd_run *run, double t, int32_t kind)
 {
+    if (kind == SD_COMPARED && run->bare)
+        return;
     double enough = run->settle->enough;
     if (kind == SD_COMPARED)
         run->settle->enough = fmax(enough, run->rough);

@@ -304,11 +304,19 @@ class Integration:
         run.audit_at, run.instant = lib.pointer(self._audit_at), lib.pointer(self._instants)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps, run.apart = int(request.sample_steps), request.apart
-        run.rough = request.settled_to
+        run.rough, run.bare = request.settled_to, int(self._bare and not request.audited)
         if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
         run.projected = self._projected()
         run.row, run.room = lib.pointer(self._rows), self._rows.shape[0]
+
+    @property
+    def _bare(self) -> bool:
+        """Whether all that is observed follows from the state: nothing that a row has to be settled for."""
+        description, written = self.system.description, self.system.family_of[: self.system.form.written]
+        follows = frozenset(np.unique(written[~self._keeps]).tolist())
+        read = [(kernel.reads, kernel.rates) for kernel in description.blocks.get("observe", ())]
+        return all(reads is not None and not (reads & follows) and rates == frozenset() for reads, rates in read)
 
     def drain(self, sink: Sink) -> None:
         """Rows so far go to the sink."""

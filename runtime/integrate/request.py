@@ -32,7 +32,8 @@ class Request:
     integration restarts (segments.py); least_norm: rows hold the least multipliers of redundant constraints;
     stiff_steps: dopri and energy give up
     where stability holds it to more steps than these; settled_to: scaled residual that will do for rows
-    by which runs are compared and nothing else, of a draft for all, 0: round-off;
+    by which runs are compared and nothing else, of a draft for all, 0: round-off; audited: they are compared by the
+    audit's members too;
     condense: what constant sums define leaves the system (condense/);
     stages: of radau, in the first step and at most, None: chosen;
     apart: part of a step; instants within it that are nearer to the row before are passed over.
@@ -59,6 +60,7 @@ class Request:
     stiff_steps: float = 1e5
     settled_to: float = 0.0
     draft: bool = False
+    audited: bool = False
     apart: float = 0.0
     condense: bool = True
     stages: tuple[int, int] | None = None

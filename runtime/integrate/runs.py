@@ -207,6 +207,7 @@ class Runs:
             stiff_steps=HELD if options.method == "auto" else STIFF,
             settled_to=ROUGH * rtol if self.controlled else 0.0,
             draft=draft,
+            audited=bool(self.meters),
             apart=APART if draft and self.open else 0.0,
             events=options.events or None,
             begin=self.begin,

@@ -547,6 +547,7 @@ class Run(c.Structure):
         ("instants", _I),
         ("every_step", _I),
         ("sample_steps", _I),
+        ("bare", _I),
         ("rough", _D),
         ("apart", _D),
         ("start_rate", _P),
