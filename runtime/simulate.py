@@ -21,8 +21,8 @@ from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, c
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
-from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.start import LARGE, ConsistentState, consistent_start
+from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace

@@ -14,11 +14,11 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
-from sysdyn.runtime.start.start import LARGE, ConsistentState
+from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, independent, nearby, reactions, vanished
 from sysdyn.values import dataclass
 
@@ -285,8 +285,8 @@ def structure(system: System, state: ConsistentState) -> Structure:
     group = tuple((_label(system, int(places[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8))
     names = tuple(_place(system, int(places[k])) for k in left)
     if system.unknowns > LARGE:
-        for once in (("reacting places", idle.tobytes()), "sizes of J"):
-            system.forget_once(once)
+        system.spare()
+        lib.core.sd_trim()
     return Structure(
         index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names
     )
