@@ -37,7 +37,7 @@ class Composition:
         return found
 
 
-def ranges(first: Longs, count: Longs) -> Longs:
+def ranges(first: Longs, count: NDArray[np.integer]) -> Longs:
     """first[k], first[k] + 1, ... of each k, one behind the other."""
     return np.repeat(first - (np.cumsum(count) - count), count) + np.arange(count.sum())
 

@@ -104,21 +104,24 @@ class Condensed:
     kept, kept_rows: their places in the whole system; core: the core's structure of it.
     """
 
-    def __init__(self, system: System, found: Sums, kept_rows: Longs, room: Room) -> None:
-        """found: the structure, and the first numbers."""
-        self._room = room
+    def __init__(self, system: System, found: Sums, terms: Composition, kept_rows: Longs, room: Room) -> None:
+        """found: the structure, and the first numbers; terms: as sums of kept unknowns."""
+        self._room, self._composition = room, terms
         self.whole, self.sums = system, found
         self.kept, self.kept_rows = found.kept, kept_rows.astype(np.int32)
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
         self._keep: list[object] = []
-        self._products()
-        if self.unknowns == self.rows > SMALL:
-            self._pair()
+        columns = self._products()
+        self._lay_out(columns)
+        if self.unknowns == self.rows > SMALL and self._pair():
+            self._lay_out(columns)
         self._make()
 
-    def _pair(self) -> None:
-        """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching."""
+    def _pair(self) -> bool:
+        """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching.
+        False where there is none, and the order stays.
+        """
         form, columns, rows = self.whole.form, self.whole.pattern.columns_of(), self.whole.pattern.row
         row_at, at = _numbers(self.whole.rows, self.kept_rows), _numbers(self.whole.unknowns, self.kept)
         moving = self.whole.structural()[1]
@@ -142,37 +145,41 @@ class Condensed:
         if lib.core.sd_match(rest.rows, rest.unknowns, *arrays) < 0:
             raise MemoryError
         if (found < 0).any():
-            return
+            return False
         own[left] = open_[found]
         self.kept_rows, self.paired = self.kept_rows[own], True
-        self._products()
+        return True
 
     def _hold(self, array: Ints | Floats) -> int | None:
         self._keep.append(array)
         return lib.pointer(array)
 
-    def _products(self) -> None:
-        """The pattern, and which entries of the whole matrix add to which of it with what factor."""
-        system, found = self.whole, self.sums
-        columns, rows = system.pattern.columns_of(), system.pattern.row
-        row_at, at = _numbers(system.rows, self.kept_rows), _numbers(system.unknowns, self.kept)
-        place = _numbers(system.unknowns, found.place)
-        direct = np.flatnonzero((row_at[rows] >= 0) & (at[columns] >= 0))
-        through = np.flatnonzero((row_at[rows] >= 0) & (place[columns] >= 0))
-        self._composition = found.composed(system.unknowns)
-        start, source = self._composition.start, self._composition.source
-        number = place[columns[through]]
-        count = start[number + 1] - start[number]
-        term = ranges(start[number], count)
-        entry = np.concatenate([direct, np.repeat(through, count)])
-        column = np.concatenate([at[columns[direct]], source[term]])
-        order = np.argsort(entry, kind="stable")
-        entry, column = entry[order], column[order]
-        term = np.concatenate([np.full(direct.size, -1), term])[order]
-        self._shared = np.flatnonzero(term >= 0), term[term >= 0]
+    def _products(self) -> Ints:
+        """Which entries of the whole matrix add to this one with what factor; the column of each such product."""
+        system, found, terms = self.whole, self.sums, self._composition
+        columns = system.pattern.columns_of()
+        at, place = _numbers(system.unknowns, self.kept)[columns], _numbers(system.unknowns, found.place)[columns]
+        kept = np.zeros(system.rows, dtype=bool)
+        kept[self.kept_rows] = True
+        entry = np.flatnonzero(kept[system.pattern.row] & ((at >= 0) | (place >= 0))).astype(np.int32)
+        at, place = at[entry], place[entry]
+        # an entry of a kept unknown is a product, one of an eliminated unknown as many as that has terms
+        gone = place >= 0
+        count = np.ones(entry.size, dtype=np.int32)
+        count[gone] = np.diff(terms.start)[place[gone]]
+        term = ranges(terms.start[place[gone]], count[gone])
+        through = np.flatnonzero(np.repeat(gone, count))
+        column = np.repeat(at, count)
+        column[through] = terms.source[term]
+        self._shared = through, term
+        self._from, self._share = np.repeat(entry, count), np.ones(column.size)
+        return column
+
+    def _lay_out(self, column: Ints) -> None:
+        """The pattern of the products, and the place of each in it."""
+        row = _numbers(self.whole.rows, self.kept_rows)[self.whole.pattern.row[self._from]]
         self.pattern: Pattern
-        self.pattern, slots = compress(self.rows, self.unknowns, [Places(row_at[rows[entry]], column)])
-        self._from, self._to, self._share = entry.astype(np.int32), slots[0], np.ones(entry.size)
+        self.pattern, (self._to,) = compress(self.rows, self.unknowns, [Places(row, column)])
 
     def _spans(self, full: Ints) -> tuple[c.Array[Any], int]:
         first, begin, number = _spans(full)
@@ -395,10 +402,12 @@ class _Condenser:
         if kept is None:
             return None
         places = np.flatnonzero(rows), np.flatnonzero(kept)
-        room = Room(whole, self.settled)
-        return Forms(
-            Condensed(whole, numbers, places[0], room), Condensed(self.settled, numbers, places[1], room)
+        room, terms = Room(whole, self.settled), numbers.composed(whole.unknowns)
+        stepped, settled = (
+            Condensed(system, numbers, terms, rows, room)
+            for system, rows in zip((whole, self.settled), places, strict=True)
         )
+        return Forms(stepped, settled)
 
 
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:

@@ -178,8 +178,8 @@ class Runs:
 
     @property
     def origin(self) -> Origin | None:
-        """The start as the system sees it, for all runs.  Where events leave numbers behind, and of a large model, which
-        lets it go, each run has its own.
+        """The start as the system sees it, for all runs.  Where events leave numbers behind each run has its own, as of
+        a large model, which lets it go.
         """
         if self._origin is None and not self.options.events and self.system.unknowns <= LARGE:
             self._origin = Origin(self.system, self.start, self.index)

@@ -104,10 +104,12 @@ def remembered(
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
         if not self.remember:
             return ask(self, t, x)
-        known, here = self.known.get(name), x.tobytes()
-        if known is None or known[0] != t or known[1] != here:
-            known = self.known[name] = (t, here, ask(self, t, x))
-        return known[2].copy()
+        here, known = self.point(t, x), self.known.get(name)
+        if known is None or known[0] is not here:
+            self.known.pop(name, None)
+            del known
+            known = self.known[name] = here, ask(self, t, x)
+        return known[1].copy()
 
     return answer
 
@@ -122,7 +124,7 @@ class Starter:
     def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
         self.system = system
         self.remember = remember  # one search for a start: nothing but t and x changes
-        self.known: dict[str, tuple[float, bytes, NDArray[Any]]] = {}
+        self.known: dict[str, tuple[tuple[float, bytes], NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
         self.plain = True  # small problems are searched in the core, which has one way of least change
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
@@ -146,6 +148,11 @@ class Starter:
         self.written = np.concatenate(
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
+
+    def point(self, t: float, x: Floats) -> tuple[float, bytes]:
+        """The point (t, x): one object for all answers there."""
+        asked = t, x.tobytes()
+        return next((here for here, _ in self.known.values() if here == asked), asked)
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
