@@ -156,7 +156,7 @@ double sd_excitation(sd_system *system, double t0, double span, const double *y,
         for (size_t r = 0; r < rows; r++) {
             double moved = fabs(now[r] - base[r]);
             moved = isfinite(moved) ? moved : 0.0;
-            moves[r] = fmax(moves[r], moved);
+            moves[r] = moved > moves[r] ? moved : moves[r];
             if (k == 0)
                 early[r] = moved;
         }

@@ -21,7 +21,7 @@ from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.patterns import read_only
-from sysdyn.runtime.model.scales import group_maximum
+from sysdyn.runtime.model.scales import group_maximum, largest_of_group
 from sysdyn.runtime.model.system import KEPT, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
@@ -279,6 +279,8 @@ class Starter:
     def _between(self, kinds: Sequence[str]) -> Mask:
         outside = ~self.moves(kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
+        if not mask.any():
+            return np.asarray(mask)
         mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
 
@@ -408,9 +410,7 @@ class Starter:
 
     def largest_alike(self, x: Floats) -> Floats:
         """Of each unknown the largest magnitude of its kind and unit."""
-        largest = np.zeros(int(self.equations.alike.max(initial=0)) + 1)
-        np.maximum.at(largest, self.equations.alike, np.abs(x))
-        return np.asarray(largest[self.equations.alike])
+        return largest_of_group(self.equations.alike, np.abs(x))
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:
