@@ -22,7 +22,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import group_maximum, largest_of_group
-from sysdyn.runtime.model.system import KEPT, System
+from sysdyn.runtime.model.system import KEPT, LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.equations import Equations
@@ -105,11 +105,15 @@ def remembered(
         if not self.remember:
             return ask(self, t, x)
         here, known = self.point(t, x), self.known.get(name)
-        if known is None or known[0] is not here:
-            self.known.pop(name, None)
-            del known
-            known = self.known[name] = here, ask(self, t, x)
-        return known[1].copy()
+        if known is not None and known[0] is here:
+            return known[1].copy()
+        found, large = ask(self, t, x), x.size > LARGE
+        if large and any(point is not here for point, _ in self.known.values()):
+            self.known.clear()  # the room counts: one point, and nothing longer
+        if large and found.size > x.size:
+            return found
+        self.known[name] = here, found
+        return found.copy()
 
     return answer
 
