@@ -46,7 +46,8 @@ def test_a_section_of_a_large_line_takes_few_bytes_to_the_first_step(tmp_path):
 
     def peak(sections):
         step = ("--set", f"n={sections}", "--max-steps", "1", "-o", str(tmp_path / "t.h5"))
-        done = subprocess.run([sys.executable, "-c", TRACED, "simulate", str(LINE), "--quiet", *step], capture_output=True, text=True, check=True)
+        asked = [sys.executable, "-c", TRACED, "simulate", str(LINE), "--quiet", *step]
+        done = subprocess.run(asked, capture_output=True, text=True, check=True)
         return int(done.stdout.split()[-1])
 
     assert peak(50_000) - peak(25_000) < KEPT * 25_000
