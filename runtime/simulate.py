@@ -5,7 +5,7 @@ Receives manifest, binding, carrier and options; hands back an `Outcome`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,8 @@ from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, c
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
-from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.start import LARGE, ConsistentState, consistent_start
+from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
@@ -83,7 +83,7 @@ class Outcome:
         return self.final and self.judgement is not None and self.judgement.met
 
 
-def _listed(names: tuple[str, ...]) -> str:
+def _listed(names: Sequence[str]) -> str:
     """The first names and how many more, with their verb."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")

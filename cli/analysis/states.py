@@ -44,7 +44,7 @@ def resting(target: Target, prepared: Prepared, tries: int, most: int | None = N
     """The model at its first state of rest, and all of them; the guess where there is none."""
     scene = prepared.network.scene
     t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
-    system = System(prepared.manifest, prepared.arrays, prepared.carrier)
+    system = System(prepared.structure, prepared.arrays, prepared.carrier)
     guess = _guess(prepared, system, t0)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
     states = rests(Resting(system, tangible, t0, guess), tries, most)

@@ -90,7 +90,7 @@ class Module:
         if key not in self._systems:
             prepared, system = self._formed.prepared, self._formed.system
             arrays = prepared.arrays_of(prepared.compiled.bind(dict(key)))
-            made = System(prepared.manifest, arrays, prepared.carrier, system.form.name)
+            made = System(prepared.structure, arrays, prepared.carrier, system.form.name)
             self._systems[key] = made.without(system.left_out) if system.left_out else made
         return self._systems[key]
 

@@ -97,7 +97,7 @@ def _account(prepared: Prepared) -> str:
     unseen = [c.name for c in compiled.energies.coordinates if c.name not in held]
     rows += [("8.7", f"displacement of {name}", "pruned: nothing reads it; its flow is the unknown") for name in unseen]
     if not prepared.network.events and not prepared.network.switches:
-        system = System(prepared.manifest, prepared.arrays, prepared.carrier)
+        system = System(prepared.structure, prepared.arrays, prepared.carrier)
         rows += [("sum", what, why) for what, why in departures(system)]
     return aligned(rows) if rows else "coordinate style: nothing was merged or pruned"
 

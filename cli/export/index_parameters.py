@@ -54,7 +54,7 @@ def _changes(formed: Formed, places: dict[str, slice], following: Following, nam
     else:
         arrays["p"] = arrays["p"].copy()
         arrays["p"][places[name]] = 0.0
-    other = type(written)(prepared.manifest, arrays, prepared.carrier)
+    other = type(written)(prepared.structure, arrays, prepared.carrier)
     if written.left_out:
         other = other.without(written.left_out)
     jy, jyd = other.jacobian(formed.state.t, *formed.state.for_form(other))

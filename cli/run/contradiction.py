@@ -97,7 +97,7 @@ def _zero(prepared: Prepared, t0: float) -> Parameter | None:
             continue
         try:
             binding = prepared.compiled.bind({p.name: 1.0})
-            system = System(prepared.manifest, prepared.arrays_of(binding), prepared.carrier)
+            system = System(prepared.structure, prepared.arrays_of(binding), prepared.carrier)
             with np.errstate(all="ignore"):
                 eventful_start(system, t0, plan(replace(prepared, binding=binding), system))
         except (InconsistentStart, NotFiniteError, ModelError):

@@ -7,6 +7,8 @@ Received: a prepared model and its start; raises ModuleFault.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
@@ -15,7 +17,7 @@ from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
 from sysdyn.compiler.forms.descriptor import Block
 from sysdyn.runtime.model.scales import group_maximum, magnitudes
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.points import normal, uniform
+from sysdyn.runtime.numerics.points import uniform
 
 Array = NDArray[np.float64]
 
@@ -85,12 +87,21 @@ def _points(system: System, started: Started, oracle: SampledRows, until: float)
     extended = [np.concatenate([x, np.zeros(order.size - x.size)]) for x in (y, yd)]
     sizes = [np.concatenate([x, np.ones(order.size - x.size)]) for x in (scale, scale / max(time, 1e-300))]
     later = 0.5 + 0.5 * uniform(number)
-    ways = np.sign(normal(number, 2, order.size)) * (0.5 + uniform(number * 2 * order.size).reshape(number, 2, -1))
+    ways = _ways(2 * len(NEARBY), order.size)
     for k, distance in enumerate((0.0, *NEARBY)):
         points.t[k] += distance * (until - t0) * later[k]
-        for target, x, size, away in zip((points.y, points.yd), extended, sizes, ways[k], strict=True):
-            target[k] = (x + distance * size * away)[order]
+        for target, x, size in zip((points.y, points.yd), extended, sizes, strict=True):
+            target[k] = (x + distance * size * next(ways) if k else x)[order]
     return points
+
+
+def _ways(number: int, size: int) -> Iterator[Array]:
+    """Numbers [size] from -1.5 to -0.5 and from 0.5 to 1.5 that know nothing of each other, so many times."""
+    for k in range(number):
+        found = uniform((k + 1) * size)[k * size :]
+        found += 0.5
+        found[uniform((k + 1) * size, 1)[k * size :] < 0.5] *= -1.0
+        yield found
 
 
 def _order(system: System, oracle: SampledRows) -> NDArray[np.intp]:

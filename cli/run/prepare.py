@@ -30,13 +30,13 @@ class Prepared:
     """A compiled model with its numbers bound; backend says which carrier it has.
 
     network: what was compiled; whole: what was written; left_out: the parts that the scene does not need;
-    unasked: quantities observed for an analysis alone.
+    unasked: quantities observed for an analysis alone; structure: of the manifest, which is what runs ask of it.
     """
 
     network: Network
     compiled: CompiledModel
     binding: Binding
-    manifest: dict[str, Any]
+    structure: dict[str, Any]
     carrier: Carrier
     formulation: str
     backend: str
@@ -48,6 +48,11 @@ class Prepared:
     """What the runtime finds of the structure of index forms, by sizes: other numbers have the same."""
     alone: bool = False
     """Nothing of a run but its trace is asked for: the next one may take its structures."""
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """The object of manifest.json, made when asked: it names what the author wrote one by one, and its numbers."""
+        return self.compiled.manifest(self.binding)
 
     @property
     def arrays(self) -> dict[str, Any]:
@@ -106,9 +111,9 @@ def prepare(
         report.extend(error.diagnostics)
         return None
     report.extend(compiled.notes)
-    manifest = compiled.manifest(binding)
+    structure = compiled.structure()
     spent = time.process_time() - cpu
-    return Prepared(network, compiled, binding, manifest, made, chosen, backend, spent, whole, left_out)
+    return Prepared(network, compiled, binding, structure, made, chosen, backend, spent, whole, left_out)
 
 
 def _well_formed(network: Network, report: Report) -> bool:

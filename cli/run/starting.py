@@ -54,7 +54,7 @@ def start(
     """
     scene = prepared.network.scene
     policy = redundancy or (scene.redundancy if scene else None) or "error"
-    system = System.of(describe(prepared.manifest, prepared.arrays), prepared.carrier, "3")
+    system = System.of(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
             state = eventful_start(system, t0, plan(prepared, system), until)
@@ -102,7 +102,7 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
             break
     else:
         return None
-    system = System(whole.manifest, whole.arrays, whole.carrier)
+    system = System(whole.structure, whole.arrays, whole.carrier)
     try:
         with np.errstate(all="ignore"):
             state = eventful_start(system, t0, plan(whole, system))
@@ -233,7 +233,7 @@ def _primal(prepared: Prepared, t0: float) -> Structure | None:
     primal = prepare(prepared.network, silent, formulation="lagrangian", backend=prepared.backend)
     if primal is None:
         return None
-    system = System(primal.manifest, primal.arrays, primal.carrier)
+    system = System(primal.structure, primal.arrays, primal.carrier)
     try:
         return structure(system, eventful_start(system, t0, plan(primal, system)))
     except InconsistentStart:

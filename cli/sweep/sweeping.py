@@ -170,7 +170,7 @@ def _units(runner: Runner) -> dict[str, str]:
     """Of parameters and traced quantities by name."""
     prepared = runner.loaded().first.prepared
     known = {p.name: si_text(p.unit.dimension) for p in prepared.network.parameters}
-    rows = [row for row in prepared.manifest["structure"]["rows"] if row.get("stored")]
+    rows = [row for row in prepared.structure["rows"] if row.get("stored")]
     return known | {str(row["name"]): str(row["unit"]) for row in rows}
 
 

@@ -46,7 +46,7 @@ def twins(prepared: Prepared, started: Started, until: float) -> Twins | None:
     )
     if other is None or other.backend == prepared.backend:
         return None
-    system, twin = started.system, System(other.manifest, other.arrays, other.carrier)
+    system, twin = started.system, System(other.structure, other.arrays, other.carrier)
     # what holds at the start, and the senses of friction, were found with the first carrier
     twin.description.switches.set(system.description.switches.active)
     twin.description.p[:] = system.description.p

@@ -25,11 +25,18 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
     """What the runtime needs beside the code: families, rows, blocks, constraints that hold at times, places in p of
     laws that may slide; no numbers of a binding.
     """
+    elements = {family: [[n, p.file, p.start[0]] for n, p in each] for family, each in network.authors.items()}
+
+    def gathered(name: str) -> dict[str, Any]:
+        """[name, file, line] of each element of a gathered family, from index 0 on: one list for all that it holds."""
+        family = owner(name, network.authors)
+        return {} if family is None else {"elements": elements[family]}
+
     return {
         "branches": [program.scalars.index(k.branch) for k in form.kinks if k.slide],
         "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches],
-        "families": [_family(f) | _elements(f.name, network.authors) for f in form.families],
-        "rows": [_row(r) | _elements(r.label, network.authors) for r in form.rows],
+        "families": [_family(f) | gathered(f.name) for f in form.families],
+        "rows": [_row(r) | gathered(r.label) for r in form.rows],
         "blocks": {name: {"kernels": [_kernel(k) for k in patterns]} for name, patterns in program.patterns},
     }
 
@@ -37,12 +44,6 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
 def _family(family: Unknowns) -> dict[str, Any]:
     plain = {"name": family.name, "kind": family.kind, "owner": family.owner, "unit": family.unit}
     return {**plain, "nominal": None, **where(family.place)}
-
-
-def _elements(name: str, authors: Authors) -> dict[str, Any]:
-    """[name, file, line] of each element of a gathered family, from index 0 on."""
-    family = owner(name, authors)
-    return {} if family is None else {"elements": [[n, p.file, p.start[0]] for n, p in authors[family]]}
 
 
 def _row(row: Equations) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
@@ -37,12 +37,12 @@ class Composition:
         return found
 
 
-def ranges(first: Longs, count: Longs) -> Longs:
+def ranges(first: Longs, count: NDArray[np.integer]) -> Longs:
     """first[k], first[k] + 1, ... of each k, one behind the other."""
     return np.repeat(first - (np.cumsum(count) - count), count) + np.arange(count.sum())
 
 
-def composed(start: Longs, kept: Longs, through: Longs) -> Composition:
+def composed(start: Longs, kept: Ints, through: Ints) -> Composition:
     """Start [eliminated + 1]: the terms of each row; kept, through [terms]: the kept unknown that a term reads, or the
     eliminated one, whose row stands before; -1.
     """
@@ -87,7 +87,7 @@ def composed(start: Longs, kept: Longs, through: Longs) -> Composition:
     return Composition(begin, column[order], (direct_entry, direct_term), levels)
 
 
-def _depth(number: int, owner: Longs, through: Longs) -> Longs:
+def _depth(number: int, owner: Longs, through: Ints) -> Longs:
     """How many rows stand between each row and kept unknowns alone [eliminated]."""
     depth, use = np.zeros(number, dtype=np.int64), through >= 0
     while True:

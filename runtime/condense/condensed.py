@@ -12,13 +12,14 @@ from hashlib import sha256
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.condense.composition import Composition, composed, ranges
 from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask, definable, eliminate, steady
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
 from sysdyn.values import dataclass
 
@@ -27,8 +28,6 @@ LEAST, STEEP = 12, 50
 0.74 to 0.86 of the time, whole runs in memory as long as before or less; of fewer the tables cost what the steps save.
 Between steep laws small matrices may leave columns open (numerics/ordering.py), which a condensed one knows less well:
 a circuit of diodes of less than 20 unknowns crawled."""
-LARGE = 100_000
-"""Unknowns beyond which what only other numbers would need is let go."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
 DEFINED = "leaves runs: a constant sum of others"
@@ -49,14 +48,12 @@ class Sums:
     start: Longs
     source: Longs
     factor: Floats
-    kept: Longs
+    kept: Ints
     unread: Longs
 
     def composed(self, unknowns: int) -> Composition:
         """T by rows, of z."""
-        number, later = np.full(unknowns, -1), np.full(unknowns, -1)
-        number[self.kept] = np.arange(self.kept.size)
-        later[self.place] = np.arange(self.place.size)
+        number, later = _numbers(unknowns, self.kept), _numbers(unknowns, self.place)
         return composed(self.start, number[self.source], later[self.source])
 
     def same(self, other: Sums) -> bool:
@@ -73,10 +70,18 @@ def sums(system: System, found: Elimination, t: float, jy: Floats) -> Sums:
     left = np.ones(system.unknowns, dtype=bool)
     left[found.place] = left[found.unread] = False
     source = system.pattern.columns_of()[found.entry].astype(np.int64)
-    return Sums(found.place, -rest / pivot, found.start, source, factor, np.flatnonzero(left), found.unread)
+    kept = np.flatnonzero(left).astype(np.int32)
+    return Sums(found.place, -rest / pivot, found.start, source, factor, kept, found.unread)
 
 
-def _spans(full: Longs) -> tuple[Longs, Longs, Longs]:
+def _numbers(size: int, places: NDArray[np.integer]) -> Ints:
+    """Of each place its number among these [size]; -1 elsewhere."""
+    found = np.full(size, -1, dtype=np.int32)
+    found[places] = np.arange(places.size, dtype=np.int32)
+    return found
+
+
+def _spans(full: NDArray[np.integer]) -> tuple[NDArray[np.integer], Longs, Longs]:
     """Stretches of ascending places: first place, first number, length."""
     begin = np.flatnonzero(np.concatenate([[True], np.diff(full) != 1])) if full.size else np.zeros(0, dtype=np.int64)
     return full[begin], begin, np.diff(np.concatenate([begin, [full.size]]))
@@ -99,23 +104,26 @@ class Condensed:
     kept, kept_rows: their places in the whole system; core: the core's structure of it.
     """
 
-    def __init__(self, system: System, found: Sums, kept_rows: Longs, room: Room) -> None:
-        """found: the structure, and the first numbers."""
-        self._room = room
-        self.whole, self.sums, self.kept, self.kept_rows = system, found, found.kept, kept_rows
+    def __init__(self, system: System, found: Sums, terms: Composition, kept_rows: Longs, room: Room) -> None:
+        """found: the structure, and the first numbers; terms: as sums of kept unknowns."""
+        self._room, self._composition = room, terms
+        self.whole, self.sums = system, found
+        self.kept, self.kept_rows = found.kept, kept_rows.astype(np.int32)
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
         self._keep: list[object] = []
-        self._products()
-        if self.unknowns == self.rows > SMALL:
-            self._pair()
+        columns = self._products()
+        self._lay_out(columns)
+        if self.unknowns == self.rows > SMALL and self._pair():
+            self._lay_out(columns)
         self._make()
 
-    def _pair(self) -> None:
-        """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching."""
+    def _pair(self) -> bool:
+        """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching.
+        False where there is none, and the order stays.
+        """
         form, columns, rows = self.whole.form, self.whole.pattern.columns_of(), self.whole.pattern.row
-        row_at, at = np.full(self.whole.rows, -1), np.full(self.whole.unknowns, -1)
-        row_at[self.kept_rows], at[self.kept] = np.arange(self.rows), np.arange(self.unknowns)
+        row_at, at = _numbers(self.whole.rows, self.kept_rows), _numbers(self.whole.unknowns, self.kept)
         moving = self.whole.structural()[1]
         row = row_at[np.concatenate([form.k_row, rows[moving]])]
         column = at[np.concatenate([form.k_q, columns[moving]])]
@@ -137,43 +145,43 @@ class Condensed:
         if lib.core.sd_match(rest.rows, rest.unknowns, *arrays) < 0:
             raise MemoryError
         if (found < 0).any():
-            return
+            return False
         own[left] = open_[found]
         self.kept_rows, self.paired = self.kept_rows[own], True
-        self._products()
+        return True
 
     def _hold(self, array: Ints | Floats) -> int | None:
         self._keep.append(array)
         return lib.pointer(array)
 
-    def _products(self) -> None:
-        """The pattern, and which entries of the whole matrix add to which of it with what factor."""
-        system, found = self.whole, self.sums
-        columns, rows = system.pattern.columns_of(), system.pattern.row
-        row_at = np.full(system.rows, -1)
-        row_at[self.kept_rows] = np.arange(self.rows)
-        at = np.full(system.unknowns, -1)
-        at[self.kept] = np.arange(self.unknowns)
-        place = np.full(system.unknowns, -1)
-        place[found.place] = np.arange(found.place.size)
-        direct = np.flatnonzero((row_at[rows] >= 0) & (at[columns] >= 0))
-        through = np.flatnonzero((row_at[rows] >= 0) & (place[columns] >= 0))
-        self._composition = found.composed(system.unknowns)
-        start, source = self._composition.start, self._composition.source
-        number = place[columns[through]]
-        count = start[number + 1] - start[number]
-        term = ranges(start[number], count)
-        entry = np.concatenate([direct, np.repeat(through, count)])
-        column = np.concatenate([at[columns[direct]], source[term]])
-        order = np.argsort(entry, kind="stable")
-        entry, column = entry[order], column[order]
-        term = np.concatenate([np.full(direct.size, -1), term])[order]
-        self._shared = np.flatnonzero(term >= 0), term[term >= 0]
-        self.pattern: Pattern
-        self.pattern, slots = compress(self.rows, self.unknowns, [Places(row_at[rows[entry]], column)])
-        self._from, self._to, self._share = entry.astype(np.int32), slots[0], np.ones(entry.size)
+    def _products(self) -> Ints:
+        """Which entries of the whole matrix add to this one with what factor; the column of each such product."""
+        system, found, terms = self.whole, self.sums, self._composition
+        columns = system.pattern.columns_of()
+        at, place = _numbers(system.unknowns, self.kept)[columns], _numbers(system.unknowns, found.place)[columns]
+        kept = np.zeros(system.rows, dtype=bool)
+        kept[self.kept_rows] = True
+        entry = np.flatnonzero(kept[system.pattern.row] & ((at >= 0) | (place >= 0))).astype(np.int32)
+        at, place = at[entry], place[entry]
+        # an entry of a kept unknown is a product, one of an eliminated unknown as many as that has terms
+        gone = place >= 0
+        count = np.ones(entry.size, dtype=np.int32)
+        count[gone] = np.diff(terms.start)[place[gone]]
+        term = ranges(terms.start[place[gone]], count[gone])
+        through = np.flatnonzero(np.repeat(gone, count))
+        column = np.repeat(at, count)
+        column[through] = terms.source[term]
+        self._shared = through, term
+        self._from, self._share = np.repeat(entry, count), np.ones(column.size)
+        return column
 
-    def _spans(self, full: Longs) -> tuple[c.Array[Any], int]:
+    def _lay_out(self, column: Ints) -> None:
+        """The pattern of the products, and the place of each in it."""
+        row = _numbers(self.whole.rows, self.kept_rows)[self.whole.pattern.row[self._from]]
+        self.pattern: Pattern
+        self.pattern, (self._to,) = compress(self.rows, self.unknowns, [Places(row, column)])
+
+    def _spans(self, full: Ints) -> tuple[c.Array[Any], int]:
         first, begin, number = _spans(full)
         made = (lib.Span * max(first.size, 1))()
         for k, span in enumerate(zip(first.tolist(), begin.tolist(), number.tolist(), strict=True)):
@@ -232,6 +240,8 @@ class Condensed:
     def fix(self) -> None:
         """Lets go of what only other numbers would need: `renew` is not asked again."""
         del self._composition, self._shared, self._order
+        found, nothing = self.sums, np.zeros(0, dtype=np.int64)
+        self.sums = Sums(found.place, np.zeros(0), nothing, nothing, np.zeros(0), found.kept, found.unread)
 
     def _observed_rates(self) -> bool:
         """Whether what is observed reads rates of eliminated unknowns."""
@@ -392,10 +402,12 @@ class _Condenser:
         if kept is None:
             return None
         places = np.flatnonzero(rows), np.flatnonzero(kept)
-        room = Room(whole, self.settled)
-        return Forms(
-            Condensed(whole, numbers, places[0], room), Condensed(self.settled, numbers, places[1], room)
+        room, terms = Room(whole, self.settled), numbers.composed(whole.unknowns)
+        stepped, settled = (
+            Condensed(system, numbers, terms, rows, room)
+            for system, rows in zip((whole, self.settled), places, strict=True)
         )
+        return Forms(stepped, settled)
 
 
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:

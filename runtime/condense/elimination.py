@@ -16,7 +16,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.condense.composition import ranges
-from sysdyn.runtime.model.description import Description, Floats
+from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.forms import FORMS
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
@@ -114,6 +114,11 @@ def _rank(system: System, family: int) -> int:
     return PREFERRED.index(kind) if kind in PREFERRED else len(PREFERRED)
 
 
+def _numbers(of: Ints) -> set[int]:
+    """Which numbers of families occur."""
+    return set(np.flatnonzero(np.bincount(of + 1)[1:]).tolist())
+
+
 class _Search:
     """Unknowns and the rows that define them, as far as they are found; reads[a]: families that define family a; read:
     families that define any.  No family is defined through itself.
@@ -141,7 +146,7 @@ class _Search:
                 self._take(family, span)
 
     def _families(self, first: int, last: int) -> set[int]:
-        return set(self.of[self.entry[self.start[first] : self.start[last]]].tolist()) - {-1}
+        return _numbers(self.of[self.entry[self.start[first] : self.start[last]]])
 
     def _candidates(self, family: int, span: tuple[int, int]) -> Longs:
         """Entries through which these rows can define unknowns of a family: alone in their row, and free of circles; of
@@ -176,7 +181,7 @@ class _Search:
             return
         entries = self.entry[self.start[span[0]] : self.start[span[1]]]
         taken = entries[np.isin(self.rows[entries], self.rows[chosen])]
-        others = set(self.of[taken].tolist()) - {family}
+        others = _numbers(self.of[taken]) - {family}
         below = 1 + max((self.below[k] for k in others if k in self.reads), default=0)
         if below + self.above.get(family, 0) > LONGEST:
             return

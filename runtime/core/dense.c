@@ -118,8 +118,11 @@ void sd_sparse_factors(int32_t m, int32_t n, int32_t entries, const int32_t *row
         double *scale = side % 2 ? column : row;
         int32_t number = side % 2 ? n : m;
         memset(largest, 0, (size_t)number * sizeof *largest);
-        for (int32_t e = 0; e < entries; e++)
-            largest[of[e]] = fmax(largest[of[e]], size[e] * row[row_of[e]] * column[column_of[e]]);
+        for (int32_t e = 0; e < entries; e++) {
+            double scaled = size[e] * row[row_of[e]] * column[column_of[e]];
+            if (scaled > largest[of[e]])
+                largest[of[e]] = scaled;
+        }
         for (int32_t k = 0; k < number; k++)
             scale[k] *= root(largest[k]);
     }

@@ -20,12 +20,16 @@ static void follow(sd_expanded *expanded)
         for (int32_t i = 0; i < expanded->face.n; i++)
             sd_met(fabs(expanded->y[i]), &expanded->met[i], &expanded->magnitude[i]);
     }
-    expanded->face.nodes = inner->nodes < expanded->nodes ? inner->nodes : expanded->nodes;
+    expanded->face.nodes = inner->nodes;
     expanded->face.node = inner->node;
     expanded->face.node_weight = inner->node_weight;
-    for (int32_t k = 0; k < expanded->face.nodes; k++)
-        sd_condensed_show(expanded->condensed, inner->node_y[k], inner->node_yd[k], expanded->node_y[k],
-                          expanded->node_yd[k]);
+}
+
+/* the points of the quadrature, one by one: together they would be as long as all the rest */
+static void show(const void *self, int32_t k, double *y, double *yd)
+{
+    const sd_expanded *expanded = self;
+    sd_condensed_show(expanded->condensed, expanded->inner->node_y[k], expanded->inner->node_yd[k], y, yd);
 }
 
 static int step(void *self)
@@ -74,27 +78,19 @@ sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, i
 {
     sd_expanded *expanded = calloc(1, sizeof *expanded);
     size_t n = (size_t)unknowns + 8, m = (size_t)condensed->unknowns + 8;
-    int32_t nodes = inner->node_y ? inner->nodes : 0; /* at most */
     if (!expanded)
         return NULL;
-    expanded->memory = calloc(2 * n + 2 * m + 2 * (size_t)nodes * n, sizeof(double));
-    expanded->node_y = calloc(2 * (size_t)nodes + 1, sizeof(double *));
-    if (!expanded->memory || !expanded->node_y) {
+    expanded->memory = calloc(2 * n + 2 * m, sizeof(double));
+    if (!expanded->memory) {
         sd_expanded_free(expanded);
         return NULL;
     }
     expanded->inner = inner;
     expanded->condensed = condensed;
-    expanded->nodes = nodes;
     expanded->y = expanded->memory;
     expanded->yd = expanded->y + n;
     expanded->z = expanded->yd + n;
     expanded->zd = expanded->z + m;
-    expanded->node_yd = expanded->node_y + nodes;
-    for (int32_t k = 0; k < nodes; k++) {
-        expanded->node_y[k] = expanded->zd + m + 2 * (size_t)k * n;
-        expanded->node_yd[k] = expanded->node_y[k] + n;
-    }
     expanded->face = *inner;
     expanded->face.self = expanded;
     expanded->face.n = unknowns;
@@ -104,8 +100,7 @@ sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, i
     expanded->face.dense = dense;
     expanded->face.refine = inner->refine ? refine : NULL;
     expanded->face.start = start;
-    expanded->face.node_y = expanded->node_y;
-    expanded->face.node_yd = expanded->node_yd;
+    expanded->face.show = inner->node_y ? show : NULL;
     return expanded;
 }
 
@@ -114,7 +109,6 @@ void sd_expanded_free(sd_expanded *expanded)
     if (!expanded)
         return;
     free(expanded->memory);
-    free(expanded->node_y);
     free(expanded);
 }
 

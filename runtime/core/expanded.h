@@ -11,9 +11,7 @@ typedef struct sd_expanded {
     sd_stepper *inner;
     const sd_condensed *condensed;
     double *y, *yd, *z, *zd, *memory; /* all unknowns of the point started from or shown last; kept ones */
-    double **node_y, **node_yd;       /* [inner nodes] */
     double *met, *magnitude;          /* [unknowns] of all, which grow with each step as in bdf.h; NULL: they do not */
-    int32_t nodes;                    /* room for as many */
 } sd_expanded;
 
 /* unknowns: of the full system; NULL without memory */

@@ -48,23 +48,48 @@ static int find_small(const sd_balance *m, const double *size, char *small, doub
     return 0;
 }
 
+char *sd_small(const sd_balance *m, const double *size)
+{
+    char *small = malloc((size_t)m->entries + 1);
+    double *line = malloc(((size_t)m->rows + 1) * sizeof *line);
+    if (!small || !line || find_small(m, size, small, line)) {
+        free(small);
+        small = NULL;
+    }
+    free(line);
+    return small;
+}
+
+static int closed(const sd_balance *m, const double *found)
+{
+    for (int32_t k = 0; k < m->unknowns; k++)
+        if (found[k] == 0.0)
+            return 0;
+    return 1;
+}
+
 int sd_propagate(const sd_balance *m, const double *size, const double *excited, const int32_t *silent, int32_t flags,
                  double *found)
 {
+    if (closed(m, found))
+        return 0;
+    char *small = sd_small(m, size);
+    int failed = small ? sd_propagate_beside(m, size, small, excited, silent, flags, found) : -1;
+    free(small);
+    return failed;
+}
+
+int sd_propagate_beside(const sd_balance *m, const double *size, const char *small, const double *excited,
+                        const int32_t *silent, int32_t flags, double *found)
+{
     size_t n = (size_t)m->unknowns, rows = (size_t)m->rows;
-    int open = 0;
-    for (size_t k = 0; k < n; k++)
-        open |= found[k] == 0.0;
+    int open = !closed(m, found);
     if (!open)
         return 0;
-    double *memory = calloc(rows + n + (size_t)m->kinds + 1, sizeof(double));
-    char *small = malloc((size_t)m->entries + 1);
+    double *memory = malloc((rows + n + (size_t)m->kinds + 1) * sizeof *memory);
     double *line = memory, *best = line + rows, *known = best + n;
-    if (!memory || !small || find_small(m, size, small, line)) {
-        free(memory);
-        free(small);
+    if (!memory)
         return -1;
-    }
     double worst = flags & SD_LARGEST ? 0.0 : INFINITY;
     for (int sweep = 0; sweep < SWEEPS && open; sweep++) {
         memcpy(line, excited, rows * sizeof *line);
@@ -110,7 +135,6 @@ int sd_propagate(const sd_balance *m, const double *size, const double *excited,
             break;
     }
     free(memory);
-    free(small);
     return 0;
 }
 
@@ -126,7 +150,8 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const in
         residual[r] = isfinite(residual[r]) ? fabs(residual[r]) : 0.0;
     for (int32_t e = 0; e < m->entries; e++)
         jacobian[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
-    int failed = sd_propagate(m, jacobian, residual, rated, flags, scale);
+    char *small = sd_small(m, jacobian);
+    int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, flags, scale) : -1;
     /* unknowns of y are no less than a thousandth of their like */
     for (int32_t k = 0; k < first; k++)
         most[member[k]] = sd_larger(most[member[k]], scale[k]);
@@ -134,7 +159,8 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const in
         scale[k] = sd_larger(scale[k], SMALL * most[member[k]]);
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     }
-    failed |= sd_propagate(m, jacobian, residual, NULL, flags, scale);
+    failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, flags, scale) : -1;
+    free(small);
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     free(most);
@@ -156,7 +182,7 @@ double sd_excitation(sd_system *system, double t0, double span, const double *y,
         for (size_t r = 0; r < rows; r++) {
             double moved = fabs(now[r] - base[r]);
             moved = isfinite(moved) ? moved : 0.0;
-            moves[r] = fmax(moves[r], moved);
+            moves[r] = moved > moves[r] ? moved : moves[r];
             if (k == 0)
                 early[r] = moved;
         }

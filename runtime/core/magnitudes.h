@@ -37,6 +37,12 @@ enum { SD_LARGEST = 1, SD_CAPPED = 2 };
 int sd_propagate(const sd_balance *balance, const double *size, const double *excited, const int32_t *silent,
                  int32_t flags, double *found);
 
+/* small [entries]: 1 where a coefficient is small beside the largest of its row and kind; freed by the caller, NULL: no
+ * memory.  Several propagations with one `size` have it together. */
+char *sd_small(const sd_balance *balance, const double *size);
+int sd_propagate_beside(const sd_balance *balance, const double *size, const char *small, const double *excited,
+                        const int32_t *silent, int32_t flags, double *found);
+
 /* scale [unknowns] := magnitudes of x, by the entries of a Jacobian and a residual at x, which are overwritten by their
  * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
  * at first; member [first], members: number of the kind of an unknown.  Returns 0; -1: no memory. */

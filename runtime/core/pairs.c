@@ -19,7 +19,8 @@ static void sort_by(int32_t n, int32_t keys, const int32_t *key, const int32_t *
     }
 }
 
-int64_t sd_pairs(int32_t n, int32_t firsts, int32_t seconds, const int32_t *first, const int32_t *second, int32_t *number)
+int64_t sd_pairs(int32_t n, int32_t firsts, int32_t seconds, const int32_t *first, const int32_t *second, int32_t *number,
+                 int32_t *start, int32_t *each)
 {
     int32_t most = firsts > seconds ? firsts : seconds;
     int32_t *room = malloc((2 * (size_t)n + (size_t)most + 1) * sizeof *room);
@@ -29,11 +30,17 @@ int64_t sd_pairs(int32_t n, int32_t firsts, int32_t seconds, const int32_t *firs
     sort_by(n, seconds, second, NULL, once, count);
     sort_by(n, firsts, first, once, twice, count);
     int64_t found = 0;
+    memset(start, 0, ((size_t)firsts + 1) * sizeof *start);
     for (int32_t i = 0; i < n; i++) {
         int32_t e = twice[i], before = i ? twice[i - 1] : e;
-        found += i && (first[e] != first[before] || second[e] != second[before]);
-        number[e] = (int32_t)found;
+        if (!i || first[e] != first[before] || second[e] != second[before]) {
+            each[found++] = second[e];
+            start[first[e] + 1]++;
+        }
+        number[e] = (int32_t)(found - 1);
     }
+    for (int32_t k = 0; k < firsts; k++)
+        start[k + 1] += start[k];
     free(room);
-    return n ? found + 1 : 0;
+    return found;
 }

@@ -5,7 +5,9 @@
 #include <stdint.h>
 
 /* number [n] := place of (first, second) among the distinct pairs in ascending order, first before second; first [n] in
- * 0..firsts-1, second [n] in 0..seconds-1.  Returns how many are distinct; -1: no memory. */
-int64_t sd_pairs(int32_t n, int32_t firsts, int32_t seconds, const int32_t *first, const int32_t *second, int32_t *number);
+ * 0..firsts-1, second [n] in 0..seconds-1; start [firsts + 1]: where the pairs of each first begin, each [n]: the second of
+ * each distinct pair.  Returns how many are distinct; -1: no memory. */
+int64_t sd_pairs(int32_t n, int32_t firsts, int32_t seconds, const int32_t *first, const int32_t *second, int32_t *number,
+                 int32_t *start, int32_t *each);
 
 #endif

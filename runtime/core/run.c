@@ -112,7 +112,10 @@ static void integrate_nodes(sd_run *run, double part)
         double weight = part < 1.0 ? share[k + 1] : stepper->node_weight[k];
         if (weight == 0.0)
             continue;
-        audit(run, from + stepper->node[k] * h, stepper->node_y[k], stepper->node_yd[k], run->sample);
+        if (stepper->show)
+            stepper->show(stepper->self, k, run->aux, run->aux_d);
+        const double *y = stepper->show ? run->aux : stepper->node_y[k];
+        audit(run, from + stepper->node[k] * h, y, stepper->show ? run->aux_d : stepper->node_yd[k], run->sample);
         weigh(run, h * weight);
     }
     for (int32_t k = 2; stepper->moves && k < run->audited; k++)

@@ -197,13 +197,16 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
     int32_t n = b->unknowns;
     /* what round-off leaves of a zero is nothing beside what the sources will make of it */
     memset(balanced, 0, (size_t)n * sizeof *balanced);
-    int failed = sd_propagate(b, size, excited, NULL, SD_CAPPED, balanced);
+    char *small = sd_small(b, size);
+    if (!small)
+        return -1;
+    int failed = sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++)
         found[k] = carries[k] && found[k] < ROUND_OFF * balanced[k] ? balanced[k] : found[k];
     /* momenta and dynamic variables are balanced against flows, what follows from the state against all of it */
     for (int32_t k = 0; k < n; k++)
         balanced[k] = carries[k] && (s->kind[k] & (SD_DISPLACEMENT | SD_FLOW)) ? found[k] : 0.0;
-    failed |= sd_propagate(b, size, excited, NULL, SD_LARGEST | SD_CAPPED, balanced);
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_LARGEST | SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++) {
         int whole = !(s->kind[k] & (SD_MOMENTUM | SD_DYNAMIC)) || found[k] > NOISE * balanced[k];
         found[k] = whole ? found[k] : balanced[k];
@@ -213,7 +216,8 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
     for (int32_t e = 0; e < b->entries; e++)
         row[b->row[e]] = sd_larger(row[b->row[e]], size[e] * kept[b->column[e]]);
     efforts(s, found, row, excited);
-    failed |= sd_propagate(b, size, excited, NULL, SD_CAPPED, balanced);
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
+    free(small);
     for (int32_t k = 0; k < n; k++)
         found[k] = found[k] > NOISE * balanced[k] ? found[k] : balanced[k];
     return failed;

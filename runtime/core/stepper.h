@@ -48,6 +48,8 @@ typedef struct sd_stepper {
     const double *moves, *part_moves; /* [rows of block audit] what moves of displacements that took no time add to the
                                        * integrals over the last step, and over the part of it; NULL: nothing */
     int32_t collocated;        /* 1: at most SD_NODES nodes; a polynomial through them and the start serves within the step */
+    /* y, yd [n] := those at node k, where they do not stand in node_y, node_yd (NULL: they do) */
+    void (*show)(const void *self, int32_t k, double *y, double *yd);
 } sd_stepper;
 
 #define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.condensed import LARGE, Condensed, Forms, condensed
+from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
 from sysdyn.runtime.condense.elimination import steady
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.least_norm import LeastNorm
@@ -34,7 +34,7 @@ from sysdyn.runtime.model import core_structures as structures
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.start.restart import Restart, still
 from sysdyn.runtime.start.settled import Settler, flows_open
@@ -80,11 +80,12 @@ class Integration:
     def __init__(
         self, system: System, start: ConsistentState, request: Request, origin: Origin | None = None
     ) -> None:
-        """origin: of this start, where it is known."""
+        """origin: of this start, where it is known for several runs."""
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
+        alone = origin is None
         self.origin = origin = origin or Origin(system, start, request.index)
-        self.y, self.yd, self._start_rate = origin.y.copy(), origin.yd.copy(), origin.rate.copy()
+        self.y, self.yd, self._start_rate = origin.point(own=alone)
         self._restart: Restart | None = None
         self.roles: Roles = origin.roles
         self.underlying: Underlying | None = None
@@ -97,8 +98,7 @@ class Integration:
         if system.form.name == "2":
             self._weigh()
         self._light = origin.light
-        if system.unknowns > LARGE:
-            origin.let_go()
+        self._spare()
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
         self.forms = self._condensed()
         self._linear()
@@ -111,9 +111,17 @@ class Integration:
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         self._stepper()
         self._driver()
-        if system.unknowns > LARGE:
-            lib.core.sd_trim()
         self.pieces = Pieces(self, request.events) if request.events else None
+        self._spare()
+        if system.unknowns > LARGE:
+            del self.origin
+
+    def _spare(self) -> None:
+        """Lets go of what a large model found on its way here, and would find again."""
+        if self.system.unknowns > LARGE:
+            self.origin.let_go()
+            self.system.spare()
+            lib.core.sd_trim()
 
     def _weigh(self) -> None:
         """The factors of the rows q' - f; the magnitudes of nu follow them."""
@@ -130,8 +138,7 @@ class Integration:
         if whole or not request.condense or request.method in ON_UNDERLYING:
             return None
         found = condensed(self.system, self.start.t, self.y, self.yd)
-        if self.system.unknowns > LARGE:
-            lib.core.sd_trim()
+        self._spare()
         return found
 
     @property
@@ -242,7 +249,7 @@ class Integration:
                 expanded = self.method.expanded.contents
                 expanded.met, expanded.magnitude = lib.pointer(self._met), lib.pointer(self.magnitude)
 
-    def _kept_roles(self, whole: System, kept: NDArray[np.int64]) -> Roles:
+    def _kept_roles(self, whole: System, kept: Ints) -> Roles:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
         _, jyd = whole.jacobian(self.start.t, self.y, self.yd)
         found = roles(whole, self.start.t, jyd, min(self.request.index, 2))

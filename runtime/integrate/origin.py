@@ -38,6 +38,10 @@ class Origin:
         self.kept: Roles | None = None
         """Roles of what is left where unknowns leave the runs (condense/)."""
 
+    def point(self, *, own: bool) -> tuple[Floats, Floats, Floats]:
+        """y, yd, rate [unknowns]; own: nobody else has them."""
+        return (self.y, self.yd, self.rate) if own else (self.y.copy(), self.yd.copy(), self.rate.copy())
+
     @property
     def jy(self) -> Floats:
         """dF/dy [entries] at the start."""
@@ -54,8 +58,8 @@ class Origin:
         return self._matrix
 
     def let_go(self) -> None:
-        """Of the Jacobian: found again if asked."""
-        self._matrix = None
+        """Of the Jacobian and what follows from it: found again if asked."""
+        self._matrix = self._sized = self._light = None
 
     def sized(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
@@ -82,4 +86,3 @@ class Origin:
     def weighted(self) -> None:
         """The entries of the Jacobian anew: its rows q' - f have other factors."""
         self.let_go()
-        self._sized = self._light = None

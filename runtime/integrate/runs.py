@@ -23,7 +23,7 @@ from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Fin
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.trace.keeping import Held, Writer, keeping
 from sysdyn.runtime.trace.trace import Column, Layout, Trace, columns_of
@@ -178,8 +178,10 @@ class Runs:
 
     @property
     def origin(self) -> Origin | None:
-        """The start as the system sees it, for all runs; events leave numbers behind: each run its own."""
-        if self._origin is None and not self.options.events:
+        """The start as the system sees it, for all runs.  Where events leave numbers behind each run has its own, as of
+        a large model, which lets it go.
+        """
+        if self._origin is None and not self.options.events and self.system.unknowns <= LARGE:
             self._origin = Origin(self.system, self.start, self.index)
         return self._origin
 

@@ -8,7 +8,7 @@ empty): where coordinates without inertia are determined by constraints, and imp
 from __future__ import annotations
 
 import ctypes as c
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,6 +32,7 @@ SMALL = 32
 """Unknowns up to which the core judges the matrix first (core/dense.h)."""
 DENSE = 300
 """Unknowns up to which the matrix is judged by its singular values."""
+NONE = np.zeros(0, dtype=np.int32)
 _DERIVED = {"phi": "phi_acceleration", "phi_rate": "phi_acceleration", "psi": "psi_rate", "momentum": "momentum_rate"}
 """Block of a constraint -> block of form 0 in whose rows its residual stands in a projection."""
 
@@ -55,6 +56,23 @@ class Selection:
     direct: bool
     silent: tuple[int, ...]
     applied: tuple[int, ...]
+
+
+class Names(Sequence[str]):
+    """Names of unknowns at places, with a prime where `rate` is not zero; each is made when it is read, for of a large
+    model only the first are told.
+    """
+
+    def __init__(self, system: System, places: NDArray[np.integer], rate: NDArray[np.integer]) -> None:
+        self._system, self._places, self._rate = system, places, rate
+
+    def __len__(self) -> int:
+        return int(self._places.size)
+
+    def __getitem__(self, at: Any) -> Any:
+        if isinstance(at, slice):
+            return Names(self._system, self._places[at], self._rate[at])
+        return self._system.name(int(self._places[at])) + "'" * int(self._rate[at] > 0)
 
 
 def _solved_for(system: System) -> tuple[Ints, Ints, Ints]:
@@ -168,8 +186,8 @@ class Accelerations:
         """Entries of the matrix from those of dF/dy, dF/dy'."""
         return np.where(self._from_rate > 0, jyd[self._source], jy[self._source])
 
-    def undetermined(self, jy: Floats, jyd: Floats) -> tuple[str, ...]:
-        """Unknowns, or x' for their derivatives, that the rows do not determine at a point; () where they do."""
+    def undetermined(self, jy: Floats, jyd: Floats) -> Sequence[str]:
+        """Unknowns, or x' for their derivatives, that the rows do not determine at a point; none where they do."""
         number = self.pattern.unknowns
         if number == 0:
             return ()
@@ -189,12 +207,10 @@ class Accelerations:
         null = vectors[count(sigma, CERTAIN) :]
         return self._largest(np.abs(null).max(axis=0) if null.size else np.zeros(number))
 
-    def _largest(self, null: Floats) -> tuple[str, ...]:
+    def _largest(self, null: Floats) -> Names:
         """Names of the largest entries of a null vector."""
-        if not null.any():
-            return ()
-        places = np.flatnonzero(null > 1e-3 * null.max())
-        return tuple(self.system.name(int(self._unknown[k])) + "'" * int(self._rate[k] > 0) for k in places)
+        places = np.flatnonzero(null > 1e-3 * null.max()) if null.any() else NONE
+        return Names(self.system, self._unknown[places], self._rate[places])
 
 
 class Underlying(Accelerations):
@@ -276,7 +292,7 @@ class Underlying(Accelerations):
             lib.core.sd_linear_free(self.linear)
 
 
-def underlying_form(system: System, state: ConsistentState) -> tuple[System, tuple[str, ...]]:
+def underlying_form(system: System, state: ConsistentState) -> tuple[System, Sequence[str]]:
     """What is solved for the slopes, and what it leaves undetermined at a state; system: form "0".
 
     That system itself; where coordinates without inertia are in the way, one in which constraints stand as they are.
@@ -290,15 +306,16 @@ def underlying_form(system: System, state: ConsistentState) -> tuple[System, tup
     return system, missing
 
 
-def rateless(system: System, state: ConsistentState) -> tuple[str, ...]:
+def rateless(system: System, state: ConsistentState) -> Sequence[str]:
     """What of form 0 has no rate at a state: flows solved for at each stage cost the explicit method its lead."""
     massless = Accelerations(system).without_rate
     if massless.any():
-        return tuple(system.name(int(k)) for k in np.flatnonzero(massless))
+        places = np.flatnonzero(massless)
+        return Names(system, places, np.zeros_like(places))
     return obstacle(system, state)
 
 
-def obstacle(system: System, state: ConsistentState) -> tuple[str, ...]:
+def obstacle(system: System, state: ConsistentState) -> Sequence[str]:
     """What keeps a model from having an underlying equation: unknowns not determined at a state.  system: form "0"."""
     y, yd = state.for_form(system)
     jy, jyd = system.jacobian(state.t, y, yd)

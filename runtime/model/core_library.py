@@ -179,7 +179,7 @@ def _load() -> Any:
         "sd_linear_paired": (None, [_P]),
         "sd_linear_z_paired": (None, [_P]),
         "sd_linear_z_pivoted": (_P, [_P]),
-        "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P]),
+        "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P, _P, _P]),
         "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P]),
         "sd_trim": (None, []),
         "sd_determined": (c.c_int, [_I, _I, *[_P] * 4, _D, _L, _P, _P]),

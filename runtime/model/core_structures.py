@@ -151,6 +151,7 @@ class Stepper(c.Structure):
         *[(name, _P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
         *[(name, _P) for name in ["moves", "part_moves"]],
         ("collocated", _I),
+        ("show", _P),
     ]
 
 
@@ -159,9 +160,7 @@ class Expanded(c.Structure):
 
     _fields_ = [
         ("face", Stepper),
-        *[(name, _P) for name in ["inner", "condensed", "y", "yd", "z", "zd", "memory", "node_y", "node_yd"]],
-        *[(name, _P) for name in ["met", "magnitude"]],
-        ("nodes", _I),
+        *[(name, _P) for name in ["inner", "condensed", "y", "yd", "z", "zd", "memory", "met", "magnitude"]],
     ]
 
 

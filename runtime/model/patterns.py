@@ -138,11 +138,7 @@ def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern
     )
     if row.size and (row.min() < 0 or row.max() >= rows or column.min() < 0 or column.max() >= unknowns):
         raise ContractError("an entry lies outside the matrix")
-    number, count = numbered(column, row, unknowns, rows)
-    starts, own = np.zeros(unknowns + 1, dtype=np.int32), np.zeros(count, dtype=np.int32)
-    own[number] = column
-    starts[1:] = np.cumsum(np.bincount(own, minlength=unknowns))
-    own[number] = row
+    number, starts, own = numbered(column, row, unknowns, rows)
     cuts = np.cumsum([part.row.size for part in parts])[:-1]
     slots = [np.ascontiguousarray(piece) for piece in np.split(number, cuts)]
     return Pattern(rows, unknowns, starts, own), slots
@@ -150,14 +146,15 @@ def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern
 
 def numbered(
     first: NDArray[np.integer], second: NDArray[np.integer], firsts: int, seconds: int
-) -> tuple[Ints, int]:
-    """The place of each pair [entries] among the distinct ones in ascending order, and their number; first below
-    firsts, second below seconds.
+) -> tuple[Ints, Ints, Ints]:
+    """The place of each pair [entries] among the distinct ones in ascending order; where those of each first begin
+    [firsts + 1]; the second of each distinct pair; first below firsts, second below seconds.
     """
-    number = np.zeros(first.size, dtype=np.int32)
+    number, start = np.empty(first.size, dtype=np.int32), np.empty(max(firsts, 1) + 1, dtype=np.int32)
+    each = np.empty(first.size, dtype=np.int32)
     pair = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in (first, second))
-    arrays = map(lib.pointer, (*pair, number))
+    arrays = map(lib.pointer, (*pair, number, start, each))
     count = lib.core.sd_pairs(number.size, max(firsts, 1), max(seconds, 1), *arrays)
     if count < 0:
         raise MemoryError
-    return number, int(count)
+    return number, start[: firsts + 1], each[:count].copy()

@@ -112,15 +112,15 @@ def _displaced(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.concatenate(rows), np.concatenate(columns)
 
 
-def alike(system: System) -> NDArray[np.int64]:
+def alike(system: System) -> Ints:
     """Number of the kind and unit of each unknown [unknowns]; read-only."""
     return system.once("alike", lambda: _alike(system))
 
 
-def _alike(system: System) -> NDArray[np.int64]:
+def _alike(system: System) -> Ints:
     families = system.description.families
     keys: dict[tuple[str, str], int] = {}
-    number = np.empty(len(families) + 1, dtype=np.int64)
+    number = np.empty(len(families) + 1, dtype=np.int32)
     for k, family in enumerate(families):
         number[k] = keys.setdefault((family.kind, family.unit), len(keys))
     number[-1] = len(keys)
@@ -129,13 +129,20 @@ def _alike(system: System) -> NDArray[np.int64]:
 
 def group_maximum(system: System, values: Floats) -> Floats:
     """Largest value among the unknowns of the same kind and unit."""
-    return _group_maximum(alike(system), values)
+    return largest_of_group(alike(system), values)
 
 
-def _group_maximum(group: NDArray[np.int64], values: Floats) -> Floats:
-    largest = np.zeros(int(group.max(initial=0)) + 1)
-    np.maximum.at(largest, group, values)
-    return largest[group]
+def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
+    """Of each value the largest of its group [values]; zero at least.  Groups lie in stretches, for families do."""
+    if not group.size:
+        return np.zeros(0)
+    new = np.ones(group.size, dtype=bool)
+    np.not_equal(group[1:], group[:-1], out=new[1:])
+    begin = np.flatnonzero(new)
+    of = group[begin]
+    largest = np.zeros(int(of.max()) + 1)
+    np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
+    return np.repeat(largest[of], np.diff(begin, append=group.size))
 
 
 def balanced(system: System, y: Floats, jy: Floats) -> Floats:

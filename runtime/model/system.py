@@ -42,6 +42,10 @@ class Layout:
 
 KEPT = 1000
 """Unknowns up to which what is as long as they are, and quickly made, is kept."""
+LARGE = 100_000
+"""Unknowns beyond which what can be found again is let go: of a large model the room counts."""
+DEAR = ("order", "sets")
+"""Names of what is long to find and short to keep."""
 SETS = 4096
 """Active sets whose rows are kept."""
 
@@ -115,6 +119,16 @@ class System:
         if self.description.systems is None:
             layouts = self.description.layouts
             for key in [k for k in layouts if isinstance(k, tuple) and self.form.name in (k[0], k[1], *k[2:3])]:
+                del layouts[key]
+
+    def spare(self) -> None:
+        """Lets go of all that was made once for any form but orders of elimination, where no other run has it: what is
+        in use stays with those who use it, the rest is found again if asked.
+        """
+        if self.description.systems is None:
+            layouts = self.description.layouts
+            made = [k for k in layouts if isinstance(k, tuple) and k[0] == "once"]
+            for key in [k for k in made if k[1] not in DEAR and k[1][0] not in DEAR]:
                 del layouts[key]
 
     def forget_once(self, name: Hashable) -> None:
@@ -406,7 +420,7 @@ class System:
         """Label of one row."""
         return self.form.row_label(self.description, row)
 
-    @cached_property
+    @property
     def kinds(self) -> NDArray[np.str_]:
         """Kind of each unknown: q f p s e kappa mu nu; read-only."""
         return self.once("kinds", lambda: read_only(self._kinds()))
@@ -438,7 +452,7 @@ class System:
                 mask[first : first + self.description.rows[family].size] = True
         return mask
 
-    @cached_property
+    @property
     def family_of(self) -> Ints:
         """Number of the family of each unknown (nu: -1); read-only."""
         return self.once("family_of", self._family_of)
@@ -450,7 +464,7 @@ class System:
                 found[self.form.at[k] : self.form.at[k] + family.size] = k
         return read_only(found)
 
-    @cached_property
+    @property
     def nominal(self) -> Floats:
         """Nominal magnitudes from the manifest; 0 where it names none; read-only."""
         return self.once("nominal", self._nominal)

@@ -158,19 +158,31 @@ class _Linear:
     """The linearised rows at a point: A [used rows, free unknowns] in scaled unknowns and rows."""
 
     def __init__(self, problem: Problem, x: Floats) -> None:
-        unit = problem.scale / problem.weight
-        values = problem.jacobian(x)
-        take = problem.use[problem.rows] & problem.free[problem.columns]
-        rows, columns = problem.rows[take], problem.columns[take]
-        values = np.where(np.isfinite(values[take]), values[take], 0.0)
+        self.unit, self.problem = problem.scale / problem.weight, problem
+        self._values = problem.jacobian(x)
+        rows, columns, values = self._taken()
         # a row is as large as its terms are, in magnitudes
         size = np.zeros(problem.number)
         np.add.at(size, rows, np.abs(values) * problem.scale[columns])
         self.row_scale = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
-        self.unit, self.problem = unit, problem
-        number = np.cumsum(problem.use) - 1, np.cumsum(problem.free) - 1
-        self.entries = (number[0][rows], number[1][columns], values * unit[columns] * self.row_scale[rows])
         self.shape = int(problem.use.sum()), int(problem.free.sum())
+
+    def _taken(self) -> tuple[Any, Any, Floats]:
+        """Rows, columns and values of the entries in use."""
+        problem = self.problem
+        take = problem.use[problem.rows] & problem.free[problem.columns]
+        values = self._values[take]
+        values[~np.isfinite(values)] = 0.0
+        return problem.rows[take], problem.columns[take], values
+
+    @property
+    def entries(self) -> tuple[Any, Any, Floats]:
+        """A by its entries, made when they are asked for: a point that holds needs none."""
+        rows, columns, values = self._taken()
+        values *= self.unit[columns]
+        values *= self.row_scale[rows]
+        numbers = (np.cumsum(mask, dtype=np.int32) - 1 for mask in (self.problem.use, self.problem.free))
+        return next(numbers)[rows], next(numbers)[columns], values
 
     def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
         """The u of least norm with A u = A u_now - r; beside it, the step of least norm: its round-off is its own."""
@@ -226,14 +238,17 @@ def determined(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
     """
     i, j, v = entries
     here = v != 0.0
+    if not here.all():
+        i, j, v = i[here], j[here], v[here]
     used = np.zeros(shape[1], dtype=bool)
-    used[j[here]] = True
+    used[j] = True
     rows, unknowns = shape[0], int(used.sum())
     if unknowns > rows:
         return None
     number = np.cumsum(used, dtype=np.int32) - 1
-    pattern, (slot,) = compress(rows, unknowns, [Places(i[here], number[j[here]])])
-    values, found = np.bincount(slot, weights=v[here], minlength=pattern.entries), np.zeros(unknowns)
+    pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
+    values, found = np.bincount(slot, weights=v, minlength=pattern.entries), np.zeros(unknowns)
+    del slot, number, here
     order = tall_order(pattern)
     arrays = (lib.pointer(item) for item in (pattern.column, pattern.row, values, order))
     limits = PIVOT, FILLED * pattern.entries

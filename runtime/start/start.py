@@ -16,7 +16,7 @@ import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
@@ -38,8 +38,6 @@ _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
 UNPERTURBED = 2
 """Trials of a stage that begin at the guess itself: the restricted problem, the whole one."""
-LARGE = 100_000
-"""Unknowns of a start beyond which its structures are let go: of a large model the room counts."""
 _FEW = 3
 """Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (

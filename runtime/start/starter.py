@@ -21,8 +21,8 @@ from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.patterns import read_only
-from sysdyn.runtime.model.scales import group_maximum
-from sysdyn.runtime.model.system import KEPT, System
+from sysdyn.runtime.model.scales import group_maximum, largest_of_group
+from sysdyn.runtime.model.system import KEPT, LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.equations import Equations
@@ -104,10 +104,16 @@ def remembered(
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
         if not self.remember:
             return ask(self, t, x)
-        known, here = self.known.get(name), x.tobytes()
-        if known is None or known[0] != t or known[1] != here:
-            known = self.known[name] = (t, here, ask(self, t, x))
-        return known[2].copy()
+        here, known = self.point(t, x), self.known.get(name)
+        if known is not None and known[0] is here:
+            return known[1].copy()
+        found, large = ask(self, t, x), x.size > LARGE
+        if large and any(point is not here for point, _ in self.known.values()):
+            self.known.clear()  # the room counts: one point, and nothing longer
+        if large and found.size > x.size:
+            return found
+        self.known[name] = here, found
+        return found.copy()
 
     return answer
 
@@ -122,7 +128,7 @@ class Starter:
     def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
         self.system = system
         self.remember = remember  # one search for a start: nothing but t and x changes
-        self.known: dict[str, tuple[float, bytes, NDArray[Any]]] = {}
+        self.known: dict[str, tuple[tuple[float, bytes], NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
         self.plain = True  # small problems are searched in the core, which has one way of least change
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
@@ -146,6 +152,11 @@ class Starter:
         self.written = np.concatenate(
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
+
+    def point(self, t: float, x: Floats) -> tuple[float, bytes]:
+        """The point (t, x): one object for all answers there."""
+        asked = t, x.tobytes()
+        return next((here for here, _ in self.known.values() if here == asked), asked)
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
@@ -272,6 +283,8 @@ class Starter:
     def _between(self, kinds: Sequence[str]) -> Mask:
         outside = ~self.moves(kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
+        if not mask.any():
+            return np.asarray(mask)
         mask[self.rows[self._structural & outside[self.columns]]] = False
         return mask
 
@@ -401,9 +414,7 @@ class Starter:
 
     def largest_alike(self, x: Floats) -> Floats:
         """Of each unknown the largest magnitude of its kind and unit."""
-        largest = np.zeros(int(self.equations.alike.max(initial=0)) + 1)
-        np.maximum.at(largest, self.equations.alike, np.abs(x))
-        return np.asarray(largest[self.equations.alike])
+        return largest_of_group(self.equations.alike, np.abs(x))
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:

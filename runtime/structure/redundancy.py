@@ -180,7 +180,7 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     starter, x, size = _around(system, state)
     q, rows = starter.moves(("q",))[: x.size], starter.groups("phi")
     found = []
-    for direction in _directions(system, POINTS)[:, : x.size]:
+    for direction in _directions(system, POINTS, 2 * system.form.written)[:, : x.size]:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * size * direction
             if rows.any() and q.any():
@@ -218,20 +218,20 @@ def vanished(system: System, state: ConsistentState) -> Ints:
         system.failure.check()
         return found
 
-    anywhere = y + np.maximum(np.abs(y), 1.0) * _directions(system, 1)[0, : y.size]
+    anywhere = y + np.maximum(np.abs(y), 1.0) * _directions(system, 1, y.size)[0]
     here, elsewhere = sizes(np.stack([y, anywhere]))
     straight = (here > 0.0) & (here == elsewhere)
     if straight.all():  # rows of J that are the same everywhere vanish nowhere
         return NONE
     starter, x, size = _around(system, state)
-    shaken = (x + BESIDE * size * _directions(system, POINTS)[:, : x.size])[:, : starter.n]
+    shaken = (x + BESIDE * size * _directions(system, POINTS, 2 * system.form.written)[:, : x.size])[:, : starter.n]
     there = sizes(shaken).min(axis=0, initial=np.inf)
     return np.flatnonzero(here <= TOLERANCE * there).astype(np.int32)
 
 
-def _directions(system: System, number: int) -> Floats:
-    """Directions [number, 2 unknowns] without a pattern, always the same."""
-    return system.once_if_small(("directions", number), lambda: normal(number, 2 * system.form.written))
+def _directions(system: System, number: int, size: int) -> Floats:
+    """Directions [number, size] without a pattern, always the same."""
+    return system.once_if_small(("directions", number, size), lambda: normal(number, size))
 
 
 def combination(found: Reactions, left: Ints) -> Floats:

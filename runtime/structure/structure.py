@@ -9,16 +9,19 @@ Freedom: rank of [Phi_q; Psi_f], taken from the reactions of the multipliers (vi
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.ordering import order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
-from sysdyn.runtime.start.start import LARGE, ConsistentState
+from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, independent, nearby, reactions, vanished
 from sysdyn.values import dataclass
 
@@ -39,6 +42,7 @@ CLEAR = 0.1
 RESOLVED = 1e-9
 """Least pivot, as part of its column, of factors that tell: where cj is too large, sums of rows in which the rates
 cancel are round-off."""
+SIDES = 2
 NONE = np.zeros(0, dtype=np.int32)
 SLIDES = 2.0
 """Of a branch (events/kinks.py)."""
@@ -121,42 +125,52 @@ def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...]
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models)."""
-    pattern = system.pattern
+    pattern, order = system.pattern, order_of(system)
     columns = pattern.columns_of()
     row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), (pattern.rows, pattern.unknowns))
     scale = row[pattern.row] * column[columns]
-    sides = np.random.default_rng(3).standard_normal((4, pattern.rows))
-    for rate in RATES:
-        sizes, least = [], 1.0
-        for cj in (rate, 10.0 * rate):
-            size, pivot = _inverse(system, (jy + cj * jyd) * scale, sides.copy())
-            least = min(least, pivot)
-            sizes.append(size)
-            if not (np.isfinite(size) and size > 0.0):
-                break
-        else:
-            growth = float(np.log10(sizes[1] / sizes[0]))
-            tells = least >= RESOLVED and abs(growth - round(growth)) <= CLEAR
-            if (tells or rate == RATES[-1]) and 0 <= round(growth) + 1 <= MAX_INDEX:
-                return round(growth) + 1
-    return None
-
-
-def _inverse(system: System, values: Floats, sides: Floats) -> tuple[float, float]:
-    """Largest entry of A^-1 b for sides b [k, rows], infinite where A (by its entries) is singular; least pivot."""
-    pattern, order = system.pattern, order_of(system)
+    del columns, row, column
     places = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(order)
     linear = lib.core.sd_linear_new(pattern.unknowns, *places)
     if not linear:
         raise MemoryError
     try:
-        if lib.core.sd_linear_factor(linear, lib.pointer(values), None):
-            return np.inf, 0.0
-        for side in sides:
-            lib.core.sd_linear_solve(linear, lib.pointer(side))
-        return float(np.abs(sides).max()), float(linear.contents.smallest)
+        for rate in RATES:
+            index = _growth(linear, lambda cj: (jy + cj * jyd) * scale, rate)
+            if index is not None:
+                return index
     finally:
         lib.core.sd_linear_free(linear)
+    return None
+
+
+def _growth(linear: Any, matrix: Callable[[float], Floats], rate: float) -> int | None:
+    """The index by the growth from cj = rate to ten times that; None where it does not tell.
+
+    The larger cj comes first: there sums of rows lose most, and the pivots that it finds serve the other one.
+    """
+    sizes, least = [], 1.0
+    for cj in (10.0 * rate, rate):
+        size, pivot = _inverse(linear, matrix(cj))
+        if not (np.isfinite(size) and size > 0.0):
+            return None
+        least = min(least, pivot)
+        sizes.append(size)
+    growth = float(np.log10(sizes[0] / sizes[1]))
+    tells = least >= RESOLVED and abs(growth - round(growth)) <= CLEAR
+    return round(growth) + 1 if (tells or rate == RATES[-1]) and 0 <= round(growth) + 1 <= MAX_INDEX else None
+
+
+def _inverse(linear: Any, values: Floats) -> tuple[float, float]:
+    """Largest entry of A^-1 b for SIDES sides b, infinite where A (by its entries) is singular; least pivot."""
+    if lib.core.sd_linear_factor(linear, lib.pointer(values), None):
+        return np.inf, 0.0
+    random, largest = np.random.default_rng(3), 0.0
+    for _ in range(SIDES):
+        side = random.standard_normal(int(linear.contents.n))
+        lib.core.sd_linear_solve(linear, lib.pointer(side))
+        largest = np.maximum(largest, np.abs(side, out=side).max())  # no number where one is none
+    return float(largest), float(linear.contents.smallest)
 
 
 def _place(system: System, multiplier: int) -> tuple[int, int]:
@@ -285,8 +299,8 @@ def structure(system: System, state: ConsistentState) -> Structure:
     group = tuple((_label(system, int(places[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8))
     names = tuple(_place(system, int(places[k])) for k in left)
     if system.unknowns > LARGE:
-        for once in (("reacting places", idle.tobytes()), "sizes of J"):
-            system.forget_once(once)
+        system.spare()
+        lib.core.sd_trim()
     return Structure(
         index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names
     )

@@ -81,7 +81,7 @@ class Bench:
         for _ in range(repetitions):
             try:
                 outcome = simulate(
-                    self.prepared.manifest,
+                    self.prepared.structure,
                     self.prepared.arrays,
                     self.prepared.carrier,
                     asked,

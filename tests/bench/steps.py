@@ -72,7 +72,7 @@ class Line:
         options = replace(self.options, method=method, rtol=rtol)
         with patch.object(Integration, "run", caught), suppress(_CaughtError):
             simulate(
-                self.prepared.manifest, self.prepared.arrays, self.prepared.carrier, options,
+                self.prepared.structure, self.prepared.arrays, self.prepared.carrier, options,
                 start=self.started.state, facts=self.started.facts,
             )  # fmt: skip
         return made[0]

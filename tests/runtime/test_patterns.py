@@ -41,6 +41,7 @@ def test_pairs_are_numbered_in_their_order(size, firsts, seconds):
     random = np.random.default_rng(size)
     first, second = random.integers(0, firsts, size), random.integers(0, seconds, size)
     keys, wanted = np.unique(first * seconds + second, return_inverse=True)
-    found, count = numbered(first, second, firsts, seconds)
-    assert count == keys.size
+    found, begin, each = numbered(first, second, firsts, seconds)
     assert np.array_equal(found, wanted.ravel())
+    assert np.array_equal(each, keys % seconds)
+    assert np.array_equal(np.repeat(np.arange(firsts), np.diff(begin)), keys // seconds)
