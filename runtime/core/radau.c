@@ -1,5 +1,6 @@
 /* The step of Radau IIA: stages by Newton's iteration, error, step size (see radau.h). */
 #include "radau.h"
+#include "threads.h"
 
 #include <float.h>
 #include <math.h>
@@ -99,8 +100,10 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
     radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
-    radau->gz = calloc(pairs * m + nnz, sizeof(double complex));
-    if (!radau->memory || !radau->gz || !radau->gap) {
+    size_t apart = system->unknowns < SD_LARGE ? 1 : pairs; /* complex matrices at once */
+    radau->gz = calloc(pairs * m + apart * nnz, sizeof(double complex));
+    radau->sums = calloc(2 * (m / SD_STRETCH + 1), sizeof(double));
+    if (!radau->memory || !radau->gz || !radau->gap || !radau->sums) {
         sd_radau_free(radau);
         return NULL;
     }
@@ -115,7 +118,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     radau->jyd = radau->jy + nnz;
     radau->g = radau->jyd + nnz;
     for (size_t k = 0; k < pairs; k++) {
-        radau->w[k] = radau->gz + nnz + k * m;
+        radau->w[k] = radau->gz + apart * nnz + k * m;
         radau->complex_linear[k] = complex_linear[k];
     }
     radau->system = system;
@@ -137,6 +140,7 @@ void sd_radau_free(sd_radau *radau)
     free(radau->memory);
     free(radau->gz);
     free(radau->gap);
+    free(radau->sums);
     free(radau);
 }
 
@@ -260,6 +264,58 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->theta = 1.0;
 }
 
+/* whether parts of a step are taken at once; where they are is a matter of size, not of the machine */
+static int large(const sd_radau *radau)
+{
+    return radau->n >= SD_LARGE;
+}
+
+typedef struct factoring {
+    sd_radau *radau;
+    int failed[SD_PAIRS + 1];
+} factoring;
+
+/* part 0: J + gamma/h E and its factors; part k: those of J + lambda/h E of pair k - 1 */
+static void factorise_one(void *context, int part)
+{
+    factoring *all = context;
+    sd_radau *radau = all->radau;
+    const sd_radau_method *method = radau->method;
+    int32_t entries = radau->system->entries;
+    if (part == 0) {
+        double real = method->gamma / radau->h;
+        for (int32_t e = 0; e < entries; e++)
+            radau->g[e] = radau->jy[e] + real * radau->jyd[e];
+        all->failed[0] = sd_linear_factor(radau->linear, radau->g, radau->scale);
+        return;
+    }
+    double complex both = method->lambda[part - 1] / radau->h;
+    double complex *gz = radau->gz + (large(radau) ? (size_t)(part - 1) * ((size_t)entries + 1) : 0);
+    for (int32_t e = 0; e < entries; e++)
+        gz[e] = radau->jy[e] + both * radau->jyd[e];
+    all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, radau->scale);
+}
+
+/* the factors of all matrices of a step; the failure of the first that has none */
+static int factorise_all(sd_radau *radau)
+{
+    factoring all = {radau, {0}};
+    int failed = 0;
+    if (large(radau))
+        sd_side_by_side(radau->method->pairs + 1, factorise_one, &all);
+    for (int part = 0; part <= radau->method->pairs && !failed; part++) {
+        if (!large(radau))
+            factorise_one(&all, part);
+        failed = all.failed[part];
+        if (part == 0) {
+            radau->bad_row = radau->linear->bad_row;
+            radau->bad_column = radau->linear->bad_column;
+        } else if (failed)
+            sd_linear_z_bad(radau->complex_linear[part - 1], &radau->bad_row, &radau->bad_column);
+    }
+    return failed;
+}
+
 /* J, E where they are not old, and the factors of J + gamma/h E and all J + lambda/h E.  Taken at the last accepted point, or
  * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
 static int factorise(sd_radau *radau, int at_end)
@@ -287,22 +343,9 @@ static int factorise(sd_radau *radau, int at_end)
         }
         radau->old_jacobian = 1;
     }
-    double real = method->gamma / radau->h;
-    for (int32_t e = 0; e < system->entries; e++)
-        radau->g[e] = radau->jy[e] + real * radau->jyd[e];
     radau->ready = 0;
     radau->factorisations++;
-    int failed = sd_linear_factor(radau->linear, radau->g, radau->scale);
-    radau->bad_row = radau->linear->bad_row;
-    radau->bad_column = radau->linear->bad_column;
-    for (int k = 0; k < method->pairs && !failed; k++) {
-        double complex both = method->lambda[k] / radau->h;
-        for (int32_t e = 0; e < system->entries; e++)
-            radau->gz[e] = radau->jy[e] + both * radau->jyd[e];
-        failed = sd_linear_z_factor(radau->complex_linear[k], radau->gz, radau->scale);
-        if (failed)
-            sd_linear_z_bad(radau->complex_linear[k], &radau->bad_row, &radau->bad_column);
-    }
+    int failed = factorise_all(radau);
     if (failed)
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
     radau->h_factored = radau->h;
@@ -362,11 +405,12 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
     return 1;
 }
 
-/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d */
-static inline void split(sd_radau *radau, int stages, int pairs)
+/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d; of unknowns
+ * first..last-1 */
+static inline void split_by(sd_radau *radau, int stages, int pairs, int32_t first, int32_t last)
 {
     const sd_radau_method *method = radau->method;
-    for (int32_t i = 0; i < radau->n; i++) {
+    for (int32_t i = first; i < last; i++) {
         double r[SD_STAGES];
         for (int j = 0; j < stages; j++)
             r[j] = -radau->d[j][i];
@@ -383,13 +427,24 @@ static inline void split(sd_radau *radau, int stages, int pairs)
     }
 }
 
-/* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and
- * over what carries the state */
-static inline void join(sd_radau *radau, int stages, int pairs, double *sum, double *state)
+static void split(void *context, int32_t first, int32_t last)
+{
+    sd_radau *radau = context;
+    if (radau->method->stages == 3)
+        split_by(radau, 3, 1, first, last);
+    else if (radau->method->stages == 5)
+        split_by(radau, 5, 2, first, last);
+    else
+        split_by(radau, 7, 3, first, last);
+}
+
+/* z += S times the solutions in d and w; adds to sums of squares of the correction in Newton's weights, over all unknowns
+ * and over what carries the state; of unknowns first..last-1 */
+static inline void join_by(sd_radau *radau, int stages, int pairs, int32_t first, int32_t last, double *sum, double *state)
 {
     const sd_radau_method *method = radau->method;
     const int32_t *idle = radau->linear->idle;
-    for (int32_t i = 0; i < radau->n; i++) {
+    for (int32_t i = first; i < last; i++) {
         double real = radau->d[0][i];
         for (int s = 0; s < stages; s++) {
             double dz = method->column[s] * real;
@@ -405,27 +460,52 @@ static inline void join(sd_radau *radau, int stages, int pairs, double *sum, dou
     }
 }
 
+/* the same with the sums of each SD_STRETCH in `sums`; at once where the system is not large */
+static void join(void *context, int32_t first, int32_t last)
+{
+    sd_radau *radau = context;
+    int32_t each = large(radau) ? SD_STRETCH : last;
+    for (int32_t i = first; i < last; i += each) {
+        int32_t end = last - i < each ? last : i + each;
+        double sum = 0.0, state = 0.0;
+        if (radau->method->stages == 3)
+            join_by(radau, 3, 1, i, end, &sum, &state);
+        else if (radau->method->stages == 5)
+            join_by(radau, 5, 2, i, end, &sum, &state);
+        else
+            join_by(radau, 7, 3, i, end, &sum, &state);
+        radau->sums[2 * (i / SD_STRETCH)] = sum;
+        radau->sums[2 * (i / SD_STRETCH) + 1] = state;
+    }
+}
+
+/* part 0: the real system; part k: that of pair k - 1 */
+static void solve_one(void *context, int part)
+{
+    sd_radau *radau = context;
+    if (part == 0)
+        sd_linear_solve(radau->linear, radau->d[0]);
+    else
+        sd_linear_z_solve(radau->complex_linear[part - 1], radau->w[part - 1]);
+}
+
 /* One Newton step from the residuals in d; the size of the correction in Newton's weights, and that of what carries the
  * state in state_size. */
 static double correct(sd_radau *radau)
 {
-    int stages = radau->method->stages;
-    double all = 0.0, state = 0.0, number = (double)stages * radau->n;
-    if (stages == 3)
-        split(radau, 3, 1);
-    else if (stages == 5)
-        split(radau, 5, 2);
+    double all = 0.0, state = 0.0, number = (double)radau->method->stages * radau->n;
+    sd_stretches(radau->n, split, radau);
+    if (large(radau))
+        sd_side_by_side(radau->method->pairs + 1, solve_one, radau);
     else
-        split(radau, 7, 3);
-    sd_linear_solve(radau->linear, radau->d[0]);
-    for (int k = 0; k < radau->method->pairs; k++)
-        sd_linear_z_solve(radau->complex_linear[k], radau->w[k]);
-    if (stages == 3)
-        join(radau, 3, 1, &all, &state);
-    else if (stages == 5)
-        join(radau, 5, 2, &all, &state);
-    else
-        join(radau, 7, 3, &all, &state);
+        for (int part = 0; part <= radau->method->pairs; part++)
+            solve_one(radau, part);
+    sd_stretches(radau->n, join, radau);
+    int32_t sums = large(radau) ? (radau->n + SD_STRETCH - 1) / SD_STRETCH : radau->n > 0;
+    for (int32_t k = 0; k < sums; k++) {
+        all += radau->sums[2 * k];
+        state += radau->sums[2 * k + 1];
+    }
     radau->newton_iterations++;
     radau->state_size = sqrt(state / number);
     return radau->n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */
