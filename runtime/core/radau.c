@@ -1,4 +1,5 @@
 /* The step of Radau IIA: stages by Newton's iteration, error, step size (see radau.h). */
+#include "condensed.h"
 #include "radau.h"
 #include "threads.h"
 
@@ -100,10 +101,9 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
     radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
-    size_t apart = system->unknowns < SD_LARGE ? 1 : pairs; /* complex matrices at once */
+    size_t apart = system->unknowns < SD_LARGE ? 1 : pairs; /* complex matrices that are made at once */
     radau->gz = calloc(pairs * m + apart * nnz, sizeof(double complex));
-    radau->sums = calloc(2 * (m / SD_STRETCH + 1), sizeof(double));
-    if (!radau->memory || !radau->gz || !radau->gap || !radau->sums) {
+    if (!radau->memory || !radau->gz || !radau->gap) {
         sd_radau_free(radau);
         return NULL;
     }
@@ -140,7 +140,8 @@ void sd_radau_free(sd_radau *radau)
     free(radau->memory);
     free(radau->gz);
     free(radau->gap);
-    free(radau->sums);
+    free(radau->beside);
+    free(radau->point_y);
     free(radau);
 }
 
@@ -264,7 +265,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->theta = 1.0;
 }
 
-/* whether parts of a step are taken at once; where they are is a matter of size, not of the machine */
+/* whether the systems of a step are taken at once: a matter of their size, not of the machine */
 static int large(const sd_radau *radau)
 {
     return radau->n >= SD_LARGE;
@@ -296,7 +297,8 @@ static void factorise_one(void *context, int part)
     all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, radau->scale);
 }
 
-/* the factors of all matrices of a step; the failure of the first that has none */
+/* The factors of all matrices of a step; the failure of the first that has none.  Large ones are all made in any case: what
+ * they leave behind must not depend on how many threads there are. */
 static int factorise_all(sd_radau *radau)
 {
     factoring all = {radau, {0}};
@@ -353,19 +355,57 @@ static int factorise(sd_radau *radau, int at_end)
     return SD_FINE;
 }
 
+/* d of stage s := its residual, of `system`, by way of y and rate */
+static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, double *rate)
+{
+    const sd_radau_method *method = radau->method;
+    double weight[SD_STAGES];
+    for (int j = 0; j < method->stages; j++)
+        weight[j] = method->inverse[s][j] / radau->h;
+    combine(method->stages, radau->n, weight, radau->z, rate);
+    for (int32_t i = 0; i < radau->n; i++)
+        y[i] = radau->phi[i] + radau->z[s][i];
+    sd_residual(system, radau->t + method->c[s] * radau->h, y, rate, radau->d[s]);
+}
+
+/* The later half of the stages, in a system beside the radau's own; the others in that. */
+static void residual_part(void *context, int part)
+{
+    sd_radau *radau = context;
+    int half = (radau->method->stages + 1) / 2;
+    if (part == 0)
+        for (int s = 0; s < half; s++)
+            residual_of(radau, radau->system, s, radau->y, radau->rate);
+    else
+        for (int s = half; s < radau->method->stages; s++)
+            residual_of(radau, sd_beside_as(radau->beside, radau->system), s, radau->point_y, radau->point_rate);
+}
+
+/* the system and the point that a second thread takes residuals with; 0: there are none */
+static int accompanied(sd_radau *radau)
+{
+    if (!large(radau) || !radau->system->together || sd_threads() < 2)
+        return 0;
+    if (!radau->beside) {
+        radau->beside = sd_beside_new(radau->system);
+        radau->point_y = calloc(2 * ((size_t)radau->n + 1), sizeof(double));
+        radau->point_rate = radau->point_y + radau->n + 1;
+    }
+    return radau->beside && radau->point_y;
+}
+
 /* residuals of the stages into d */
 static int residuals(sd_radau *radau)
 {
-    const sd_radau_method *method = radau->method;
     int32_t n = radau->n;
-    for (int s = 0; s < method->stages; s++) {
-        double weight[SD_STAGES];
-        for (int j = 0; j < method->stages; j++)
-            weight[j] = method->inverse[s][j] / radau->h;
-        combine(method->stages, n, weight, radau->z, radau->rate);
-        for (int32_t i = 0; i < n; i++)
-            radau->y[i] = radau->phi[i] + radau->z[s][i];
-        sd_residual(radau->system, radau->t + method->c[s] * radau->h, radau->y, radau->rate, radau->d[s]);
+    int64_t before = radau->system->residual_evaluations;
+    int made = accompanied(radau);
+    if (made)
+        sd_side_by_side(2, residual_part, radau);
+    for (int s = 0; s < radau->method->stages; s++) {
+        if (!made)
+            residual_of(radau, radau->system, s, radau->y, radau->rate);
+        radau->system->residual_evaluations = before + s + 1; /* those that are looked at */
         if (*radau->system->stop)
             return SD_STOPPED;
         int32_t bad = sd_first_bad(n, radau->d[s]);
@@ -405,12 +445,11 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
     return 1;
 }
 
-/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d; of unknowns
- * first..last-1 */
-static inline void split_by(sd_radau *radau, int stages, int pairs, int32_t first, int32_t last)
+/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d */
+static inline void split(sd_radau *radau, int stages, int pairs)
 {
     const sd_radau_method *method = radau->method;
-    for (int32_t i = first; i < last; i++) {
+    for (int32_t i = 0; i < radau->n; i++) {
         double r[SD_STAGES];
         for (int j = 0; j < stages; j++)
             r[j] = -radau->d[j][i];
@@ -427,24 +466,13 @@ static inline void split_by(sd_radau *radau, int stages, int pairs, int32_t firs
     }
 }
 
-static void split(void *context, int32_t first, int32_t last)
-{
-    sd_radau *radau = context;
-    if (radau->method->stages == 3)
-        split_by(radau, 3, 1, first, last);
-    else if (radau->method->stages == 5)
-        split_by(radau, 5, 2, first, last);
-    else
-        split_by(radau, 7, 3, first, last);
-}
-
-/* z += S times the solutions in d and w; adds to sums of squares of the correction in Newton's weights, over all unknowns
- * and over what carries the state; of unknowns first..last-1 */
-static inline void join_by(sd_radau *radau, int stages, int pairs, int32_t first, int32_t last, double *sum, double *state)
+/* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and
+ * over what carries the state */
+static inline void join(sd_radau *radau, int stages, int pairs, double *sum, double *state)
 {
     const sd_radau_method *method = radau->method;
     const int32_t *idle = radau->linear->idle;
-    for (int32_t i = first; i < last; i++) {
+    for (int32_t i = 0; i < radau->n; i++) {
         double real = radau->d[0][i];
         for (int s = 0; s < stages; s++) {
             double dz = method->column[s] * real;
@@ -457,25 +485,6 @@ static inline void join_by(sd_radau *radau, int stages, int pairs, int32_t first
             if (idle && !idle[i])
                 *state += v * v;
         }
-    }
-}
-
-/* the same with the sums of each SD_STRETCH in `sums`; at once where the system is not large */
-static void join(void *context, int32_t first, int32_t last)
-{
-    sd_radau *radau = context;
-    int32_t each = large(radau) ? SD_STRETCH : last;
-    for (int32_t i = first; i < last; i += each) {
-        int32_t end = last - i < each ? last : i + each;
-        double sum = 0.0, state = 0.0;
-        if (radau->method->stages == 3)
-            join_by(radau, 3, 1, i, end, &sum, &state);
-        else if (radau->method->stages == 5)
-            join_by(radau, 5, 2, i, end, &sum, &state);
-        else
-            join_by(radau, 7, 3, i, end, &sum, &state);
-        radau->sums[2 * (i / SD_STRETCH)] = sum;
-        radau->sums[2 * (i / SD_STRETCH) + 1] = state;
     }
 }
 
@@ -493,19 +502,25 @@ static void solve_one(void *context, int part)
  * state in state_size. */
 static double correct(sd_radau *radau)
 {
-    double all = 0.0, state = 0.0, number = (double)radau->method->stages * radau->n;
-    sd_stretches(radau->n, split, radau);
+    int stages = radau->method->stages;
+    double all = 0.0, state = 0.0, number = (double)stages * radau->n;
+    if (stages == 3)
+        split(radau, 3, 1);
+    else if (stages == 5)
+        split(radau, 5, 2);
+    else
+        split(radau, 7, 3);
     if (large(radau))
         sd_side_by_side(radau->method->pairs + 1, solve_one, radau);
     else
         for (int part = 0; part <= radau->method->pairs; part++)
             solve_one(radau, part);
-    sd_stretches(radau->n, join, radau);
-    int32_t sums = large(radau) ? (radau->n + SD_STRETCH - 1) / SD_STRETCH : radau->n > 0;
-    for (int32_t k = 0; k < sums; k++) {
-        all += radau->sums[2 * k];
-        state += radau->sums[2 * k + 1];
-    }
+    if (stages == 3)
+        join(radau, 3, 1, &all, &state);
+    else if (stages == 5)
+        join(radau, 5, 2, &all, &state);
+    else
+        join(radau, 7, 3, &all, &state);
     radau->newton_iterations++;
     radau->state_size = sqrt(state / number);
     return radau->n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */

@@ -1,16 +1,11 @@
 /* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
 #include "sparse.h"
-#include "threads.h"
 
 #include <math.h>
-#include <sched.h>
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
-#define FILLED 12      /* entries of a column of the factors from which threads gain by taking columns in turns (a line has 4) */
-#define PATIENCE 2000  /* looks for a column that another thread has in hand, before the core is left to it */
 #define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
 
 void sd_sparse_free(sd_sparse *lu)
@@ -143,44 +138,6 @@ static void leave(sd_sparse *lu)
     lu->l_room = lu->u_room = 0;
 }
 
-typedef struct upper {
-    int32_t row;
-    sd_number value;
-} upper;
-
-static int earlier(const void *a, const void *b)
-{
-    int32_t i = ((const upper *)a)->row, j = ((const upper *)b)->row;
-    return (i > j) - (i < j);
-}
-
-/* whether threads take the columns of the factors in turns: a matter of the matrix, not of the machine */
-static int shared(const sd_sparse *lu)
-{
-    int64_t filled = lu->l_start[lu->n] + (int64_t)lu->u_start[lu->n];
-    return lu->n >= SD_LARGE && filled >= FILLED * (int64_t)lu->n;
-}
-
-/* Columns of U in ascending order: who refactorises one asks last for what another thread is at.  2: no memory */
-static int arrange(sd_sparse *lu)
-{
-    upper *column = malloc(((size_t)lu->n + 1) * sizeof *column);
-    if (!column)
-        return 2;
-    for (int32_t k = 0; k < lu->n; k++) {
-        int32_t first = lu->u_start[k], number = lu->u_start[k + 1] - first;
-        for (int32_t i = 0; i < number; i++)
-            column[i] = (upper){lu->u_row[first + i], lu->u_value[first + i]};
-        qsort(column, (size_t)number, sizeof *column, earlier);
-        for (int32_t i = 0; i < number; i++) {
-            lu->u_row[first + i] = column[i].row;
-            lu->u_value[first + i] = column[i].value;
-        }
-    }
-    free(column);
-    return 0;
-}
-
 int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
     int32_t n = lu->n, rows = lu->rows;
@@ -271,123 +228,47 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         }
         lu->l_start[k + 1] = (int32_t)kept;
     }
-    if (shared(lu) && arrange(lu))
-        return 2;
     lu->pivoted = 1;
     return 0;
 }
 
-/* Column k of the factors, from those before it, which are done (in_turns: are waited for); x [n + 1] is zero before and
- * after.  The pivot as part of its column; -1 where it is unhealthy, or another column is. */
-static inline double renew(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
-                           sd_number *restrict x, int in_turns, _Atomic unsigned char *done, const atomic_int *failed)
-{
-    int32_t c = lu->order[k];
-    for (int32_t e = column[c]; e < column[c + 1]; e++)
-        x[lu->place[row[e]]] += value[e];
-    for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++) {
-        int32_t j = lu->u_row[p];
-        for (int looks = 1; in_turns && !atomic_load_explicit(&done[j], memory_order_acquire); looks++) {
-            if (atomic_load_explicit(failed, memory_order_relaxed))
-                return -1.0;
-            if (looks % PATIENCE == 0)
-                sched_yield();
-        }
-        sd_number u = x[j];
-        x[j] = 0.0;
-        lu->u_value[p] = u;
-        for (int32_t l = lu->l_start[j]; l < lu->l_start[j + 1]; l++)
-            x[lu->l_row[l]] -= lu->l_value[l] * u;
-    }
-    sd_number diagonal = x[k], inverse = 1.0 / diagonal;
-    double largest = sd_size(diagonal);
-    x[k] = 0.0;
-    lu->inverse[k] = inverse;
-    for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++) {
-        sd_number v = x[lu->l_row[l]];
-        x[lu->l_row[l]] = 0.0;
-        lu->l_value[l] = v * inverse;
-        largest = sd_size(v) > largest ? sd_size(v) : largest;
-    }
-    double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
-    return relative >= UNHEALTHY && isfinite(sd_size(diagonal)) ? relative : -1.0;
-}
-
-typedef struct turns {
-    sd_sparse *lu;
-    const int32_t *column, *row;
-    const sd_number *value;
-    sd_number *x; /* [parts][n + 1] */
-    _Atomic unsigned char *done;
-    atomic_int next, failed;
-    double *smallest; /* [parts] */
-} turns;
-
-/* Columns in turns with the other threads: each is made of the same operations in the same order, whoever makes it.  Who
- * waits for a column waits for one that was taken before. */
-static void take_turns(void *context, int part)
-{
-    turns *all = context;
-    sd_sparse *lu = all->lu;
-    sd_number *x = all->x + (size_t)part * ((size_t)lu->n + 1);
-    all->smallest[part] = 1.0;
-    for (int32_t k = atomic_fetch_add(&all->next, 1); k < lu->n; k = atomic_fetch_add(&all->next, 1)) {
-        if (lu->source[k] >= 0) {
-            double pivot = renew(lu, all->column, all->row, all->value, k, x, 1, all->done, &all->failed);
-            if (pivot < 0.0) {
-                atomic_store(&all->failed, 1);
-                return;
-            }
-            all->smallest[part] = pivot < all->smallest[part] ? pivot : all->smallest[part];
-        }
-        atomic_store_explicit(&all->done[k], 1, memory_order_release);
-    }
-}
-
-/* sd_sparse_refactor by several threads; -1: there is no memory */
-static int refactor_in_turns(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int parts)
-{
-    size_t m = (size_t)lu->n + 1;
-    turns all = {.lu = lu, .column = column, .row = row, .value = value};
-    all.x = calloc((size_t)parts * m, sizeof *all.x);
-    all.done = calloc(m, sizeof *all.done);
-    all.smallest = calloc((size_t)parts, sizeof *all.smallest);
-    int failed = -1;
-    if (all.x && all.done && all.smallest) {
-        sd_side_by_side(parts, take_turns, &all);
-        failed = atomic_load(&all.failed);
-        for (int part = 0; part < parts; part++)
-            lu->smallest = all.smallest[part] < lu->smallest ? all.smallest[part] : lu->smallest;
-    }
-    free(all.x);
-    free((void *)all.done);
-    free(all.smallest);
-    return failed;
-}
-
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
-    int threads = shared(lu) ? sd_threads() : 1;
+    sd_number *x = lu->x;
     lu->smallest = 1.0;
-    if (threads > 1) {
-        int failed = refactor_in_turns(lu, column, row, value, threads);
-        if (failed == 1)
-            lu->pivoted = 0;
-        if (failed >= 0)
-            return failed;
-    }
     for (int32_t k = 0; k < lu->n; k++) {
+        int32_t c = lu->order[k];
         if (lu->source[k] < 0)
             continue;
-        double pivot = renew(lu, column, row, value, k, lu->x, 0, NULL, NULL);
-        if (pivot < 0.0) {
-            memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
+        for (int32_t e = column[c]; e < column[c + 1]; e++)
+            x[lu->place[row[e]]] += value[e];
+        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++) {
+            int32_t j = lu->u_row[p];
+            sd_number u = x[j];
+            x[j] = 0.0;
+            lu->u_value[p] = u;
+            for (int32_t l = lu->l_start[j]; l < lu->l_start[j + 1]; l++)
+                x[lu->l_row[l]] -= lu->l_value[l] * u;
+        }
+        sd_number diagonal = x[k], inverse = 1.0 / diagonal;
+        double largest = sd_size(diagonal);
+        x[k] = 0.0;
+        lu->inverse[k] = inverse;
+        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++) {
+            sd_number v = x[lu->l_row[l]];
+            x[lu->l_row[l]] = 0.0;
+            lu->l_value[l] = v * inverse;
+            largest = sd_size(v) > largest ? sd_size(v) : largest;
+        }
+        double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
+        lu->smallest = relative < lu->smallest ? relative : lu->smallest;
+        if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
+            memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);
             lu->pivoted = 0;
             return 1;
         }
-        lu->smallest = pivot < lu->smallest ? pivot : lu->smallest;
     }
-    lu->x[lu->n] = 0.0;
+    x[lu->n] = 0.0;
     return 0;
 }
 

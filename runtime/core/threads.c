@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #define MOST 8     /* threads: memory feeds no more */
-#define SPIN 4000  /* looks for another job, or for an end, before a thread sleeps: some ten microseconds */
+#define SPIN 1000  /* looks for another job, or for an end, before a thread sleeps: some ten microseconds */
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t wake = PTHREAD_COND_INITIALIZER, finished = PTHREAD_COND_INITIALIZER;
@@ -164,29 +164,4 @@ void sd_side_by_side(int parts, sd_part *work, void *context)
         pthread_mutex_unlock(&lock);
     }
     atomic_flag_clear(&busy);
-}
-
-typedef struct stretched {
-    int32_t n, each;
-    sd_stretch *work;
-    void *context;
-} stretched;
-
-static void one_stretch(void *context, int part)
-{
-    const stretched *all = context;
-    int32_t first = (int32_t)part * all->each, last = all->n - first < all->each ? all->n : first + all->each;
-    all->work(all->context, first, last);
-}
-
-void sd_stretches(int32_t n, sd_stretch *work, void *context)
-{
-    int32_t threads = n < SD_LARGE ? 1 : sd_threads(), pieces = (n + SD_STRETCH - 1) / SD_STRETCH;
-    if (threads < 2 || pieces < 2) {
-        work(context, 0, n);
-        return;
-    }
-    int32_t each = (pieces + threads - 1) / threads * SD_STRETCH;
-    stretched all = {n, each, work, context};
-    sd_side_by_side((n + each - 1) / each, one_stretch, &all);
 }

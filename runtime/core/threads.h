@@ -1,7 +1,6 @@
 /* Parts of one piece of work on the cores of the machine.
  *
- * What is computed never depends on how many threads there are: parts write to places of their own, and sums are taken
- * over pieces of fixed length (SD_STRETCH), then over the pieces in their order.
+ * What is computed never depends on how many threads there are: parts are whole tasks that write to places of their own.
  * One job at a time: whoever asks while another one runs (another thread of the process, a part itself) does its parts alone.
  * Threads begin with the first job of a large system, wait for the next one on a core for microseconds, and then sleep.
  */
@@ -10,11 +9,9 @@
 
 #include <stdint.h>
 
-#define SD_LARGE 4000   /* unknowns from which a step gains from a second thread (tests/bench/cores.py) */
-#define SD_STRETCH 4096 /* numbers whose sum is taken by itself */
+#define SD_LARGE 10000 /* unknowns from which a step of radau gains from a second thread (tests/bench/cores.py) */
 
 typedef void sd_part(void *context, int part);
-typedef void sd_stretch(void *context, int32_t first, int32_t last);
 
 /* threads that work on a job, the asking one among them: SYSDYN_THREADS, else the cores that the process may use */
 int sd_threads(void);
@@ -22,8 +19,5 @@ int sd_threads(void);
 void sd_threads_use(int number);
 /* work(context, part) for each part of 0..parts-1, in any order; returns when all are done */
 void sd_side_by_side(int parts, sd_part *work, void *context);
-/* work(context, first, last) for stretches that cover 0..n-1, each but the last a multiple of SD_STRETCH; all at once where n
- * is less than SD_LARGE.  Its numbers must not depend on where stretches end. */
-void sd_stretches(int32_t n, sd_stretch *work, void *context);
 
 #endif
