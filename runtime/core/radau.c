@@ -378,7 +378,7 @@ static void residual_part(void *context, int part)
             residual_of(radau, radau->system, s, radau->y, radau->rate);
     else
         for (int s = half; s < radau->method->stages; s++)
-            residual_of(radau, sd_beside_as(radau->beside, radau->system), s, radau->point_y, radau->point_rate);
+            residual_of(radau, radau->other, s, radau->point_y, radau->point_rate);
 }
 
 /* the system and the point that a second thread takes residuals with; 0: there are none */
@@ -391,7 +391,10 @@ static int accompanied(sd_radau *radau)
         radau->point_y = calloc(2 * ((size_t)radau->n + 1), sizeof(double));
         radau->point_rate = radau->point_y + radau->n + 1;
     }
-    return radau->beside && radau->point_y;
+    if (!radau->beside || !radau->point_y)
+        return 0;
+    radau->other = sd_beside_as(radau->beside, radau->system);
+    return 1;
 }
 
 /* residuals of the stages into d */

@@ -86,6 +86,7 @@ typedef struct sd_radau {
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
     double complex *w[SD_PAIRS], *gz;
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
+    sd_system *other;             /* its system */
     double *point_y, *point_rate; /* [n] */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;

@@ -3,6 +3,11 @@
  * What is computed never depends on how many threads there are: parts are whole tasks that write to places of their own.
  * One job at a time: whoever asks while another one runs (another thread of the process, a part itself) does its parts alone.
  * Threads begin with the first job of a large system, wait for the next one on a core for microseconds, and then sleep.
+ *
+ * What was measured on two cores and left out: loops over unknowns in halves (values between steps, differences, eliminated
+ * unknowns) took 1.1 times as long at 30000 unknowns and as long at 100000, for halves change caches; columns of a grid's
+ * factors in turns made a step of the bdf 0.93 to 1.46 times as fast, and slower where others had the cores.  Lines are
+ * eliminated from one end to the other: their factors have no parts that could be made at once.
  */
 #ifndef SYSDYN_THREADS_H
 #define SYSDYN_THREADS_H

@@ -284,7 +284,7 @@ class Radau(c.Structure):
         *[(name, _P) for name in ["newton_weight", "scale", "terms", "jy", "jyd", "g", "memory"]],
         ("w", _P * PAIRS),
         ("gz", _P),
-        *[(name, _P) for name in ["beside", "point_y", "point_rate"]],
+        *[(name, _P) for name in ["beside", "other", "point_y", "point_rate"]],
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
         *[(name, _L) for name in ["factorisations", "taken"]],
         *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],

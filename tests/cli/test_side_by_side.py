@@ -90,7 +90,8 @@ def goes_on(group):
 
 def test_an_interrupt_ends_every_process_and_keeps_what_was_computed(tmp_path):
     """Of a trade: the runs of its journal; nobody goes on."""
-    asked = [sys.executable, "-m", "sysdyn", "trade", str(MODELS / "benchmark" / "beam.sd"), "--full", "--jobs", "2", "-q"]
+    beam = str(MODELS / "benchmark" / "beam.sd")
+    asked = [sys.executable, "-m", "sysdyn", "trade", beam, "--full", "--jobs", "2", "-q"]
     environment = {**os.environ, "SYSDYN_CACHE": str(tmp_path)}
     process = subprocess.Popen(asked, env=environment, start_new_session=True, stdout=subprocess.DEVNULL)
     kept: list[Path] = []
