@@ -264,7 +264,7 @@ class Beside:
         found = self._found[0] if self._found else None
         return None if isinstance(found, (Lost, _Raised)) else found
 
-    def end(self) -> None:
+    def close(self) -> None:
         """Nobody wants it any more."""
         self._timer.cancel()
         self._crew.end()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 from sysdyn.cli.run.crew import Beside
@@ -54,24 +55,20 @@ def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple
     best: tuple[float, _Run, _Run] | None = None
     sure = SURE * bench.accuracy
     ways = list(_ways(bench))
-    beside = Beside(_beside, (bench.request, bench.folder, ways[1], budget), jobs)
-    for number, combination in enumerate(ways):
-        made = beside.answer() if number == 1 else None
-        try:
+    with closing(Beside(_beside, (bench.request, bench.folder, ways[1], budget), jobs)) as beside:
+        for number, combination in enumerate(ways):
+            made = beside.answer() if number == 1 else None
             run, said = made or _finest(bench, combination, budget, len(runs))
-        except BaseException:
-            beside.end()
-            raise
-        reasons += said
-        if run is None:
-            continue
-        for other in runs:
-            apart = error_of(run.trace, other.trace, bench.judged(other.trace), bench.accuracy, bench.options.t_end)
-            if run.steps != other.steps and (best is None or apart < best[0]):  # equal steps are no second opinion
-                best = apart, other, run
-        runs.append(run)
-        if best is not None and (best[0] <= sure or len(runs) == 3):
-            break
+            reasons += said
+            if run is None:
+                continue
+            for other in runs:
+                apart = error_of(run.trace, other.trace, bench.judged(other.trace), bench.accuracy, bench.options.t_end)
+                if run.steps != other.steps and (best is None or apart < best[0]):  # equal steps are no second opinion
+                    best = apart, other, run
+            runs.append(run)
+            if best is not None and (best[0] <= sure or len(runs) == 3):
+                break
     if best is None:
         raise NoReference("; ".join(dict.fromkeys(reasons)) or "there is but one way to run this scene")
     uncertainty, first, second = best

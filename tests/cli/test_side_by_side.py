@@ -5,11 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from sysdyn.cli.main import run
 from sysdyn.cli.run import crew
+from texts import PENDULUM, run_json
 
 MODELS = Path(__file__).parents[2] / "models"
 FALL = "model fall {\n  param m = 1 kg\n  coord x: translation = 0 m\n  energy T* = 1/2*m*x'^2\n  init x' = 1 m/s\n}\n"
@@ -60,6 +62,33 @@ def test_processes_begin_where_what_is_left_foreseeably_pays(monkeypatch):
 
 def test_what_is_called_here_stands_for_what_is_called_elsewhere():
     assert list(crew.each(later_first, [2, 3], 1, lambda item: -item)) == [-2, -3]
+
+
+def test_one_item_goes_beside_what_takes_long(monkeypatch):
+    monkeypatch.setattr(crew, "PAYS", 0.05)
+    monkeypatch.setattr(crew, "cores", lambda: 2)
+    for item, answer in ((3, 9), (14, None), (13, None)):
+        with closing(crew.Beside(later_first, item, None)) as beside:
+            time.sleep(0.2)
+            found = beside.answer()
+        assert (found and found[0]) == answer
+    assert crew.Beside(later_first, 3, 1).answer() is None
+    with closing(crew.Beside(later_first, 3, 2)) as beside:
+        assert beside.answer() is None, "before it began"
+
+
+def test_a_reference_made_beside_the_other_changes_nothing(tmp_path, capsys, monkeypatch):
+    file = tmp_path / "pendulum.sd"
+    file.write_text(PENDULUM)
+    made = []
+    monkeypatch.setattr(crew, "cores", lambda: 2)
+    monkeypatch.setattr(crew.Crew, "_give", lambda self, *job, give=crew.Crew._give: made.append(job) or give(*job))
+    found = []
+    for pays in (60.0, 0.0):
+        monkeypatch.setattr(crew, "PAYS", pays)
+        found.append(run_json(capsys, "trade", str(file), "--no-timings", "--until", "0.3"))
+    assert made, "the second way was made by a process"
+    assert found[0] == found[1]
 
 
 def test_checks_say_the_same_in_any_number_of_processes(tmp_path, capsys, monkeypatch):
