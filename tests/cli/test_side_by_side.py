@@ -91,6 +91,24 @@ def test_a_reference_made_beside_the_other_changes_nothing(tmp_path, capsys, mon
     assert found[0] == found[1]
 
 
+@pytest.mark.parametrize("command", ["verify", "record"])
+def test_commands_that_choose_processes_say_what_one_says(tmp_path, capsys, monkeypatch, command):
+    Path("pendulum.sd").write_text(PENDULUM)
+    asked = {"verify": ["verify"], "record": ["golden", "record", "--folder", "{}"]}[command]
+    monkeypatch.setattr(crew, "cores", lambda: 2)
+    told = []
+    for pays in (60.0, 0.0):
+        monkeypatch.setattr(crew, "PAYS", pays)
+        words = [word.format(f"kept{pays}") for word in asked]
+        told.append(run([*words, "pendulum.sd", *([] if command == "record" else ["--no-timings"])]))
+        told.append(capsys.readouterr())
+    assert told[:2] == told[2:]
+    assert told[0] == 0
+    for file in Path("kept60.0").rglob("*.*"):
+        if file.suffix in (".json", ".toml"):
+            assert file.read_text() == Path("kept0.0", *file.parts[1:]).read_text()
+
+
 def test_checks_say_the_same_in_any_number_of_processes(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a.sd").write_text(FALL)
