@@ -40,6 +40,12 @@ def offered(context: click.Context, parameter: click.Parameter, begun: str) -> l
     return complete(context, parameter, begun)
 
 
+def side_by_side(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The option that says how many processes do what can be done side by side."""
+    said = "Processes side by side. Default: one a core, where the work pays for them."
+    return click.option("--jobs", "-j", type=click.IntRange(min=1), metavar="N", help=said)(function)
+
+
 def chosen(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options that choose the model, the scene and how it is compiled."""
     for option in reversed(

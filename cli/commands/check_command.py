@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import INPUT_OUTPUT, UsageError, classify
+from sysdyn.cli.options import side_by_side
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.checking import checked
-from sysdyn.dsl.model import expression as ex
+from sysdyn.cli.run.checking import Checked, file_checked
+from sysdyn.cli.run.crew import Lost, each
 from sysdyn.dsl.text.diagnostics import ModelError
 
 FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
@@ -24,6 +26,7 @@ FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
 @click.option("--watch", is_flag=True, help="Check again whenever a file changes, until interrupted.")
 @click.option("--explain", is_flag=True, help="Say of each model whether it is passive, and by which elements.")
 @click.option("--output-format", type=click.Choice(FORMATS), help="Form of the findings. Default: full.")
+@side_by_side
 def command(
     console: Console,
     files: tuple[str, ...],
@@ -33,6 +36,7 @@ def command(
     watch: bool,
     explain: bool,
     output_format: str | None,
+    jobs: int | None,
 ) -> int:
     """Check every model and scene of FILES, the consistent start included; no C compiler is needed.
 
@@ -48,7 +52,7 @@ def command(
         raise UsageError("--fix writes files: standard input is none")
     refused = strict and not allow_unsupported
     if not watch:
-        return _all(console, files, refused, strict=strict, fix=fix)
+        return _all(console, files, refused, jobs, strict=strict, fix=fix)
     if "-" in files or console.as_json or output_format in ("junit", "sarif"):
         raise UsageError("--watch prints findings as they come: no standard input, --json, junit or sarif")
     from sysdyn.cli.run import watching
@@ -56,23 +60,39 @@ def command(
     seen = watching.stamps(given)
     while True:  # until it is interrupted
         console.renew()
-        code = _all(console, tuple(targets.files(given)), refused, strict=strict, fix=fix)
+        code = _all(console, tuple(targets.files(given)), refused, jobs, strict=strict, fix=fix)
         console.say(f"exit {code}; waiting for a change of {', '.join(given)}")
         seen = watching.changed(given, watching.stamps(given) if fix else seen)
 
 
-def _all(console: Console, files: Sequence[str], refused: bool, *, strict: bool, fix: bool) -> int:
+def _all(
+    console: Console, files: Sequence[str], refused: bool, jobs: int | None, *, strict: bool, fix: bool
+) -> int:
     """Check the files and show what was found; the exit code."""
     results, unread = [], False
-    for path in files:
+
+    def mended(asked: tuple[str, bool, bool]) -> Checked:
+        """In this process, behind the repair."""
         try:
-            changes = _fixed(console, path) if fix else []
-            results.append(_file(console, path, refused) | ({"fixed": changes} if fix else {}))
+            changes = {"fixed": _fixed(console, asked[0])} if fix else {}
         except OSError as error:
+            return Checked(unread=classify(error)[1])
+        except ModelError as error:
+            return Checked(tuple(error.diagnostics))
+        found = file_checked(asked)
+        return found if found.result is None else replace(found, result=found.result | changes)
+
+    asked = [(path, refused, console.explain) for path in files]
+    for path, found in zip(files, each(file_checked, asked, 1 if fix or "-" in files else jobs, mended), strict=True):
+        if isinstance(found, Lost):
+            raise RuntimeError(f"the process that checked {path} died ({found.how})")
+        console.report.extend(found.found)
+        for said, text in found.said:
+            (console.data if said == "data" else console.say)(text)
+        results += [] if found.result is None else [found.result]
+        if found.unread is not None:
             unread = True
-            console.complain(classify(error)[1], INPUT_OUTPUT)
-        except ModelError as error:  # a file that is no text does not hide the others
-            console.report.extend(error.diagnostics)
+            console.complain(found.unread, INPUT_OUTPUT)
     console.result = {"files": results}
     wrong = {d.place.file for d in console.report if d.severity == "error" and d.place is not None}
     console.summary = f" in {len(wrong)} of {len(files)} files" if len(files) > 1 else ""
@@ -111,39 +131,3 @@ def _form(console: Console, chosen: str | None, files: tuple[str, ...]) -> None:
 
     forms = {"concise": findings.concise, "github": findings.github, "sarif": findings.sarif}
     console.format = forms.get(chosen) or (lambda found, plain: findings.junit(found, plain, files))
-
-
-def _file(console: Console, path: str, refused: bool) -> dict[str, object]:
-    document = targets.read(path, console.report)
-    wrong = [d.place.span for d in console.report if d.severity == "error" and d.place and d.place.file == path]
-    found = []
-    for target in targets.all_targets(document, console.report):
-        with ex.fresh():
-            summary = checked(target, console.report, refused)
-        items = [item.span for item in (target.model, target.scene) if item is not None]
-        if any(i.start <= span.start < i.end for span in wrong for i in items):
-            summary["ok"] = False  # a slip that was read as it was meant is still to be mended
-        found.append(summary)
-        if summary["ok"]:
-            console.say(f"{path}: {target.name}: {_line(summary)}")
-            if console.explain:
-                console.data(f"{path}: {target.name}: " + _passivity(summary))
-    if not document.models and not document.scenes and not console.report.failed:
-        console.say(f"{path}: no model")
-    return {"file": path, "models": list(document.models), "targets": found}
-
-
-def _passivity(summary: dict[str, object]) -> str:
-    found = summary.get("passivity")
-    return "not compiled" if not isinstance(found, dict) else "\n".join(found["lines"])
-
-
-def _line(summary: dict[str, object]) -> str:
-    if "index" not in summary:
-        return "ok"
-    counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}, index {index}".format(**summary)
-    moved = summary["moved"]
-    assert isinstance(moved, list)
-    from sysdyn.cli.run.starting import shortened
-
-    return "; ".join([f"ok: {counts}", *shortened(moved)])

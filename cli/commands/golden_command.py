@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError
-from sysdyn.cli.options import FORMULATIONS, Setting
+from sysdyn.cli.options import FORMULATIONS, Setting, side_by_side
 from sysdyn.cli.page.columns import aligned
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ def _folder(function: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--formulation", type=click.Choice(FORMULATIONS[:-1]), help="This one alone. Default: all that can.")
 @click.option("--set", "settings", type=Setting(), multiple=True, help="Parameter or input; repeatable.")
 @click.option("--size", type=float, default=SIZE, show_default=True, metavar="KB", help="Largest size of the trace.")
+@side_by_side
 @_folder
 def record(
     console: Console,
@@ -76,6 +77,7 @@ def record(
     formulation: str | None,
     settings: tuple[tuple[str, str], ...],
     size: float,
+    jobs: int | None,
     folder: str,
 ) -> int:
     """Record a scene of FILE as golden.
@@ -101,7 +103,7 @@ def record(
     if any(g.name == label for g in known):
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")
     request = Request(file, scene=scene_name, model=model_name, until=until, formulation=formulation, settings=settings)
-    found = _measured(console, request, rtol, atol)
+    found = _measured(console, request, rtol, atol, jobs)
     if isinstance(found, int):
         return console.finish(found)
     golden = _golden(
@@ -116,7 +118,7 @@ def record(
 @click.option("--formulation", "formulations", type=click.Choice(FORMULATIONS[:-1]), multiple=True, help="Repeatable.")
 @click.option("--method", "methods", type=click.Choice(["bdf", "radau", "auto"]), multiple=True, help="Repeatable.")
 @click.option("--backend", "backends", type=click.Choice(["c", "numpy"]), multiple=True, help="Repeatable. Default: c.")
-@click.option("--jobs", "-j", type=click.IntRange(min=1), default=1, show_default=True, metavar="N")
+@side_by_side
 @click.option("--junit", "junit_file", metavar="FILE", help="Write the results as JUnit XML.")
 @click.option("--html", "html_file", metavar="FILE", help="Write one page with pictures of what differs.")
 @click.option("--mutate", "mutants", is_flag=True, help="Change each parameter by 1 %: which goldens do not notice?")
@@ -128,7 +130,7 @@ def check(
     formulations: tuple[str, ...],
     methods: tuple[str, ...],
     backends: tuple[str, ...],
-    jobs: int,
+    jobs: int | None,
     junit_file: str | None,
     html_file: str | None,
     mutants: bool,
@@ -140,25 +142,15 @@ def check(
 
     goldens = book.find(Path(folder), names)
     if mutants:
-        return _mutants(console, goldens)
-    backends = backends or ("c",)
-    if jobs > 1 and len(goldens) > 1:
-        from sysdyn.cli.golden.jobs import Asked, in_processes
+        return _mutants(console, goldens, jobs)
+    from sysdyn.cli.golden.jobs import Asked, in_processes
 
-        asked = [Asked(g, formulations, methods, backends, bool(html_file) or pages) for g in goldens]
-        stream = in_processes(asked, jobs)
-    else:
-        from sysdyn.cli.golden.checking import check as checked
-
-        drawn = bool(html_file) or pages
-        stream = ([case] for g in goldens for case in checked(g, formulations, methods, backends, drawn))
+    drawn = bool(html_file) or pages
     cases = []
-    for found in stream:
+    for found in in_processes([Asked(g, formulations, methods, backends or ("c",), drawn) for g in goldens], jobs):
         cases += found
         for case in found:
             console.say(f"{'ok' if case.exit == 0 else 'FAILED':6} {case.label}: {case.message} ({case.seconds:.1f} s)")
-    order = {g.label: k for k, g in enumerate(goldens)}
-    cases.sort(key=lambda case: order[case.golden])
     return _report(console, cases, junit_file, html_file, pages)
 
 
@@ -188,29 +180,25 @@ def _report(console: Console, cases: Sequence[Case], junit_file: str | None, htm
     return console.finish(max((c.exit for c in cases), default=0))
 
 
-def _mutants(console: Console, goldens: Sequence[Golden]) -> int:
+def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> int:
     """`check --mutate`: exit 1 where a golden does not notice a change that it could have noticed."""
     from dataclasses import asdict
 
-    from sysdyn.cli.golden.checking import mutate
-    from sysdyn.cli.golden.runs import Stopped
-    from sysdyn.runtime.comparison.verdict import Incomparable
+    from sysdyn.cli.golden.jobs import mutated
+    from sysdyn.cli.run.crew import each
 
     found: list[Mutant] = []
     code = 0
-    for golden in goldens:
-        try:
-            for mutant in mutate(golden):
-                found.append(mutant)
-                word = {True: "noticed", False: "MISSED", None: "skipped"}[mutant.noticed]
-                by = "" if mutant.noticed is None else f", {mutant.ratio:.3g} of the limit"
-                console.say(f"{word:8} {mutant.golden} {mutant.parameter}{by}")
-        except Stopped as error:
-            console.complain(f"{golden.label}: {error}", error.code)
-            code = max(code, error.code)
-        except Incomparable as error:
-            console.complain(f"{golden.label}: {error}", SOLVER)
-            code = max(code, SOLVER)
+    for golden, made in zip(goldens, each(mutated, goldens, jobs), strict=True):
+        mutants, stopped = made if isinstance(made, tuple) else ([], (SOLVER, f"its process died ({made.how})"))
+        for mutant in mutants:
+            found.append(mutant)
+            word = {True: "noticed", False: "MISSED", None: "skipped"}[mutant.noticed]
+            by = "" if mutant.noticed is None else f", {mutant.ratio:.3g} of the limit"
+            console.say(f"{word:8} {mutant.golden} {mutant.parameter}{by}")
+        if stopped is not None:
+            console.complain(f"{golden.label}: {stopped[1]}", stopped[0])
+            code = max(code, stopped[0])
     tried = [m for m in found if m.noticed is not None]
     missed = [m for m in found if m.noticed is False]
     zeros = len(found) - len(tried)
@@ -236,9 +224,16 @@ def _mutants(console: Console, goldens: Sequence[Golden]) -> int:
 @click.option("--reason", metavar="TEXT", help="Why the change is right; kept in golden.toml.")
 @click.option("--rtol", type=float, metavar="R", help="Another tolerance.")
 @click.option("--size", type=float, default=SIZE, show_default=True, metavar="KB", help="Largest size of the trace.")
+@side_by_side
 @_folder
 def accept(
-    console: Console, names: tuple[str, ...], reason: str | None, rtol: float | None, size: float, folder: str
+    console: Console,
+    names: tuple[str, ...],
+    reason: str | None,
+    rtol: float | None,
+    size: float,
+    jobs: int | None,
+    folder: str,
 ) -> int:
     """Show what changed in the goldens NAME... and, with a reason, record them anew."""
     from sysdyn.cli.golden import book
@@ -249,9 +244,9 @@ def accept(
     if rtol is not None and not 0.0 < rtol < 1.0:
         raise UsageError(f"--rtol {rtol:g}: between 0 and 1")
     code, changes = 0, []
-    for golden in book.find(Path(folder), names):
-        wanted = golden if rtol is None else replace(golden, rtol=rtol)
-        found = _again(console, wanted)
+    goldens = book.find(Path(folder), names)
+    renewed = [golden if rtol is None else replace(golden, rtol=rtol) for golden in goldens]
+    for golden, wanted, found in zip(goldens, renewed, _again(console, renewed, jobs), strict=True):
         if isinstance(found, int):
             code = max(code, found)
             continue
@@ -272,11 +267,21 @@ def accept(
     return console.finish(code)
 
 
-def _again(console: Console, golden: Golden) -> Recorded | int:
-    from sysdyn.cli.golden.checking import request_of
+def _again(console: Console, goldens: Sequence[Golden], jobs: int | None) -> Iterator[Recorded | int]:
+    """The record of each golden, made anew; the exit code after saying why there is none."""
+    from sysdyn.cli.golden.jobs import renewed
+    from sysdyn.cli.run.crew import Lost, each
 
-    only = golden.formulations[0] if len(golden.formulations) == 1 else None
-    return _measured(console, request_of(golden, accuracy=None, formulation=only), golden.rtol, golden.atol)
+    for golden, made in zip(goldens, each(renewed, goldens, jobs), strict=True):
+        died = isinstance(made, Lost)
+        said, found = ([], (SOLVER, f"{golden.label}: its process died ({made.how})")) if died else made
+        for line in said:
+            console.say(line)
+        if isinstance(found, tuple):
+            console.complain(found[1], found[0])
+            yield found[0]
+        else:
+            yield found
 
 
 @_add("list")
@@ -327,13 +332,13 @@ def _target(
     return (target.scene.name.name, target.scene.name.name, None) if target.scene else (model_name, None, model_name)
 
 
-def _measured(console: Console, request: Request, rtol: float, atol: float) -> Recorded | int:
+def _measured(console: Console, request: Request, rtol: float, atol: float, jobs: int | None) -> Recorded | int:
     """The record; the exit code after saying why there is none."""
     from sysdyn.cli.golden import recording
     from sysdyn.cli.golden.runs import Stopped
 
     try:
-        return recording.record(request, rtol, atol, console.say)
+        return recording.record(request, rtol, atol, console.say, jobs)
     except (recording.Refused, Stopped) as error:
         code = getattr(error, "code", 1)
         console.complain(str(error), code)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from sysdyn.cli.failures import FAULT, SOLVER, UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.run.crew import cores
 from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep.in_core import KEEPS
 from sysdyn.cli.sweep.kept import Kept
@@ -88,7 +88,7 @@ def command(
     if target.suffix == ".sd" or (target.exists() and target.samefile(file)):
         raise UsageError(f"-o {target} is the model itself")
     line = ProgressLine("never" if console.quiet else progress)
-    number = jobs or said.get("jobs") or os.cpu_count() or 1
+    number = jobs or said.get("jobs") or cores()
     try:
         swept = sweep(
             request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner

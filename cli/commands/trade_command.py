@@ -11,7 +11,7 @@ import click
 from sysdyn import __version__
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
-from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.options import chosen, side_by_side, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run import lock, targets
@@ -33,7 +33,7 @@ KINDS = (".html", ".png", ".svg")
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("-o", "output", metavar="FILE.html|.png|.svg", help="The work-precision plot; a page that zooms.")
 @click.option("--full", is_flag=True, help="Every combination at every tolerance from 1e-1 to 1e-12.")
-@click.option("--jobs", "-j", type=click.IntRange(min=1), default=1, show_default=True, metavar="N")
+@side_by_side
 @click.option("--lock", "locks", is_flag=True, help="Write the choice into FILE.lock, which simulate honours.")
 @click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
 def command(
@@ -41,7 +41,7 @@ def command(
     progress: str,
     no_timings: bool,
     full: bool,
-    jobs: int,
+    jobs: int | None,
     locks: bool,
     output: str | None,
     max_wall: str | None,
@@ -51,8 +51,9 @@ def command(
 
     Errors are those of the traced quantities against a reference that trade makes itself: the finest run, and one by
     another method, in another formulation where there is one. Cost is CPU time and counted work, which is what the
-    choice goes by. --formulation, --index, --method fix a choice; --max-wall limits the whole search; --jobs makes
-    runs ahead side by side, with equal results but for CPU times. A trade that was stopped goes on where it was.
+    choice goes by. --formulation, --index, --method fix a choice; --max-wall limits the whole search; --jobs N makes
+    runs ahead side by side, with equal results but for CPU times (by itself only with --full, and the reference's two:
+    the search leaves most others out). A trade that was stopped goes on where it was.
     """
     target = _target(output)
     if locks and options["file"] == "-":

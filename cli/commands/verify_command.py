@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER
-from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.options import chosen, side_by_side, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
 
@@ -27,19 +27,19 @@ if TYPE_CHECKING:
 @click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
 @click.option("--at", metavar="T1,T2,...", help="Instants that are compared too.")
 @click.option("-o", "output", metavar="DIR", help="Keep the traces there, as FORMULATION-METHOD.h5.")
-@click.option("--jobs", "-j", type=click.IntRange(min=1), default=1, show_default=True, metavar="N")
+@side_by_side
 @click.option("--full", is_flag=True, help="Do not take reduced sizes from the ci.toml above FILE's folder.")
 @click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
 def command(
-    console: Console, progress: str, no_timings: bool, full: bool, jobs: int, output: str | None, **options: Any
+    console: Console, progress: str, no_timings: bool, full: bool, jobs: int | None, output: str | None, **options: Any
 ) -> int:
     """Run a scene of FILE in every formulation that can express it, by bdf and by radau, and compare the traces.
 
     Two runs agree where every traced quantity differs by less than 10 x accuracy x its nominal magnitude, up to the
     horizon: the instant at which the reference differs by that much from its own run at a tenth of the accuracy.
     --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree, 3 where a
-    ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.  --jobs runs
-    formulations side by side, with equal results.
+    ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.  Formulations run
+    side by side where that pays, with equal results.
     """
     from sysdyn.cli.run.running import Request
     from sysdyn.cli.run.sizes import sizes

@@ -1,4 +1,4 @@
-"""Checks side by side: one that kills its process costs its own result and no other."""
+"""Checks side by side: one that kills a process of its own costs its own result and no other."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 from sysdyn.cli.golden.book import Golden
-from sysdyn.cli.golden.checking import INPUT_OUTPUT, Case, check
+from sysdyn.cli.golden.checking import INPUT_OUTPUT, SOLVER, Case, Mutant, check, mutate, request_of
+from sysdyn.cli.golden.recording import Recorded, Refused, record
+from sysdyn.cli.golden.runs import Stopped
 from sysdyn.cli.run.crew import Lost, each
+from sysdyn.runtime.comparison.verdict import Incomparable
 from sysdyn.values import dataclass
 
 
@@ -27,12 +30,35 @@ def checked(asked: Asked) -> list[Case]:
     return list(check(asked.golden, asked.formulations, asked.methods, asked.backends, asked.with_page))
 
 
+def mutated(golden: Golden) -> tuple[list[Mutant], tuple[int, str] | None]:
+    """The mutants of a golden, as many as could be made; exit code and reason where they could not all be."""
+    found: list[Mutant] = []
+    try:
+        found.extend(mutate(golden))
+    except Stopped as error:
+        return found, (error.code, str(error))
+    except Incomparable as error:
+        return found, (SOLVER, str(error))
+    return found, None
+
+
+def renewed(golden: Golden) -> tuple[list[str], Recorded | tuple[int, str]]:
+    """What is said while a golden is recorded anew, and the record; exit code and reason where there is none."""
+    said: list[str] = []
+    only = golden.formulations[0] if len(golden.formulations) == 1 else None
+    request = request_of(golden, accuracy=None, formulation=only)
+    try:
+        return said, record(request, golden.rtol, golden.atol, said.append)
+    except (Refused, Stopped) as error:
+        return said, (getattr(error, "code", 1), str(error))
+
+
 def in_processes(
-    asked: Sequence[Asked], jobs: int, checked: Callable[[Asked], list[Case]] = checked
+    asked: Sequence[Asked], jobs: int | None, checked: Callable[[Asked], list[Case]] = checked
 ) -> Iterator[list[Case]]:
-    """The cases of each golden as they come in; checked: what makes them, in another process."""
+    """The cases of each golden, in their order; checked: what makes them, in another process perhaps."""
     began = time.monotonic()
-    for k, found in each(checked, asked, jobs):
+    for one, found in zip(asked, each(checked, asked, jobs), strict=True):
         if not isinstance(found, Lost):
             yield found
             continue
@@ -41,5 +67,4 @@ def in_processes(
         message, seconds = f"the check {how}", time.monotonic() - began
         code = int(number) if kind == "exit" and int(number) > 1 else INPUT_OUTPUT
         wrong = (("run", message),)
-        label = asked[k].golden.label
-        yield [Case(label, "", "", "", code, message, float("inf"), None, None, seconds, wrong)]
+        yield [Case(one.golden.label, "", "", "", code, message, float("inf"), None, None, seconds, wrong)]

@@ -8,6 +8,7 @@ formulation that can express the scene then runs as `check` will, by both method
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -15,9 +16,10 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.compare.diffing import common, differences, sentence
 from sysdyn.cli.golden.runs import APART, RUNS, Run, Stopped, between, run
+from sysdyn.cli.run.crew import Lost, each
 from sysdyn.cli.run.running import Request
 from sysdyn.runtime.comparison.arrays import Arrays
-from sysdyn.runtime.comparison.curve import Curve, Flags, bernstein, cells_at
+from sysdyn.runtime.comparison.curve import Curve, Flags, Floats, bernstein, cells_at
 from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
 from sysdyn.runtime.comparison.verdict import SHARE, Tolerance, Verdict
 from sysdyn.values import dataclass
@@ -73,8 +75,11 @@ class Recorded:
     method: str
 
 
-def record(request: Request, rtol: float, atol: float, say: Say) -> Recorded:
-    """Measure a scene.  request: file, scene, settings.  Raises Refused, Stopped, UsageError."""
+def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | None = 1) -> Recorded:
+    """Measure a scene.  request: file, scene, settings; jobs: processes that run its formulations, None: where it pays.
+
+    Raises Refused, Stopped, UsageError.
+    """
     for share in REFERENCE:
         try:
             base, runs, golden = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
@@ -89,6 +94,7 @@ def record(request: Request, rtol: float, atol: float, say: Say) -> Recorded:
         except Refused:
             continue
     refused: Refused | None = None
+    wanted = _every(request, base)
     for tau in (first, *wider):
         tolerance = Tolerance(rtol, atol, tau)
         if refused is not None:
@@ -96,7 +102,7 @@ def record(request: Request, rtol: float, atol: float, say: Say) -> Recorded:
         try:
             error = _own_error(golden, runs, tolerance)
             say(f"its own error: {error:.1e}, the tolerance is {rtol / error if error else np.inf:.3g} times that")
-            checked, structure, found = _formulations(request, base, golden, tolerance, say)
+            checked, structure, found = _formulations(wanted, base, golden, tolerance, say, jobs)
             break
         except Refused as error_:
             refused = refused or error_
@@ -230,39 +236,62 @@ def _untold(golden: Arrays, trace: Arrays, rtol: float, atol: float) -> Flags:
     return off
 
 
-def _formulations(
-    request: Request, base: Run, golden: Arrays, tolerance: Tolerance, say: Say
-) -> tuple[float, dict[str, Any], list[Run]]:
-    """(accuracy of checks, structure by formulation, the runs) of every formulation that can express the scene."""
-    accuracy = max(tolerance.rtol * CHECKED, FINEST)
+def _every(request: Request, base: Run) -> list[Request]:
+    """Every formulation by both methods; the reference's first."""
     others = (f for f in FORMULATIONS if f != base.formulation and request.formulation is None)
     method = "bdf" if base.method == "radau" else "radau"
-    runs = [(name, how) for name in (base.formulation, *others) for how in (None, method)]
+    return [
+        replace(request, formulation=name, method=how, own=name != base.formulation)
+        for name in (base.formulation, *others)
+        for how in (None, method)
+    ]
+
+
+def _formulations(
+    every: Sequence[Request], base: Run, golden: Arrays, tolerance: Tolerance, say: Say, jobs: int | None
+) -> tuple[float, dict[str, Any], list[Run]]:
+    """(accuracy of checks, structure by formulation, the runs) of every formulation that can express the scene."""
+    first = accuracy = max(tolerance.rtol * CHECKED, FINEST)
     structure: dict[str, Any] = {}
     found = []
-    for name, how in runs:
-        wanted = replace(request, formulation=name, method=how, own=name != base.formulation)
-        try:
-            one, verdict = _inside(wanted, accuracy, golden, tolerance)
-        except Stopped as stopped:
-            if how or stopped.finding.startswith("E60") or stopped.finding == "N608":
-                continue  # not expressible
-            raise Refused(f"{name}: {stopped}; --formulation {base.formulation} leaves it out") from stopped
-        while verdict.worst is not None and _margin(verdict) > HALF and accuracy > tolerance.rtol * CHECKED / 50.0:
-            accuracy /= 10.0
-            one, verdict = _inside(wanted, accuracy, golden, tolerance)
-        if _margin(verdict) > HALF:
-            assert verdict.worst is not None
-            raise Refused(f"{name} differs from {base.formulation}: {sentence(verdict.worst)}")
-        say(f"{name}, {one.method}: {_margin(verdict):.2g} of the limit at accuracy {accuracy:.0e}")
-        structure[name] = one.structure
-        found.append(one)
+    made = each(_one, [(wanted, first, golden.time) for wanted in every], jobs)
+    with contextlib.closing(made):
+        for wanted in every:
+            name = wanted.formulation or ""
+            ran = next(made) if accuracy == first else _one((wanted, accuracy, golden.time))
+            if isinstance(ran, Lost):
+                raise RuntimeError(f"the process of {name} died ({ran.how})")
+            if isinstance(ran, tuple):
+                code, message, finding = ran
+                if wanted.method or finding.startswith("E60") or finding == "N608":
+                    continue  # not expressible
+                text = f"{name}: {message}; --formulation {base.formulation} leaves it out"
+                raise Refused(text) from Stopped(code, message, finding)
+            verdict = _within(ran, golden, tolerance)
+            while verdict.worst is not None and _margin(verdict) > HALF and accuracy > tolerance.rtol * CHECKED / 50.0:
+                accuracy /= 10.0
+                ran = run(replace(wanted, accuracy=accuracy), between(golden.time))
+                verdict = _within(ran, golden, tolerance)
+            if _margin(verdict) > HALF:
+                assert verdict.worst is not None
+                raise Refused(f"{name} differs from {base.formulation}: {sentence(verdict.worst)}")
+            say(f"{name}, {ran.method}: {_margin(verdict):.2g} of the limit at accuracy {accuracy:.0e}")
+            structure[name] = ran.structure
+            found.append(ran)
     return accuracy, structure, found
 
 
-def _inside(request: Request, accuracy: float, golden: Arrays, tolerance: Tolerance) -> tuple[Run, Verdict]:
-    one = run(replace(request, accuracy=accuracy), between(golden.time))
-    return one, differences(common(golden, set(one.trace.values)), one.trace, tolerance.part(HALF))
+def _one(asked: tuple[Request, float, Floats]) -> Run | tuple[int, str, str]:
+    """A run at an accuracy with rows between the kept instants [n] s; exit code, message and code where it stopped."""
+    request, accuracy, time = asked
+    try:
+        return run(replace(request, accuracy=accuracy), between(time))
+    except Stopped as stopped:
+        return stopped.code, str(stopped), stopped.finding
+
+
+def _within(one: Run, golden: Arrays, tolerance: Tolerance) -> Verdict:
+    return differences(common(golden, set(one.trace.values)), one.trace, tolerance.part(HALF))
 
 
 def _margin(verdict: Verdict) -> float:

@@ -14,7 +14,7 @@ from sysdyn.cli.failures import UsageError
 
 FILES = ("sysdyn.toml", "pyproject.toml")
 _RUNS = ("simulate", "report", "sweep", "trade", "verify", "reduce")
-_JOBS = ("sweep", "trade", "verify", "golden check")
+_JOBS = ("check", "sweep", "trade", "verify")
 _ALL: dict[str, tuple[str, Any]] = {
     "color": ("color", ("auto", "always", "never")),
     "quiet": ("quiet", bool),
@@ -32,6 +32,7 @@ KEYS: dict[str, dict[str, tuple[str, Any]]] = {
         "strict": ("strict", bool),
         "allow-unsupported": ("allow_unsupported", bool),
         "output-format": ("output_format", ("full", "concise", "json", "github", "junit", "sarif")),
+        "jobs": ("jobs", int),
     },
     "diff": {"rtol": ("rtol", float), "atol": ("atol", float), "tau": ("tau", float)},
     "golden": {"folder": ("folder", str)},
@@ -80,7 +81,8 @@ def _map(
         found[command] |= own.get(command, {})
     inner = general | own.get("golden", {})
     found["golden"] = {name: dict(inner) for name in ("record", "check", "accept", "list")}
-    found["golden"]["check"] |= jobs
+    for name in ("record", "check", "accept"):
+        found["golden"][name] |= jobs
     return found
 
 

@@ -2,10 +2,54 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from sysdyn.cli.failures import classify
 from sysdyn.cli.run import targets
 from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
-from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What came of a file.  said: ("say" or "data", text) in order; unread: why it could not be read."""
+
+    found: tuple[Diagnostic, ...] = ()
+    said: tuple[tuple[str, str], ...] = ()
+    result: dict[str, Any] | None = None
+    unread: str | None = None
+
+
+def file_checked(asked: tuple[str, bool, bool]) -> Checked:
+    """Every model and scene of a file.  asked: path, whether what cannot be run yet is an error, whether the passivity
+    of each is told.
+    """
+    path, refused, explain = asked
+    report, said, found = Report(), list[tuple[str, str]](), list[dict[str, object]]()
+    try:
+        document = targets.read(path, report)
+        wrong = [d.place.span for d in report if d.severity == "error" and d.place and d.place.file == path]
+        for target in targets.all_targets(document, report):
+            with ex.fresh():
+                summary = checked(target, report, refused)
+            items = [item.span for item in (target.model, target.scene) if item is not None]
+            if any(i.start <= span.start < i.end for span in wrong for i in items):
+                summary["ok"] = False  # a slip that was read as it was meant is still to be mended
+            found.append(summary)
+            if summary["ok"]:
+                said.append(("say", f"{path}: {target.name}: {_line(summary)}"))
+                if explain:
+                    said.append(("data", f"{path}: {target.name}: " + _passivity(summary)))
+    except OSError as error:
+        return Checked(tuple(report), tuple(said), unread=classify(error)[1])
+    except ModelError as error:  # a file that is no text does not hide the others
+        return Checked((*report, *error.diagnostics), tuple(said))
+    if not document.models and not document.scenes and not report.failed:
+        said.append(("say", f"{path}: no model"))
+    return Checked(tuple(report), tuple(said), {"file": path, "models": list(document.models), "targets": found})
 
 
 def checked(target: targets.Target, report: Report, refused: bool = False) -> dict[str, object]:
@@ -62,3 +106,19 @@ def _judged(network: Network, report: Report) -> dict[str, object]:
             "lines": judged.lines(),
         },
     }
+
+
+def _passivity(summary: dict[str, object]) -> str:
+    found = summary.get("passivity")
+    return "not compiled" if not isinstance(found, dict) else "\n".join(found["lines"])
+
+
+def _line(summary: dict[str, object]) -> str:
+    if "index" not in summary:
+        return "ok"
+    counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}, index {index}".format(**summary)
+    moved = summary["moved"]
+    assert isinstance(moved, list)
+    from sysdyn.cli.run.starting import shortened
+
+    return "; ".join([f"ok: {counts}", *shortened(moved)])

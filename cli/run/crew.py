@@ -2,17 +2,19 @@
 
 A worker takes a job from its pipe and sends back what came of it.  One that dies takes its job with it: the supply says
 what becomes of that.  `each` is the plain case: one function, many items; an item whose worker died DEATHS times is
-lost.
+lost.  Where nobody says how many, items are worked off here until what is left of them pays for processes, one a core.
 """
 
 from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import signal
+import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -22,10 +24,24 @@ from sysdyn.values import dataclass
 
 DEATHS = 3
 """Workers that a job may kill."""
+PAYS = 3.0
+"""s: what is left of the work, as the items done so far foretell it, from which on processes pay; one takes 0.6 s to
+start.
+"""
+SHARE = 0.5
+"""Of the machine's memory: what processes of the size of this one may take together."""
 _CONTEXT = multiprocessing.get_context("spawn")
 
 Serve = Callable[..., None]
 """What a worker does: `serve(pipe, *setup)`; it answers every job that comes through the pipe until that is closed."""
+
+
+def cores() -> int:
+    """Those that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on this system
+        return os.cpu_count() or 1
 
 
 class Supply(Protocol):
@@ -60,7 +76,7 @@ class Crew:
         """As many workers as there are jobs for."""
         while len(self._workers) < self._jobs and (job := self._supply.next()) is not None:
             mine, other = _CONTEXT.Pipe()
-            process = _CONTEXT.Process(target=self._serve, args=(other, *self._setup), daemon=True)
+            process = _CONTEXT.Process(target=_alone, args=(self._serve, other, *self._setup), daemon=True)
             process.start()
             other.close()
             worker = _Worker(process, mine, job)
@@ -83,7 +99,7 @@ class Crew:
                     yield from self._answered(worker)
                 self._fill()
         finally:
-            self._end()
+            self.end()
 
     def _answered(self, worker: _Worker) -> Iterator[Any]:
         try:
@@ -105,12 +121,19 @@ class Crew:
             self._give(worker, job)
         yield from found
 
-    def _end(self) -> None:
+    def end(self) -> None:
+        """No worker goes on."""
         for worker in self._workers:
             worker.pipe.close()
             worker.process.terminate()
         for worker in self._workers:
             worker.process.join(5.0)
+
+
+def _alone(serve: Serve, *setup: Any) -> None:
+    """What a process does: the cores are for the others beside it, not for threads of its own."""
+    os.environ["SYSDYN_THREADS"] = "1"
+    serve(*setup)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +154,6 @@ class _Items:
         return self.waiting.popleft() if self.waiting else None
 
     def took(self, job: tuple[int, Any], answer: Any, seconds: float) -> Iterator[tuple[int, Any]]:
-        if isinstance(answer, BaseException):
-            raise answer
         yield job[0], answer
 
     def died(self, job: tuple[int, Any], how: str) -> Iterator[tuple[int, Any]]:
@@ -141,6 +162,13 @@ class _Items:
             self.waiting.append(job)
         else:
             yield job[0], Lost(how)
+
+
+@dataclass(frozen=True, slots=True)
+class _Raised:
+    """What a function raised in another process."""
+
+    error: BaseException
 
 
 def _call(pipe: Connection, function: Callable[[Any], Any]) -> None:
@@ -152,19 +180,108 @@ def _call(pipe: Connection, function: Callable[[Any], Any]) -> None:
             try:
                 answer: Any = function(item)
             except Exception as error:
-                answer = error
+                answer = _Raised(error)
             try:
                 pipe.send(answer)
             except (TypeError, AttributeError, ValueError) as error:  # it cannot be handed over
-                pipe.send(RuntimeError(f"{answer!r:.500}: {error}"))
+                pipe.send(_Raised(RuntimeError(f"{answer!r:.500}: {error}")))
 
 
-def each(function: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> Iterator[tuple[int, Any]]:
-    """(number, function(item)) as they are ready, `Lost` for one that kills its workers; jobs 1: here, in order.
+def as_ready(function: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> Iterator[tuple[int, Any]]:
+    """(number, function(item)) as they are ready, by processes; `Lost` for an item that kills its workers.
 
     function: of a module, for it is called in other processes; so are items and what comes of them handed over.
     """
-    if jobs == 1 or len(items) == 1:
-        yield from ((k, function(item)) for k, item in enumerate(items))
+    for k, answer in Crew(_Items(deque(enumerate(items))), jobs, _call, (function,)).results():
+        if isinstance(answer, _Raised):
+            raise answer.error
+        yield k, answer
+
+
+def each(
+    function: Callable[[Any], Any],
+    items: Sequence[Any],
+    jobs: int | None,
+    here: Callable[[Any], Any] | None = None,
+    like: float | None = None,
+) -> Generator[Any, None, None]:
+    """function(item) of each item, in their order, whatever is ready first; `Lost` for one that kills its workers.
+
+    jobs: processes; 1: all here.  None: here, until what is left foreseeably takes longer than PAYS, then one a core.
+    here: what is called in this process, in the place of function.  like [s]: what one like them took before.  What an
+    item raises is raised in its turn.
+    """
+    done, took = 0, [] if like is None else [like]
+    while done < len(items) and _stays(took, len(items) - done, jobs if done or len(items) > 1 else 1):
+        began = time.monotonic()
+        answer = (here or function)(items[done])
+        took.append(time.monotonic() - began)
+        done += 1
+        yield answer
+    if done == len(items):
         return
-    yield from Crew(_Items(deque(enumerate(items))), jobs, _call, (function,)).results()
+    found: dict[int, Any] = {}
+    for k, answer in Crew(_Items(deque(enumerate(items[done:], done))), jobs or _most(), _call, (function,)).results():
+        found[k] = answer
+        while done in found:
+            answer = found.pop(done)
+            if isinstance(answer, _Raised):
+                raise answer.error
+            done += 1
+            yield answer
+
+
+def _stays(took: Sequence[float], left: int, jobs: int | None) -> bool:
+    """Whether the next item is worked off here; took [s]: by those done."""
+    if jobs is not None:
+        return jobs == 1
+    return not took or left < 2 or sum(took) / len(took) * left < PAYS or _most() == 1
+
+
+class Beside:
+    """One item worked off by a process beside this one, from when this one has been at its own work for PAYS s.
+
+    jobs: 1: never; None: where there are cores and memory for it.
+    """
+
+    def __init__(self, function: Callable[[Any], Any], item: Any, jobs: int | None) -> None:
+        self._crew = Crew(_Items(deque([(0, item)])), 1, _call, (function,))
+        self._found: list[Any] = []
+        self._timer = threading.Timer(PAYS, self._made)
+        self._timer.daemon = True
+        if (jobs or _most()) > 1:
+            self._timer.start()
+
+    def _made(self) -> None:
+        with contextlib.suppress(OSError):  # it is not wanted any more
+            self._found += [answer for _, answer in self._crew.results()]
+
+    def answer(self) -> Any | None:
+        """What came of it, waited for; None where no process was begun, or it died, or the function raised."""
+        self._timer.cancel()
+        if self._timer.ident is not None:
+            self._timer.join()
+        found = self._found[0] if self._found else None
+        return None if isinstance(found, (Lost, _Raised)) else found
+
+    def close(self) -> None:
+        """Nobody wants it any more."""
+        self._timer.cancel()
+        self._crew.end()
+
+
+def company(seconds: float) -> int:
+    """Processes for work of that length."""
+    return _most() if seconds > PAYS else 1
+
+
+def _most() -> int:
+    """One a core, as far as processes of the size of this one have room."""
+    try:
+        import resource
+
+        whole = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        mine = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    except (ImportError, ValueError, OSError):  # not on this system
+        return cores()
+    return max(1, min(cores(), int(SHARE * whole / mine)))

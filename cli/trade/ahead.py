@@ -6,24 +6,19 @@ steps included, and made anew where it is not.  Ahead go all runs of every combi
 
 from __future__ import annotations
 
-import os
-import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.crew import Lost, each
+from sysdyn.cli.run.crew import Lost, as_ready
 from sysdyn.cli.run.running import Request
-from sysdyn.cli.trade.measuring import Bench, Limits
+from sysdyn.cli.trade.measuring import Limits, bench_of
 from sysdyn.cli.trade.search import FIRST, Search, tolerance
 from sysdyn.cli.trade.traded import Combination, Measured, Runs
-from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
 STEPS = 20_000
 """Of a first run made ahead at most: one that takes more may be one that the search never makes."""
-_benches: dict[tuple[Request, Path], Bench] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,22 +34,9 @@ class Asked:
     wall: float
 
 
-def _bench(request: Request, folder: Path) -> Bench:
-    """The settings of the scene, once a process."""
-    key = request, folder
-    if key not in _benches:
-        report, own = Report(), folder / f"ahead-{os.getpid()}"
-        own.mkdir(exist_ok=True)
-        target = targets.one(targets.read(request.file, report), request.file, request.model, request.scene, report)
-        assert target is not None
-        _benches[key] = Bench(request, target, report, own, time.monotonic())
-        _benches[key].prepare()
-    return _benches[key]
-
-
 def _runs(asked: Asked) -> Runs:
     """In a process of its own."""
-    bench, found = _bench(asked.request, asked.folder), Runs()
+    bench, found = bench_of(asked.request, asked.folder), Runs()
 
     def measure(combination: Combination, tolerance: float, most: float) -> Measured | str:
         limits = Limits(None if asked.full else STEPS, asked.wall)
@@ -71,10 +53,8 @@ def _runs(asked: Asked) -> Runs:
     return found
 
 
-def ahead(asked: Sequence[Asked], jobs: int) -> Runs:
-    """The runs of all combinations; what a process died of is left to the search."""
-    found = Runs()
-    for _, runs in each(_runs, asked, jobs):
+def ahead(asked: Sequence[Asked], jobs: int) -> Iterator[Runs]:
+    """The runs of all combinations, as they are ready; what a process died of is left to the search."""
+    for _, runs in as_ready(_runs, asked, jobs):
         if not isinstance(runs, Lost):
-            found |= runs
-    return found
+            yield runs

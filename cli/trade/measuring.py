@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import TRIED
+from sysdyn.cli.run import targets
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.running import ACCURACY, Ran, Request, begin, options_of, ready, run_from
 from sysdyn.cli.run.starting import Started
@@ -294,3 +297,19 @@ def _reason(ran: Ran | None, report: Report) -> str:
     if ran is not None and ran.outcome.met:
         return ""
     return errors[0] if errors else "not met"
+
+
+_benches: dict[tuple[Request, Path], Bench] = {}
+
+
+def bench_of(request: Request, folder: Path) -> Bench:
+    """The settings of a request's scene in a process beside the one that asks, made once."""
+    key = request, folder
+    if key not in _benches:
+        report, own = Report(), folder / f"ahead-{os.getpid()}"
+        own.mkdir(exist_ok=True)
+        target = targets.one(targets.read(request.file, report), request.file, request.model, request.scene, report)
+        assert target is not None
+        _benches[key] = Bench(request, target, report, own, time.monotonic())
+        _benches[key].prepare()
+    return _benches[key]

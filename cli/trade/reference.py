@@ -9,9 +9,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
 
+from sysdyn.cli.run.crew import Beside
+from sysdyn.cli.run.running import Request
 from sysdyn.cli.trade.errors import error_of
-from sysdyn.cli.trade.measuring import Bench, Limits
+from sysdyn.cli.trade.measuring import Bench, Limits, bench_of
 from sysdyn.cli.trade.traded import Combination, Reference
 from sysdyn.cli.verify.agreement import horizon
 from sysdyn.runtime.integrate.accuracy import LAWS
@@ -41,23 +45,30 @@ class NoReference(Exception):  # noqa: N818 (a name of the house)
     """No two runs agree anywhere; the message says how far they are apart, or why there are none."""
 
 
-def reference(bench: Bench, budget: float | None) -> tuple[Trace, Reference]:
-    """The reference's trace and what is known of it.  budget [s] of wall time.  Raises NoReference."""
+def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple[Trace, Reference]:
+    """The reference's trace and what is known of it.  budget [s] of wall time.  Raises NoReference.
+
+    jobs: 1: one run after the other; else the second way runs beside the first, once that has been long.
+    """
     runs: list[_Run] = []
     reasons: list[str] = []
     best: tuple[float, _Run, _Run] | None = None
     sure = SURE * bench.accuracy
-    for combination in _ways(bench):
-        run = _finest(bench, combination, budget, len(runs), reasons)
-        if run is None:
-            continue
-        for other in runs:
-            apart = error_of(run.trace, other.trace, bench.judged(other.trace), bench.accuracy, bench.options.t_end)
-            if run.steps != other.steps and (best is None or apart < best[0]):  # equal steps are no second opinion
-                best = apart, other, run
-        runs.append(run)
-        if best is not None and (best[0] <= sure or len(runs) == 3):
-            break
+    ways = list(_ways(bench))
+    with closing(Beside(_beside, (bench.request, bench.folder, ways[1], budget), jobs)) as beside:
+        for number, combination in enumerate(ways):
+            made = beside.answer() if number == 1 else None
+            run, said = made or _finest(bench, combination, budget, len(runs))
+            reasons += said
+            if run is None:
+                continue
+            for other in runs:
+                apart = error_of(run.trace, other.trace, bench.judged(other.trace), bench.accuracy, bench.options.t_end)
+                if run.steps != other.steps and (best is None or apart < best[0]):  # equal steps are no second opinion
+                    best = apart, other, run
+            runs.append(run)
+            if best is not None and (best[0] <= sure or len(runs) == 3):
+                break
     if best is None:
         raise NoReference("; ".join(dict.fromkeys(reasons)) or "there is but one way to run this scene")
     uncertainty, first, second = best
@@ -83,10 +94,16 @@ def _ways(bench: Bench) -> Iterator[Combination]:
         yield Combination(names[0], "2", "radau", level)
 
 
+def _beside(asked: tuple[Request, Path, Combination, float | None]) -> tuple[_Run | None, list[str]]:
+    """A run at the finest tolerance in a process of its own."""
+    request, folder, combination, budget = asked
+    return _finest(bench_of(request, folder), combination, budget, 1)
+
+
 def _finest(
-    bench: Bench, combination: Combination, budget: float | None, number: int, reasons: list[str]
-) -> _Run | None:
-    """A run at the finest tolerance that ends in time; None where none does."""
+    bench: Bench, combination: Combination, budget: float | None, number: int
+) -> tuple[_Run | None, list[str]]:
+    """A run at the finest tolerance that ends in time; None where none does, and why."""
     law, tolerance = LAWS[combination.method], FINEST[combination.method]
     coarsest = max(law.tolerance(ENOUGH * bench.accuracy), tolerance)
     wall = SECONDS if budget is None else max(PART * budget, 1e-3)
@@ -96,9 +113,8 @@ def _finest(
         if ran is not None and ran.outcome.final:
             counts = ran.outcome.statistics
             steps = counts["steps"], counts["residual_evaluations"]
-            return _Run(f"{combination.name} at {tolerance:.0e}", ran.outcome.traced, steps)
+            return _Run(f"{combination.name} at {tolerance:.0e}", ran.outcome.traced, steps), []
         if ran is None or tolerance >= coarsest:
-            reasons.append(f"{combination.name}: {reason}")
-            return None
+            return None, [f"{combination.name}: {reason}"]
         late = time.monotonic() - began >= 0.5 * wall
         tolerance = coarsest if late else min(100.0 * tolerance, coarsest)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.crew import company
 from sysdyn.cli.run.running import Request, check_tolerances
 from sysdyn.cli.trade.ahead import Asked, ahead
 from sysdyn.cli.trade.journal import journal as journal_of
@@ -37,12 +38,13 @@ def trade(
     full: bool = False,
     budget: float | None = None,
     progress: Callable[[float, float | None], None] | None = None,
-    jobs: int = 1,
+    jobs: int | None = 1,
 ) -> Traded | None:
     """Measure; None where the report says why the scene cannot run.  Raises NoReference.
 
     A trade that was stopped goes on where it was (journal.py).
-    full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead.
+    full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead;
+    None: where it pays, which it does not where the search leaves most combinations out.
     """
     check_tolerances(request)
     if request.rtol is not None or request.atol is not None:
@@ -58,7 +60,8 @@ def trade(
     if not bench.prepare():
         return None
     journal = journal_of(request, document.file.source, document.file.items)
-    kept, known = (journal.reference if journal else None) or reference(bench, budget)
+    kept, known = (journal.reference if journal else None) or reference(bench, budget, jobs)
+    first = time.monotonic() - began
     if journal is not None and journal.reference is None:
         journal.refer(kept, known)
     limit = None if budget is None else began + budget
@@ -68,10 +71,14 @@ def trade(
 
     combinations = list(bench.combinations())
     made_before: Runs = dict(journal.runs) if journal else {}
-    if jobs > 1:
-        left = [c for c in combinations if full or (c, tolerance(FIRST)) not in made_before]
-        made = ahead([Asked(request, folder, c, kept, known.until, full, wall()) for c in left], jobs)
-        made_before = made | made_before
+    left = [c for c in combinations if full or (c, tolerance(FIRST)) not in made_before]
+    number = jobs or (company(first) if full else 1)
+    if number > 1:
+        asked = [Asked(request, folder, c, kept, known.until, full, wall()) for c in left]
+        for runs in ahead(asked, number):
+            for (combination, at), found in runs.items():
+                if made_before.setdefault((combination, at), found) is found and journal is not None:
+                    journal.take(combination, at, found)
 
     def measure(combination: Combination, tolerance: float, most: float) -> Measured | str:
         left = wall()

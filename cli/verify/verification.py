@@ -50,11 +50,11 @@ def verify(
     report: Report,
     folder: Path,
     progress: Callable[[float, float | None], None] | None = None,
-    jobs: int = 1,
+    jobs: int | None = 1,
 ) -> Verified | None:
     """Run and compare; None where the report says why the reference cannot run.  Errors pass as those of `run`.
 
-    jobs: formulations side by side, each in a process of its own.
+    jobs: formulations side by side, each in a process of its own; None: where it pays.
     """
     check_tolerances(request)
     if request.method not in (None, "auto", *METHODS):
@@ -119,43 +119,47 @@ class _Verification:
         self.span = (0.0, 0.0)
         self.finer: Run | None = None
 
-    def all(self, jobs: int = 1) -> Verified | None:
-        """Every formulation, then the comparison."""
-        if jobs > 1:
-            return self._side_by_side(jobs)
-        self._formulation(None)
-        if not self.runs or self.finer is None:
-            self._tell()
-            return None
-        first = self.runs[0].formulation
-        for name in EVERY:
-            if name != first:
-                self._formulation(name)
-        self._tell()
-        return self._compared(self.finer)
+    def all(self, jobs: int | None = 1) -> Verified | None:
+        """Every formulation, then the comparison.
 
-    def _side_by_side(self, jobs: int) -> Verified | None:
-        """The same by processes: what they find is taken in in the order of formulations, not of their ends."""
-        silent = Report()
-        with ex.fresh():
-            first = ready(self.request, self.target, silent)
-        others = [name for name in EVERY if first and name != first.formulation]
-        items = [(self.request, self.folder, name) for name in (None, *others)]
-        parts: dict[int, _Part] = {}
-        for k, part in each(_part, items, jobs):
+        jobs: processes; None: as many as pay, as the reference, which runs here, foretells it.  What they find is taken
+        in in the order of formulations, not of their ends.
+        """
+        began = time.monotonic()
+        asked: list[str | None] = []
+        if jobs is None or jobs == 1:
+            self._formulation(None)
+            if self._stopped():
+                return None
+            asked += [name for name in EVERY if name != self.runs[0].formulation]
+        else:
+            with ex.fresh():
+                first = ready(self.request, self.target, Report())
+            asked += [None, *(name for name in EVERY if first and name != first.formulation)]
+        items = [(self.request, self.folder, name) for name in asked]
+        for name, part in zip(asked, each(_part, items, jobs, self._here, time.monotonic() - began), strict=True):
             if isinstance(part, Lost):
-                raise RuntimeError(f"the process of {items[k][2] or 'the reference'} died ({part.how})")
-            parts[k] = part
-            self.done = round(self.planned * len(parts) / len(items))
-            self._advance(0.0, None)
-        for k in range(len(items)):
-            self._take(parts[k])
-            if k == 0 and (not self.runs or self.finer is None):
-                self._tell()
+                raise RuntimeError(f"the process of {name or 'the reference'} died ({part.how})")
+            if part is not None:
+                self._take(part)
+                self.done = min(self.planned, self.done + len(METHODS) + (name is None))
+                self._advance(0.0, None)
+            if name is None and self._stopped():
                 return None
         self._tell()
         assert self.finer is not None
         return self._compared(self.finer)
+
+    def _here(self, item: tuple[Request, Path, str | None]) -> None:
+        """A formulation in this process."""
+        self._formulation(item[2])
+
+    def _stopped(self) -> bool:
+        """The reference did not come to its end: it is said why."""
+        if self.runs and self.finer is not None:
+            return False
+        self._tell()
+        return True
 
     def _take(self, part: _Part) -> None:
         """What came of a formulation."""

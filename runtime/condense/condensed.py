@@ -300,6 +300,7 @@ class Condensed:
             row=lib.pointer(self.pattern.row),
             scales=whole.core.scales,
             stop=whole.core.stop,
+            together=whole.core.together,
         )
         lib.core.sd_condensed_bind(c.byref(self.condensed), c.byref(self.core))
 

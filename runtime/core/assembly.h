@@ -56,6 +56,7 @@ struct sd_system {
     const int32_t *stop; /* nonzero: a callback of the caller failed, give up */
     int64_t residual_evaluations, jacobian_evaluations;
     const sd_left *left; /* the unknowns and rows are those that are left of another system; NULL: all are */
+    int32_t together;    /* 1: its blocks may be called by several threads at once */
 };
 
 /* r := F(t, y, yd) */

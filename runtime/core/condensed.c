@@ -1,6 +1,7 @@
 /* Elimination of unknowns that are constant sums of others: see condensed.h. */
 #include "condensed.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* x := factors * sources + constant, up to three terms in one pass over memory */
@@ -109,4 +110,40 @@ void sd_condensed_bind(sd_condensed *condensed, sd_system *system)
 {
     condensed->left = (sd_left){residual, jacobian, steep};
     system->left = &condensed->left;
+}
+
+struct sd_beside {
+    sd_system system, full;
+    sd_condensed condensed;
+    double *y, *yd, *r;
+    double memory[];
+};
+
+sd_beside *sd_beside_new(const sd_system *system)
+{
+    const sd_system *full = system->left ? ((const sd_condensed *)system->left)->full : NULL;
+    size_t n = full ? (size_t)full->unknowns + 8 : 0, rows = full ? (size_t)full->rows + 1 : 0;
+    sd_beside *beside = calloc(1, sizeof *beside + (2 * n + rows) * sizeof(double));
+    if (!beside)
+        return NULL;
+    beside->y = beside->memory;
+    beside->yd = beside->y + n;
+    beside->r = beside->yd + n;
+    return beside;
+}
+
+sd_system *sd_beside_as(sd_beside *beside, const sd_system *system)
+{
+    beside->system = *system;
+    if (system->left) {
+        beside->condensed = *(const sd_condensed *)system->left;
+        beside->full = *beside->condensed.full;
+        beside->condensed.full = &beside->full;
+        beside->condensed.y = beside->y;
+        beside->condensed.yd = beside->yd;
+        beside->condensed.r = beside->r;
+        beside->condensed.jy = beside->condensed.jyd = NULL;
+        beside->system.left = &beside->condensed.left;
+    }
+    return &beside->system;
 }

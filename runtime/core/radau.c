@@ -1,5 +1,7 @@
 /* The step of Radau IIA: stages by Newton's iteration, error, step size (see radau.h). */
+#include "condensed.h"
 #include "radau.h"
+#include "threads.h"
 
 #include <float.h>
 #include <math.h>
@@ -99,7 +101,8 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
     radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
-    radau->gz = calloc(pairs * m + nnz, sizeof(double complex));
+    size_t apart = system->unknowns < SD_LARGE ? 1 : pairs; /* complex matrices that are made at once */
+    radau->gz = calloc(pairs * m + apart * nnz, sizeof(double complex));
     if (!radau->memory || !radau->gz || !radau->gap) {
         sd_radau_free(radau);
         return NULL;
@@ -115,7 +118,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     radau->jyd = radau->jy + nnz;
     radau->g = radau->jyd + nnz;
     for (size_t k = 0; k < pairs; k++) {
-        radau->w[k] = radau->gz + nnz + k * m;
+        radau->w[k] = radau->gz + apart * nnz + k * m;
         radau->complex_linear[k] = complex_linear[k];
     }
     radau->system = system;
@@ -137,6 +140,8 @@ void sd_radau_free(sd_radau *radau)
     free(radau->memory);
     free(radau->gz);
     free(radau->gap);
+    free(radau->beside);
+    free(radau->point_y);
     free(radau);
 }
 
@@ -260,6 +265,59 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->theta = 1.0;
 }
 
+/* whether the systems of a step are taken at once: a matter of their size, not of the machine */
+static int large(const sd_radau *radau)
+{
+    return radau->n >= SD_LARGE;
+}
+
+typedef struct factoring {
+    sd_radau *radau;
+    int failed[SD_PAIRS + 1];
+} factoring;
+
+/* part 0: J + gamma/h E and its factors; part k: those of J + lambda/h E of pair k - 1 */
+static void factorise_one(void *context, int part)
+{
+    factoring *all = context;
+    sd_radau *radau = all->radau;
+    const sd_radau_method *method = radau->method;
+    int32_t entries = radau->system->entries;
+    if (part == 0) {
+        double real = method->gamma / radau->h;
+        for (int32_t e = 0; e < entries; e++)
+            radau->g[e] = radau->jy[e] + real * radau->jyd[e];
+        all->failed[0] = sd_linear_factor(radau->linear, radau->g, radau->scale);
+        return;
+    }
+    double complex both = method->lambda[part - 1] / radau->h;
+    double complex *gz = radau->gz + (large(radau) ? (size_t)(part - 1) * ((size_t)entries + 1) : 0);
+    for (int32_t e = 0; e < entries; e++)
+        gz[e] = radau->jy[e] + both * radau->jyd[e];
+    all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, radau->scale);
+}
+
+/* The factors of all matrices of a step; the failure of the first that has none.  Large ones are all made in any case: what
+ * they leave behind must not depend on how many threads there are. */
+static int factorise_all(sd_radau *radau)
+{
+    factoring all = {radau, {0}};
+    int failed = 0;
+    if (large(radau))
+        sd_side_by_side(radau->method->pairs + 1, factorise_one, &all);
+    for (int part = 0; part <= radau->method->pairs && !failed; part++) {
+        if (!large(radau))
+            factorise_one(&all, part);
+        failed = all.failed[part];
+        if (part == 0) {
+            radau->bad_row = radau->linear->bad_row;
+            radau->bad_column = radau->linear->bad_column;
+        } else if (failed)
+            sd_linear_z_bad(radau->complex_linear[part - 1], &radau->bad_row, &radau->bad_column);
+    }
+    return failed;
+}
+
 /* J, E where they are not old, and the factors of J + gamma/h E and all J + lambda/h E.  Taken at the last accepted point, or
  * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
 static int factorise(sd_radau *radau, int at_end)
@@ -287,22 +345,9 @@ static int factorise(sd_radau *radau, int at_end)
         }
         radau->old_jacobian = 1;
     }
-    double real = method->gamma / radau->h;
-    for (int32_t e = 0; e < system->entries; e++)
-        radau->g[e] = radau->jy[e] + real * radau->jyd[e];
     radau->ready = 0;
     radau->factorisations++;
-    int failed = sd_linear_factor(radau->linear, radau->g, radau->scale);
-    radau->bad_row = radau->linear->bad_row;
-    radau->bad_column = radau->linear->bad_column;
-    for (int k = 0; k < method->pairs && !failed; k++) {
-        double complex both = method->lambda[k] / radau->h;
-        for (int32_t e = 0; e < system->entries; e++)
-            radau->gz[e] = radau->jy[e] + both * radau->jyd[e];
-        failed = sd_linear_z_factor(radau->complex_linear[k], radau->gz, radau->scale);
-        if (failed)
-            sd_linear_z_bad(radau->complex_linear[k], &radau->bad_row, &radau->bad_column);
-    }
+    int failed = factorise_all(radau);
     if (failed)
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
     radau->h_factored = radau->h;
@@ -310,19 +355,60 @@ static int factorise(sd_radau *radau, int at_end)
     return SD_FINE;
 }
 
+/* d of stage s := its residual, of `system`, by way of y and rate */
+static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, double *rate)
+{
+    const sd_radau_method *method = radau->method;
+    double weight[SD_STAGES];
+    for (int j = 0; j < method->stages; j++)
+        weight[j] = method->inverse[s][j] / radau->h;
+    combine(method->stages, radau->n, weight, radau->z, rate);
+    for (int32_t i = 0; i < radau->n; i++)
+        y[i] = radau->phi[i] + radau->z[s][i];
+    sd_residual(system, radau->t + method->c[s] * radau->h, y, rate, radau->d[s]);
+}
+
+/* The later half of the stages, in a system beside the radau's own; the others in that. */
+static void residual_part(void *context, int part)
+{
+    sd_radau *radau = context;
+    int half = (radau->method->stages + 1) / 2;
+    if (part == 0)
+        for (int s = 0; s < half; s++)
+            residual_of(radau, radau->system, s, radau->y, radau->rate);
+    else
+        for (int s = half; s < radau->method->stages; s++)
+            residual_of(radau, radau->other, s, radau->point_y, radau->point_rate);
+}
+
+/* the system and the point that a second thread takes residuals with; 0: there are none */
+static int accompanied(sd_radau *radau)
+{
+    if (!large(radau) || !radau->system->together || sd_threads() < 2)
+        return 0;
+    if (!radau->beside) {
+        radau->beside = sd_beside_new(radau->system);
+        radau->point_y = calloc(2 * ((size_t)radau->n + 1), sizeof(double));
+        radau->point_rate = radau->point_y + radau->n + 1;
+    }
+    if (!radau->beside || !radau->point_y)
+        return 0;
+    radau->other = sd_beside_as(radau->beside, radau->system);
+    return 1;
+}
+
 /* residuals of the stages into d */
 static int residuals(sd_radau *radau)
 {
-    const sd_radau_method *method = radau->method;
     int32_t n = radau->n;
-    for (int s = 0; s < method->stages; s++) {
-        double weight[SD_STAGES];
-        for (int j = 0; j < method->stages; j++)
-            weight[j] = method->inverse[s][j] / radau->h;
-        combine(method->stages, n, weight, radau->z, radau->rate);
-        for (int32_t i = 0; i < n; i++)
-            radau->y[i] = radau->phi[i] + radau->z[s][i];
-        sd_residual(radau->system, radau->t + method->c[s] * radau->h, radau->y, radau->rate, radau->d[s]);
+    int64_t before = radau->system->residual_evaluations;
+    int made = accompanied(radau);
+    if (made)
+        sd_side_by_side(2, residual_part, radau);
+    for (int s = 0; s < radau->method->stages; s++) {
+        if (!made)
+            residual_of(radau, radau->system, s, radau->y, radau->rate);
+        radau->system->residual_evaluations = before + s + 1; /* those that are looked at */
         if (*radau->system->stop)
             return SD_STOPPED;
         int32_t bad = sd_first_bad(n, radau->d[s]);
@@ -405,6 +491,16 @@ static inline void join(sd_radau *radau, int stages, int pairs, double *sum, dou
     }
 }
 
+/* part 0: the real system; part k: that of pair k - 1 */
+static void solve_one(void *context, int part)
+{
+    sd_radau *radau = context;
+    if (part == 0)
+        sd_linear_solve(radau->linear, radau->d[0]);
+    else
+        sd_linear_z_solve(radau->complex_linear[part - 1], radau->w[part - 1]);
+}
+
 /* One Newton step from the residuals in d; the size of the correction in Newton's weights, and that of what carries the
  * state in state_size. */
 static double correct(sd_radau *radau)
@@ -417,9 +513,11 @@ static double correct(sd_radau *radau)
         split(radau, 5, 2);
     else
         split(radau, 7, 3);
-    sd_linear_solve(radau->linear, radau->d[0]);
-    for (int k = 0; k < radau->method->pairs; k++)
-        sd_linear_z_solve(radau->complex_linear[k], radau->w[k]);
+    if (large(radau))
+        sd_side_by_side(radau->method->pairs + 1, solve_one, radau);
+    else
+        for (int part = 0; part <= radau->method->pairs; part++)
+            solve_one(radau, part);
     if (stages == 3)
         join(radau, 3, 1, &all, &state);
     else if (stages == 5)

@@ -85,6 +85,9 @@ typedef struct sd_radau {
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
     double complex *w[SD_PAIRS], *gz;
+    struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
+    sd_system *other;             /* its system */
+    double *point_y, *point_rate; /* [n] */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;
     int32_t cause, bad_row, bad_column;

@@ -182,6 +182,8 @@ def _load() -> Any:
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P, _P, _P]),
         "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P]),
         "sd_trim": (None, []),
+        "sd_threads": (c.c_int, []),
+        "sd_threads_use": (None, [c.c_int]),
         "sd_determined": (c.c_int, [_I, _I, *[_P] * 4, _D, _L, _P, _P]),
         "sd_match": (_I, [_I, _I, _P, _P, _P, _P]),
         "sd_peel": (_I, [_I, _I, _I, _P, _P, _P, _D, _P]),

@@ -76,6 +76,7 @@ class System(c.Structure):
         ("residual_evaluations", _L),
         ("jacobian_evaluations", _L),
         ("left", _P),
+        ("together", _I),
     ]
 
 
@@ -282,6 +283,7 @@ class Radau(c.Structure):
         *[(name, _P) for name in ["newton_weight", "scale", "terms", "jy", "jyd", "g", "memory"]],
         ("w", _P * PAIRS),
         ("gz", _P),
+        *[(name, _P) for name in ["beside", "other", "point_y", "point_rate"]],
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
         *[(name, _L) for name in ["factorisations", "taken"]],
         *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],

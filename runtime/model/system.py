@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.carrier import Carrier, Extent, Failure, Tables
+from sysdyn.runtime.model.carrier import Carrier, Extent, Failure, LibraryCarrier, Tables
 from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, describe
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
@@ -226,6 +226,7 @@ class System:
             scale=c.addressof(scales),
             v=lib.pointer(self._scratch),
             stop=lib.pointer(self.failure.flag),
+            together=isinstance(self.carrier, LibraryCarrier),
         )
         self._sets: dict[bytes, tuple[Any, Any]] = self.once("sets", dict)
         self.switch()

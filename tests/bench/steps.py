@@ -45,13 +45,14 @@ class _CaughtError(Exception):
 
 
 class Line:
-    """A model at a size, ready to be integrated."""
+    """A model at a size, ready to be integrated.  name: of models/benchmark, or a file with one scene."""
 
-    def __init__(self, name: str, n: int, folder: Path) -> None:
-        path, report = MODELS / "benchmark" / f"{name}.sd", Report()
+    def __init__(self, name: str | Path, n: int, folder: Path) -> None:
+        path = MODELS / "benchmark" / f"{name}.sd" if isinstance(name, str) else name
+        scene, report = "reference" if isinstance(name, str) else None, Report()
         settings = (("n", str(n)),)
-        request = Request(str(path), "reference", output=str(folder / "trace.h5"), settings=settings)
-        target = targets.one(targets.read(str(path), report), str(path), None, "reference", report)
+        request = Request(str(path), scene, output=str(folder / "trace.h5"), settings=settings)
+        target = targets.one(targets.read(str(path), report), str(path), None, scene, report)
         assert target is not None
         with ex.fresh():
             prepared = ready(request, target, report)

@@ -1,4 +1,5 @@
-"""The core under the address and the undefined-behaviour sanitizer: `python tests/runtime/sanitized.py [PYTEST ARGS]`.
+"""The core under the address and the undefined-behaviour sanitizer: `python tests/runtime/sanitized.py [PYTEST ARGS]`;
+with `--threads` first under that of threads.
 
 The sources are built as pyproject.toml names them, with the sanitizers, into a folder of their own; a Python that has
 the sanitizer's library before all others then runs the tests of the core with that build in place of the installed one.
@@ -16,10 +17,13 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[2]
-FLAGS = ("-O1", "-g1", "-std=c11", "-fPIC", "-fsanitize=address,undefined", "-fno-sanitize-recover=undefined")
+PLAIN = ("-O1", "-g1", "-std=c11", "-fPIC")
+FLAGS = (*PLAIN, "-fsanitize=address,undefined", "-fno-sanitize-recover=undefined")
+THREADS = (*PLAIN, "-fsanitize=thread")
 OPTIONS = {
     "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1",  # CPython keeps what it has to its end
     "UBSAN_OPTIONS": "print_stacktrace=1",
+    "TSAN_OPTIONS": "halt_on_error=1",
 }
 PRELUDE = """
 import importlib.util, sys
@@ -35,7 +39,7 @@ sys.exit(pytest.main(sys.argv[2:]))
 """
 
 
-def build(folder):
+def build(folder, flags=FLAGS):
     """The core's library with the sanitizers, as the package's extension module; two compilers side by side."""
     import sysconfig
 
@@ -46,26 +50,30 @@ def build(folder):
 
     def compiled(pair):
         source, target = pair
-        subprocess.run(["gcc", *FLAGS, *include, "-c", str(ROOT / source), "-o", str(target)], check=True)
+        subprocess.run(["gcc", *flags, *include, "-c", str(ROOT / source), "-o", str(target)], check=True)
 
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(compiled, zip(module["sources"], objects, strict=True)))
     library = folder / "_core.so"
-    subprocess.run(["gcc", *FLAGS, "-shared", *map(str, objects), "-lm", "-o", str(library)], check=True)
+    subprocess.run(["gcc", *flags, "-shared", *map(str, objects), "-lm", "-o", str(library)], check=True)
     return library
 
 
-def run(library, arguments):
+def run(library, arguments, sanitizer="asan"):
     """The exit code of pytest with the library in place of the installed core, and what it said."""
-    asan = subprocess.run(["gcc", "-print-file-name=libasan.so"], check=True, capture_output=True, text=True).stdout
-    env = {**os.environ, **OPTIONS, "LD_PRELOAD": str(Path(asan.strip()).resolve())}
-    command = [sys.executable, "-c", PRELUDE, str(library), "-q", "-p", "no:cacheprovider", *arguments]
+    name = f"-print-file-name=lib{sanitizer}.so"
+    found = subprocess.run(["gcc", name], check=True, capture_output=True, text=True).stdout
+    env = {**os.environ, **OPTIONS, "LD_PRELOAD": str(Path(found.strip()).resolve())}
+    shown = ["-s"] if sanitizer == "tsan" else []  # what it says goes lost in pytest's capture
+    command = [sys.executable, "-c", PRELUDE, str(library), "-q", *shown, "-p", "no:cacheprovider", *arguments]
     found = subprocess.run(command, check=False, env=env, cwd=ROOT, capture_output=True, text=True)
     return found.returncode, found.stdout + found.stderr
 
 
 if __name__ == "__main__":
+    threads = sys.argv[1:2] == ["--threads"]
+    chosen = (THREADS, "tsan") if threads else (FLAGS, "asan")
     with tempfile.TemporaryDirectory() as made:
-        code, said = run(build(Path(made)), sys.argv[1:] or ["tests/runtime"])
+        code, said = run(build(Path(made), chosen[0]), sys.argv[1 + threads :] or ["tests/runtime"], chosen[1])
     print(said)
     sys.exit(code)

@@ -4,13 +4,14 @@ import shutil
 import subprocess
 
 import pytest
-from sanitized import FLAGS, build, run
+from sanitized import FLAGS, THREADS, build, run
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 SLICE = {
     "test_linear.py": ("agrees_with_numpy", "refactorises", "without_a_pivot"),
     "test_radau.py": ("typed",),
     "test_dopri.py": ("text_jumps",),
+    "test_threads.py": ("star",),
 }
 
 
@@ -20,6 +21,14 @@ def test_a_slice_of_the_core_has_no_fault(tmp_path):
     code, said = run(build(tmp_path), [*files, "-k", chosen])
     assert code == 0, said
     assert "passed" in said or "%]" in said
+
+
+def test_threads_of_the_core_have_no_race(tmp_path):
+    library = build(tmp_path, THREADS)
+    if run(library, ["--version"], "tsan")[0] != 0:
+        pytest.skip("the sanitizer of threads does not run here")
+    code, said = run(library, ["tests/runtime/test_threads.py", "-k", "star or share"], "tsan")
+    assert code == 0, said
 
 
 @pytest.mark.parametrize("fault", ["a[n] = 1.0", "shift = 1 << (n + 31)"])
