@@ -54,6 +54,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     bdf->g = bdf->jyd + nnz + 1;
     bdf->system = system;
     bdf->linear = linear;
+    sd_linear_replayed(linear);
     bdf->n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
     bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->phi[0], bdf->yd, &bdf->taken,

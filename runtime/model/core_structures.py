@@ -136,6 +136,9 @@ class Linear(c.Structure):
         ("idle", _P),
         ("place", _P),
         ("rank", _I),
+        ("pivoted", _I),
+        ("replayed", _I),
+        ("elimination", _P),
     ]
 
 
