@@ -225,9 +225,12 @@ class Bdf(c.Structure):
                     "jyd",
                     "g",
                     "memory",
+                    "newton_power",
+                    "test_power",
                 ]
             )
         ],
+        ("h_weighed", _D),
         ("error_next", _D),
         ("steps", _L),
         ("rejected_steps", _L),
