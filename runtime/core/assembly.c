@@ -1,5 +1,6 @@
 /* Residual and Jacobian of a system: see assembly.h. */
 #include "assembly.h"
+#include "lanes.h"
 
 #include <float.h>
 #include <math.h>
@@ -112,10 +113,14 @@ int32_t sd_first_astray(sd_system *system, double t, const double *y, const doub
     return -1;
 }
 
-int32_t sd_first_bad(int32_t n, const double *x)
+SD_WIDE int32_t sd_first_bad(int32_t n, const double *x)
 {
-    double sum = 0.0; /* x - x is 0 for a finite number and not a number otherwise */
-    for (int32_t i = 0; i < n; i++)
+    sd_lanes sums = {0.0}; /* x - x is 0 for a finite number and not a number otherwise */
+    int32_t whole = n - n % SD_LANES;
+    for (int32_t i = 0; i < whole; i += SD_LANES)
+        sums += SD_FROM(x, i) - SD_FROM(x, i);
+    double sum = SD_TOTAL(sums);
+    for (int32_t i = whole; i < n; i++)
         sum += x[i] - x[i];
     if (sum == 0.0)
         return -1;

@@ -5,13 +5,26 @@
 #include <math.h>
 #include <string.h>
 
-/* predicted, predicted_d := the polynomial through the past, at the new t; y, yd begin there, ee at 0 */
-SD_WIDE void sd_bdf_predict(sd_bdf *bdf)
+/* a pass for each order: the differences of an order that is known stay in registers */
+#define OF_ORDER(pass, bdf, order) \
+    switch (order) { \
+    case 1: pass(bdf, 1); break; \
+    case 2: pass(bdf, 2); break; \
+    case 3: pass(bdf, 3); break; \
+    case 4: pass(bdf, 4); break; \
+    default: pass(bdf, 5); \
+    }
+
+static inline __attribute__((always_inline)) void predict(sd_bdf *bdf, const int32_t order)
 {
-    const int32_t order = bdf->order, n = bdf->n;
-    double *const *const phi = bdf->phi;
-    const double *const gamma = bdf->gamma;
+    const int32_t n = bdf->n;
+    double *phi[SD_MAX_ORDER + 1], gamma[SD_MAX_ORDER + 1];
     double *const predicted = bdf->predicted, *const predicted_d = bdf->predicted_d;
+    double *const own = bdf->y, *const own_d = bdf->yd, *const ee = bdf->ee;
+    for (int32_t k = 0; k <= order; k++) {
+        phi[k] = bdf->phi[k];
+        gamma[k] = bdf->gamma[k];
+    }
     for (int32_t i = 0; i < n; i += SD_LANES) {
         sd_lanes y = SD_FROM(phi[0], i), yd = {0.0};
         for (int32_t k = 1; k <= order; k++) {
@@ -19,10 +32,16 @@ SD_WIDE void sd_bdf_predict(sd_bdf *bdf)
             y += difference;
             yd += gamma[k] * difference;
         }
-        SD_AT(predicted, i) = y;
-        SD_AT(predicted_d, i) = yd;
+        SD_AT(predicted, i) = SD_AT(own, i) = y;
+        SD_AT(predicted_d, i) = SD_AT(own_d, i) = yd;
+        SD_AT(ee, i) = (sd_lanes){0.0};
     }
-    sd_bdf_begin(bdf);
+}
+
+/* predicted, predicted_d := the polynomial through the past, at the new t; y, yd begin there, ee at 0 */
+SD_WIDE void sd_bdf_predict(sd_bdf *bdf)
+{
+    OF_ORDER(predict, bdf, bdf->order)
 }
 
 /* y, yd, ee as they are before a correction */
@@ -66,11 +85,12 @@ SD_WIDE void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const doub
     }
 }
 
-/* differences at the new point: up to the one above the order of the step */
-SD_WIDE void sd_bdf_shift(sd_bdf *bdf)
+static inline __attribute__((always_inline)) void shift(sd_bdf *bdf, const int32_t order)
 {
-    const int32_t n = bdf->n, order = bdf->order_used;
-    double *const *const phi = bdf->phi, *const ee = bdf->ee;
+    const int32_t n = bdf->n;
+    double *phi[SD_MAX_ORDER + 2], *const ee = bdf->ee;
+    for (int32_t k = 0; k <= order + 1; k++)
+        phi[k] = bdf->phi[k];
     for (int32_t i = 0; i < n; i += SD_LANES) {
         sd_lanes above = SD_FROM(ee, i);
         if (order < SD_MAX_ORDER)
@@ -78,6 +98,12 @@ SD_WIDE void sd_bdf_shift(sd_bdf *bdf)
         for (int32_t k = order; k >= 0; k--)
             above = SD_AT(phi[k], i) += above;
     }
+}
+
+/* differences at the new point: up to the one above the order of the step */
+SD_WIDE void sd_bdf_shift(sd_bdf *bdf)
+{
+    OF_ORDER(shift, bdf, bdf->order_used)
 }
 
 /* root mean squares over the tested unknowns of ee, ee + phi[k] and ee + phi[k] + phi[k-1]: corrections at the orders k,

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define GROWTH 1e3         /* largest multiplier, in scaled terms: more costs digits */
-#define WEAK 1e-6          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
+#define GROWTH 1e2         /* largest multiplier, in scaled terms: more costs digits */
+#define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
 #define SHARE 4            /* nor do large ones before this part of n */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
@@ -237,7 +237,7 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
     sd_elimination *e = elimination;
     size_t size = (size_t)e->entries;
     e->seen++;
-    int due = ++e->waited >= e->wait;
+    int due = e->waited >= e->wait;
     if (due || !(e->seen & (e->seen - 1))) { /* of the first ones the 1st, 2nd, 4th, ... */
         if (e->samples == SD_SAMPLES)
             memmove(e->sample, e->sample + size, (size_t)--e->samples * size * sizeof(sd_number));
@@ -246,7 +246,7 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
     if (!due)
         return;
     e->waited = 0;
-    e->wait *= 2; /* where no order lasts, looking for one stays cheap */
+    e->wait += e->wait / 2; /* where no order lasts, looking for one stays cheap */
     prepare(e);
 }
 
@@ -302,6 +302,7 @@ static int healthy(const sd_elimination *e)
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
 {
     sd_elimination *e = elimination;
+    e->waited++;
     if (!e->ready)
         return 0;
     sd_number *magnitudes = e->cell + magnitude(e, 0);

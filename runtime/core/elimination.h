@@ -38,7 +38,8 @@ typedef struct sd_elimination {
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
     int32_t ready;               /* an order was found */
     int32_t factors, inside;     /* cells of factors; of all */
-    int32_t samples, wait, waited, seen;
+    int32_t samples, seen;
+    int32_t wait, waited;        /* matrices from one order to the next at least; since the last */
     sd_number *sample;           /* [SD_SAMPLES][entries] scaled matrices, the newest last */
     sd_number *cell;             /* inverse pivots, other factors; then n each: right side, magnitudes, sizes of rows, their
                                     growth; constants */

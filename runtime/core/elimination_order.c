@@ -9,7 +9,8 @@
 #define OLDER 0.01         /* and in those before */
 
 /* Matrices in full while they are eliminated: value [samples][n][n] by columns; left: rows and columns that are left, `open`
- * of both; their counts of entries; size [n][SD_SAMPLES]: largest entries of columns in rows that are left */
+ * of both; their counts of entries; size [n][SD_SAMPLES]: largest entries of columns in rows that are left, -1 where
+ * they are not known */
 typedef struct sd_full {
     int32_t n, samples, open;
     sd_number *value;
@@ -26,9 +27,11 @@ static void full_free(sd_full *full)
     free(full->size);
 }
 
-/* the largest of a column's entries that are left, of each matrix */
-static void measure_column(sd_full *full, int32_t c)
+/* the largest of a column's entries that are left, of each matrix, where it is not known */
+static void measure_column(const sd_full *full, int32_t c)
 {
+    if (full->size[c * SD_SAMPLES] >= 0.0)
+        return;
     size_t n = (size_t)full->n;
     const char *entry = full->entry + (size_t)c * n;
     for (int32_t s = 0; s < full->samples; s++) {
@@ -63,7 +66,7 @@ static int fill_in(sd_full *full, const sd_elimination *e)
         full->row[k] = full->column[k] = k;
     full->open = full->n;
     for (int32_t c = 0; c < full->n; c++)
-        measure_column(full, c);
+        full->size[c * SD_SAMPLES] = -1.0;
     return 0;
 }
 
@@ -94,6 +97,7 @@ static double health(const sd_full *full, int32_t r, int32_t c)
     size_t n = (size_t)full->n, place = (size_t)c * n + (size_t)r;
     const double *size = full->size + c * SD_SAMPLES;
     double least = INFINITY;
+    measure_column(full, c);
     for (size_t s = 0; s < (size_t)full->samples; s++) {
         double enough = (s + 1 == (size_t)full->samples ? STRONG : OLDER) * size[s], own = sd_size(full->value[s * n * n + place]);
         if (!(own >= enough) || !(enough > 0.0))
@@ -150,7 +154,7 @@ static void take_column(sd_full *full, int32_t r, int32_t p, int32_t c)
             a[across + (size_t)i] -= a[own + (size_t)i] * a[across + (size_t)r];
         }
     }
-    measure_column(full, c);
+    full->size[c * SD_SAMPLES] = -1.0;
 }
 
 /* eliminates with the pivot at place i of the rows and j of the columns that are left */
