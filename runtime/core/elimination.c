@@ -103,7 +103,7 @@ static int add_pair(sd_list *list, int32_t a, int32_t b)
 }
 
 /* ends a sum whose pairs are those behind the last one's */
-static int add_sum(sd_list *list, enum sd_kind kind, int32_t target, int32_t source, int32_t by)
+static int add_sum(sd_list *list, enum sd_sum_kind kind, int32_t target, int32_t source, int32_t by)
 {
     if (widen((void **)&list->sum, list->sums, &list->room, sizeof(sd_sum)))
         return 2;
@@ -119,7 +119,7 @@ static int list_factor(sd_elimination *e, const int32_t *cell, const int32_t *so
     for (int32_t m = 0; m < least; m++)
         if (cell[i * n + m] >= 0 && cell[m * n + k] >= 0)
             failed |= add_pair(&e->factor, cell[i * n + m], cell[m * n + k]);
-    enum sd_kind kind = k < i ? SD_SUM_TIMES : k == i ? SD_SUM_INVERSE : SD_SUM_PLAIN;
+    enum sd_sum_kind kind = k < i ? SD_SUM_TIMES : k == i ? SD_SUM_INVERSE : SD_SUM_PLAIN;
     return failed | add_sum(&e->factor, kind, cell[i * n + k], source[i * n + k], cell[k * n + k]);
 }
 

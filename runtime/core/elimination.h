@@ -18,7 +18,7 @@
 #define SD_SAMPLES 6    /* matrices of which an order is found */
 
 /* how the target of a sum is made of S = source - sum over pairs of a b */
-enum sd_kind { SD_SUM_PLAIN, SD_SUM_TIMES, SD_SUM_INVERSE, SD_SUM_LARGEST }; /* S; S times the cell `by`; 1 / S; largest |a b| */
+enum sd_sum_kind { SD_SUM_PLAIN, SD_SUM_TIMES, SD_SUM_INVERSE, SD_SUM_LARGEST }; /* S; S times the cell `by`; 1 / S; largest |a b| */
 
 /* one operation; places below `inside` are cells, others those of the caller's array; source -1: 0 */
 typedef struct sd_sum {

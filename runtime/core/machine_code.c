@@ -1,5 +1,5 @@
 /* Machine code of lists of sums: see machine_code.h. */
-#ifdef __linux__
+#if defined(__linux__) && !defined(_DEFAULT_SOURCE)
 #define _DEFAULT_SOURCE
 #endif
 #include "machine_code.h"
@@ -14,7 +14,7 @@ void sd_code_allow(int allowed)
     permitted = allowed;
 }
 
-#if defined(__x86_64__) && defined(__linux__)
+#if defined(__x86_64__) && defined(__linux__) && !defined(SD_INTERPRETED)
 #include <sys/mman.h>
 
 #define LONGEST 8   /* bytes of an instruction */
