@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.integers import Reference
 from sysdyn.compiler.model.mirror import word
-from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT
+from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT, TURNS
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
 from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
 
@@ -25,15 +25,19 @@ _ARGUMENTS = (
 _FUNCTIONS = {
     "ln": "log", "abs": "fabs", "min": "sd_min", "max": "sd_max", "sign": "sd_sign", "step": "sd_step", "mod": "sd_mod",
 }  # fmt: skip
+_OF_ANGLES = {"sin": "sine", "cos": "cosine"}
 _BOOLEAN = ("cmp", "and", "or", "not")
 
 
 def emit_c(program: Program, form: DescriptorForm, head: str = HEAD) -> str:
     """The C text of a program; head: what declares the contract's frame."""
-    bodies = [_routine(k, routine, form) for k, routine in enumerate(program.routines)]
+    angles = _Angles()
+    bodies = [_routine(k, routine, form, angles) for k, routine in enumerate(program.routines)]
     text = "\n".join(bodies)
     used = [code for name, code in SUPPORT if f"{name}(" in text]
-    blocks = [_block(name, part, program) for name in program.blocks() for part in ("rows", "dy", "dyd")]
+    if angles.number:
+        used.append(TURNS.replace("@", ", ".join(["{0.0, 0.0, 1.0}"] * angles.number)))
+    blocks = [_block(name, part, program, angles) for name in program.blocks() for part in ("rows", "dy", "dyd")]
     return "\n".join([head, APART, *used, text, *(b for b in blocks if b)])
 
 
@@ -45,13 +49,43 @@ def _operand(value: Operand) -> str:
     return f"a{value}" if isinstance(value, int) else number(value, C)
 
 
-def _routine(k: int, routine: Routine, form: DescriptorForm) -> str:
-    writer = _Writer(routine)
+class _Angles:
+    """Angles of sines and cosines in all of a text: one that is made alike of the same unknowns has one number."""
+
+    def __init__(self) -> None:
+        self._values: dict[tuple[object, ...], int] = {}
+        self._numbers: dict[int, int] = {}
+
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return len(self._numbers)
+
+    def of(self, routine: Routine) -> dict[int, int]:
+        """Numbers of the angles by the target of each sine and cosine of a routine: where loops go round there are as
+        many angles as turns, and none is kept.
+        """
+        if routine.loops:
+            return {}
+        value: dict[int, int] = {}
+        found = {}
+        for s in routine.body:
+            if isinstance(s, Assign):
+                own = (s.op, s.data, *((value.get(a, -a - 1),) if isinstance(a, int) else a for a in s.args))
+                value[s.target] = self._values.setdefault(own, len(self._values))
+                if s.op == "call" and s.data in _OF_ANGLES and isinstance(s.args[0], int) and s.args[0] in value:
+                    found[s.target] = self._numbers.setdefault(value[s.args[0]], len(self._numbers))
+        return found
+
+
+def _routine(k: int, routine: Routine, form: DescriptorForm, angles: _Angles) -> str:
+    writer = _Writer(routine, angles.of(routine))
     body = writer.body(routine.body, "    " * (len(routine.loops) + 1))
     lines = [f"/* {_comment(routine, form)} */"]
     out = "r" if routine.part == "rows" else "v"
     kind = "SD_APART void " if out == "r" else "SD_APART double *"
-    lines.append(f"static {kind}f{k}({_ARGUMENTS.format(out=out)})\n{{")
+    kept = ", sd_turn *restrict w" if writer.angles else ""  # one look for the thread's own ones a routine
+    lines.append(f"static {kind}f{k}({_ARGUMENTS.format(out=out)}{kept})\n{{")
     unused = [n for n in ("p", "ix", "at", "to", "t", "y", "yd") if n not in writer.used]
     lines += [f"    {''.join(f'(void){n}; ' for n in unused).strip()}"] if unused else []
     lines += writer.bases
@@ -88,8 +122,10 @@ def _stands(place: Reference) -> bool:
 class _Writer:
     """Statements of one routine as C; places that no loop enters are computed before the loops."""
 
-    def __init__(self, routine: Routine) -> None:
+    def __init__(self, routine: Routine, angles: dict[int, int]) -> None:
         self.routine = routine
+        self.angles = angles
+        self._turned: set[int] = set()
         self.bases: list[str] = []
         self.used: set[str] = {"ix"} if routine.loops else set()
         self.sums: dict[str, str] = {}
@@ -105,6 +141,8 @@ class _Writer:
         lines: list[str] = []
         for s in statements:
             match s:
+                case Assign() if s.target in self.angles:
+                    lines += [f"{indent}{line}" for line in self.turned(s)]
                 case Assign():
                     kind = "int" if s.op in _BOOLEAN else "double"
                     lines.append(f"{indent}const {kind} a{s.target} = {self.value(s)};")
@@ -112,6 +150,15 @@ class _Writer:
                     lines += self.fold(s, indent)
                 case Store():
                     lines.append(indent + self.store(s))
+        return lines
+
+    def turned(self, s: Assign) -> list[str]:
+        """Sine or cosine of an angle that is kept."""
+        k = self.angles[s.target]
+        lines = [f"const double a{s.target} = w{k}->{_OF_ANGLES[s.data]};"]
+        if k not in self._turned:
+            self._turned.add(k)
+            lines.insert(0, f"const sd_turn *const w{k} = sd_turned(w + {k}, {_operand(s.args[0])});")
         return lines
 
     def store(self, s: Store) -> str:
@@ -210,7 +257,7 @@ class _Writer:
         return f"sd_table2({where}, {args[0]}, {args[1]}, {orders[0]}, {orders[1]})"
 
 
-def _block(name: str, part: str, program: Program) -> str:
+def _block(name: str, part: str, program: Program, angles: _Angles) -> str:
     """The exported function of a block's part: its routines in order."""
     numbers = [k for k, r in enumerate(program.routines) if r.block == name and r.part == part]
     if not numbers:
@@ -222,7 +269,8 @@ def _block(name: str, part: str, program: Program) -> str:
     lines = [head]
     for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
         routine = program.routines[k]
-        call = f"f{k}(frame->p, frame->ix, frame->at, frame->to, t, y, yd, {out})"
+        kept = ", sd_turns" if angles.of(routine) else ""
+        call = f"f{k}(frame->p, frame->ix, frame->at, frame->to, t, y, yd, {out}{kept})"
         if part != "rows":
             call = f"v = {call}" if routine.loops else f"(void){call}"
         lines.append(f"    {call};")

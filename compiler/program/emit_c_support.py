@@ -88,6 +88,28 @@ static double sd_table2(const double *x, int32_t n, int32_t m, int32_t clamped, 
 }
 """
 
+TURNS = """/* sine and cosine of an angle, kept for the next block or Jacobian that reads them of the same one */
+typedef struct sd_turn {
+    double angle, sine, cosine;
+} sd_turn;
+
+static _Thread_local sd_turn sd_turns[] = {@};
+
+static SD_APART void sd_turn_to(sd_turn *kept, double angle)
+{
+    kept->angle = angle;
+    kept->sine = sin(angle);
+    kept->cosine = cos(angle);
+}
+
+static inline const sd_turn *sd_turned(sd_turn *kept, double angle)
+{
+    if (kept->angle != angle) sd_turn_to(kept, angle);
+    return kept;
+}
+"""
+"""@: one {0.0, 0.0, 1.0} for each angle."""
+
 SUPPORT = (
     ("sd_whole", _WHOLE),
     ("sd_min", "static inline double sd_min(double a, double b)\n{\n    return b < a ? b : a;\n}\n"),

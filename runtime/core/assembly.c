@@ -114,8 +114,13 @@ int32_t sd_first_astray(sd_system *system, double t, const double *y, const doub
 
 int32_t sd_first_bad(int32_t n, const double *x)
 {
-    double sum = 0.0; /* x - x is 0 for a finite number and not a number otherwise */
-    for (int32_t i = 0; i < n; i++)
+    double sums[4] = {0.0, 0.0, 0.0, 0.0}; /* x - x is 0 for a finite number and not a number otherwise */
+    int32_t whole = n - n % 4;
+    for (int32_t i = 0; i < whole; i += 4)
+        for (int32_t k = 0; k < 4; k++)
+            sums[k] += x[i + k] - x[i + k];
+    double sum = sums[0] + sums[1] + sums[2] + sums[3];
+    for (int32_t i = whole; i < n; i++)
         sum += x[i] - x[i];
     if (sum == 0.0)
         return -1;

@@ -1,11 +1,13 @@
 /* The step of the BDF: predict, correct, test, choose order and step size (see bdf.h). */
 #include "bdf.h"
+#include "lanes.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#define VECTORS 14
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
 #define TRUST 0.02          /* least contraction assumed of a first correction (an exponential law may lie ahead) */
@@ -36,8 +38,8 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     sd_bdf *bdf = calloc(1, sizeof *bdf);
     if (!bdf)
         return NULL;
-    size_t n = (size_t)system->unknowns, nnz = (size_t)system->entries, m = n > 0 ? n : 1;
-    bdf->memory = calloc((SD_MAX_ORDER + 2 + 12) * m + 3 * (nnz + 1), sizeof(double));
+    size_t m = (size_t)sd_whole_lanes(system->unknowns), nnz = (size_t)sd_whole_lanes(system->entries);
+    bdf->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + 3 * nnz + 1, sizeof(double));
     if (!bdf->memory) {
         free(bdf);
         return NULL;
@@ -46,14 +48,16 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
     double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->test_weight, &bdf->delta,
-                          &bdf->predicted, &bdf->predicted_d, &bdf->scale, &bdf->terms, &bdf->rate};
-    for (int i = 0; i < 12; i++, next += m)
+                          &bdf->predicted, &bdf->predicted_d, &bdf->scale, &bdf->terms, &bdf->rate,
+                          &bdf->newton_power, &bdf->test_power};
+    for (int i = 0; i < VECTORS; i++, next += m)
         *vectors[i] = next;
     bdf->jy = next;
-    bdf->jyd = bdf->jy + nnz + 1;
-    bdf->g = bdf->jyd + nnz + 1;
+    bdf->jyd = bdf->jy + nnz;
+    bdf->g = bdf->jyd + nnz;
     bdf->system = system;
     bdf->linear = linear;
+    sd_linear_replayed(linear);
     bdf->n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
     bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->phi[0], bdf->yd, &bdf->taken,
@@ -74,28 +78,6 @@ void sd_bdf_free(sd_bdf *bdf)
     free(bdf);
 }
 
-/* weight := 1 / (atol + rtol |y|) at the last accepted point */
-static void set_weights(sd_bdf *bdf)
-{
-    const double *y = bdf->phi[0];
-    for (int32_t i = 0; i < bdf->n; i++) {
-        double size = fabs(y[i]);
-        sd_met(size, &bdf->met[i], &bdf->magnitude[i]);
-        double atol = bdf->atol && bdf->test[i] >= 0 ? bdf->atol[i] : bdf->rtol * bdf->magnitude[i];
-        bdf->weight[i] = 1.0 / (atol + bdf->rtol * size);
-    }
-}
-
-/* the weights of a step of length h, in Newton's test and in that of the error */
-static void set_step_weights(sd_bdf *bdf)
-{
-    const double power[3] = {1.0, bdf->h, bdf->h * bdf->h}, test[3] = {0.0, 1.0, bdf->h};
-    for (int32_t i = 0; i < bdf->n; i++) {
-        bdf->newton_weight[i] = bdf->weight[i] * power[bdf->power[i]];
-        bdf->test_weight[i] = bdf->weight[i] * test[bdf->test[i] + 1];
-    }
-}
-
 /* magnitudes of the columns: index-2 unknowns and index-3 multipliers with powers of h */
 static void set_scales(sd_bdf *bdf)
 {
@@ -112,10 +94,14 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
     for (int32_t i = 0; i < bdf->n; i++)
         bdf->tested += bdf->test[i] >= 0;
     memcpy(bdf->phi[0], y, (size_t)bdf->n * sizeof *y);
+    memcpy(bdf->y, y, (size_t)bdf->n * sizeof *y);
+    memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
+    memset(bdf->ee, 0, (size_t)bdf->n * sizeof *yd);
     bdf->h = 1.0;
-    set_weights(bdf);
-    set_step_weights(bdf);
-    bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, yd, bdf->t_end - t);
+    bdf->h_weighed = 0.0;
+    sd_bdf_weights(bdf);
+    sd_bdf_step_weights(bdf);
+    bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, bdf->t_end - t);
     bdf->h = fmin(bdf->h, bdf->h_max);
     for (int32_t i = 0; i < bdf->n; i++)
         bdf->phi[1][i] = bdf->h * yd[i];
@@ -127,27 +113,6 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
     bdf->rising = bdf->max_order > 1;
     bdf->contraction = 20.0;
     bdf->ready = 0;
-    memcpy(bdf->y, y, (size_t)bdf->n * sizeof *y);
-    memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
-}
-
-/* y, yd := the polynomial through the past, at the new t; in pieces that stay in the nearest cache */
-static void predict(sd_bdf *bdf)
-{
-    for (int32_t first = 0; first < bdf->n; first += SD_PIECE) {
-        int32_t n = bdf->n - first < SD_PIECE ? bdf->n - first : SD_PIECE;
-        double *restrict y = bdf->predicted + first, *restrict yd = bdf->predicted_d + first;
-        memcpy(y, bdf->phi[0] + first, (size_t)n * sizeof *y);
-        memset(yd, 0, (size_t)n * sizeof *yd);
-        for (int32_t k = 1; k <= bdf->order; k++) {
-            const double *restrict phi = bdf->phi[k] + first;
-            double gamma = bdf->gamma[k];
-            for (int32_t i = 0; i < n; i++) {
-                y[i] += phi[i];
-                yd[i] += gamma * phi[i];
-            }
-        }
-    }
 }
 
 /* G := dF/dy + cj dF/dyd and its factors; a fresh Jacobian where asked */
@@ -166,8 +131,7 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
             return SD_NONFINITE;
         }
     }
-    for (int32_t e = 0; e < bdf->system->entries; e++)
-        bdf->g[e] = bdf->jy[e] + bdf->cj * bdf->jyd[e];
+    sd_bdf_matrix(bdf);
     set_scales(bdf);
     bdf->ready = 0;
     int failed = sd_linear_factor(bdf->linear, bdf->g, bdf->scale);
@@ -180,16 +144,6 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
     bdf->contraction = 20.0;
     bdf->ready = 1;
     return SD_FINE;
-}
-
-static double newton_norm(const sd_bdf *bdf, const double *x)
-{
-    double sum[4] = {0.0, 0.0, 0.0, 0.0}; /* one would wait for itself */
-    for (int32_t i = 0; i < bdf->n; i++) {
-        double v = x[i] * bdf->newton_weight[i];
-        sum[i % 4] += v * v;
-    }
-    return bdf->n ? sqrt((sum[0] + sum[1] + sum[2] + sum[3]) / bdf->n) : 0.0;
 }
 
 /* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an
@@ -209,9 +163,6 @@ static int iterate(sd_bdf *bdf, double t)
     int32_t n = bdf->n;
     double first = 0.0;
     int converged = 0, judged = bdf->system->scales > 0;
-    memcpy(bdf->y, bdf->predicted, (size_t)n * sizeof(double));
-    memcpy(bdf->yd, bdf->predicted_d, (size_t)n * sizeof(double));
-    memset(bdf->ee, 0, (size_t)n * sizeof(double));
     for (int m = 0; m < ITERATIONS + judged; m++) {
         double *d = bdf->delta;
         sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
@@ -229,14 +180,9 @@ static int iterate(sd_bdf *bdf, double t)
             break;
         converged = 0;
         sd_linear_solve(bdf->linear, d);
-        double size = newton_norm(bdf, d);
+        double size = sd_bdf_move(bdf);
         if (!isfinite(size))
             return SD_NEWTON;
-        for (int32_t i = 0; i < n; i++) {
-            bdf->ee[i] -= d[i];
-            bdf->y[i] -= d[i];
-            bdf->yd[i] -= bdf->cj * d[i];
-        }
         if (m == 0) {
             first = size;
             converged = size <= 100.0 * DBL_EPSILON;
@@ -264,12 +210,10 @@ static int correct(sd_bdf *bdf)
 {
     double t = bdf->t + bdf->h;
     bdf->fresh_jacobian = 0;
-    set_step_weights(bdf);
+    sd_bdf_step_weights(bdf);
     for (;;) {
         int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->taken == 0 || bdf->fresh_jacobian < 0;
         if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {
-            memcpy(bdf->y, bdf->predicted, (size_t)bdf->n * sizeof(double));
-            memcpy(bdf->yd, bdf->predicted_d, (size_t)bdf->n * sizeof(double));
             int cause = factorise(bdf, t, fresh);
             if (cause == SD_SINGULAR && bdf->fresh_jacobian == 0) {
                 bdf->fresh_jacobian = -1;
@@ -282,6 +226,7 @@ static int correct(sd_bdf *bdf)
         if (cause == SD_FINE || cause == SD_STOPPED || bdf->fresh_jacobian)
             return cause;
         bdf->fresh_jacobian = -1; /* once more with a fresh Jacobian */
+        sd_bdf_begin(bdf);
     }
 }
 
@@ -337,7 +282,7 @@ int sd_bdf_step(sd_bdf *bdf)
 {
     int32_t error_failures = 0, order_next = 1;
     double ck, error;
-    set_weights(bdf);
+    sd_bdf_weights(bdf);
     bdf->cause = SD_FINE;
     bdf->jacobian_age++;
     for (;;) {
@@ -347,7 +292,7 @@ int sd_bdf_step(sd_bdf *bdf)
             return bdf->cause;
         }
         sd_bdf_coefficients(bdf, &ck);
-        predict(bdf);
+        sd_bdf_predict(bdf);
         int cause = correct(bdf);
         if (cause == SD_FINE && (sd_bdf_test(bdf, ck, &error, &order_next) || bdf->fixed_h > 0.0))
             break;

@@ -38,6 +38,7 @@ typedef struct sd_bdf {
     double *phi[SD_MAX_ORDER + 2];
     double *y, *yd, *ee, *weight, *newton_weight, *test_weight, *delta, *predicted, *predicted_d, *scale;
     double *terms, *rate, *jy, *jyd, *g, *memory;
+    double *newton_power, *test_power, h_weighed; /* powers of h by which unknowns count, and of which h */
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations;
@@ -60,10 +61,20 @@ void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd);
 /* coefficients.c */
 void sd_bdf_coefficients(sd_bdf *bdf, double *ck);
 void sd_bdf_restore(sd_bdf *bdf);
-/* controller.c */
+/* bdf_passes.c */
+void sd_bdf_weights(sd_bdf *bdf);
+void sd_bdf_step_weights(sd_bdf *bdf);
+void sd_bdf_predict(sd_bdf *bdf);
+void sd_bdf_begin(sd_bdf *bdf);
+void sd_bdf_matrix(sd_bdf *bdf);
+double sd_bdf_move(sd_bdf *bdf);
+void sd_bdf_orders(const sd_bdf *bdf, double *norm);
 double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus);
+void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const double *beta);
+void sd_bdf_shift(sd_bdf *bdf);
+/* controller.c */
 int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next);
 void sd_bdf_accept(sd_bdf *bdf, int32_t order_next);
-double sd_bdf_first_step(const sd_bdf *bdf, const double *yd, double span);
+double sd_bdf_first_step(const sd_bdf *bdf, double span);
 
 #endif

@@ -33,10 +33,9 @@ void sd_bdf_coefficients(sd_bdf *bdf, double *ck)
         variable -= bdf->alpha[i];
     }
     bdf->cj = -fixed / h;
-    *ck = fmax(fabs(bdf->alpha[k] + fixed - variable), bdf->alpha[k]);
-    for (int32_t i = bdf->ns; i <= k; i++)
-        for (int32_t j = 0; j < bdf->n; j++)
-            bdf->phi[i][j] *= bdf->beta[i];
+    double tail = fabs(bdf->alpha[k] + fixed - variable);
+    *ck = tail > bdf->alpha[k] ? tail : bdf->alpha[k];
+    sd_bdf_stretch(bdf, bdf->ns, k, bdf->beta);
 }
 
 /* Undoes sd_bdf_coefficients after a step that was not accepted. */
@@ -44,9 +43,8 @@ void sd_bdf_restore(sd_bdf *bdf)
 {
     for (int32_t i = 1; i <= bdf->order; i++)
         bdf->psi[i - 1] = bdf->psi[i] - bdf->h;
-    for (int32_t i = bdf->ns; i <= bdf->order; i++) {
-        double back = 1.0 / bdf->beta[i];
-        for (int32_t j = 0; j < bdf->n; j++)
-            bdf->phi[i][j] *= back;
-    }
+    double back[SD_MAX_ORDER + 2];
+    for (int32_t i = bdf->ns; i <= bdf->order; i++)
+        back[i] = 1.0 / bdf->beta[i];
+    sd_bdf_stretch(bdf, bdf->ns, bdf->order, back);
 }

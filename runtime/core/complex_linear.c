@@ -1,6 +1,10 @@
-/* The factorisation of linear.c and sparse.c for complex matrices. */
+/* The factorisation of linear.c, elimination.c and sparse.c for complex matrices. */
 #define SD_COMPLEX
 #include "sparse.c"
+
+#include "elimination_order.c"
+
+#include "elimination.c"
 
 #include "linear.c"
 

@@ -10,9 +10,11 @@ typedef struct sd_linear_z sd_linear_z;
 sd_linear_z *sd_linear_z_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order);
 void sd_linear_z_free(sd_linear_z *linear);
 /* as sd_linear_pivoted */
-int *sd_linear_z_pivoted(sd_linear_z *linear);
+int32_t *sd_linear_z_pivoted(sd_linear_z *linear);
 /* as sd_linear_paired */
 void sd_linear_z_paired(sd_linear_z *linear);
+/* as sd_linear_replayed */
+void sd_linear_z_replayed(sd_linear_z *linear);
 /* as sd_linear_factor */
 int sd_linear_z_factor(sd_linear_z *linear, const double complex *values, const double *scale);
 void sd_linear_z_solve(sd_linear_z *linear, double complex *x);

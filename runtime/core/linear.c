@@ -13,6 +13,7 @@ void sd_linear_free(sd_linear *linear)
     if (!linear)
         return;
     sd_sparse_free(linear->sparse);
+    sd_elimination_free(linear->elimination);
     free(linear->row_scale);
     free(linear->work);
     free(linear->dense);
@@ -160,12 +161,18 @@ static void dense_solve(const sd_linear *linear, sd_number *x, sd_number *work)
     }
 }
 
-int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale)
+/* by the list of operations, if there is one and it serves; a column that may be left wants exchanges */
+static int replay(sd_linear *linear, const sd_number *values, const double *scale)
 {
-    equilibrate(linear, values, scale);
-    linear->factorisations++;
-    if (linear->dense)
-        return dense_factor(linear);
+    if (!linear->elimination || linear->null_pivot > 0.0 || !sd_elimination_factor(linear->elimination, values, scale))
+        return 0;
+    linear->smallest = 1.0;
+    linear->rank = linear->n;
+    return 1;
+}
+
+static int sparse_factor(sd_linear *linear)
+{
     sd_sparse *lu = linear->sparse;
     int failed = 1;
     if (lu->pivoted)
@@ -180,9 +187,40 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
     return failed;
 }
 
-int *sd_linear_pivoted(sd_linear *linear)
+/* all that was learnt of matrices before */
+static void forget(sd_linear *linear)
 {
-    return linear->sparse ? &linear->sparse->pivoted : NULL;
+    if (linear->sparse)
+        linear->sparse->pivoted = 0;
+    if (linear->elimination)
+        sd_elimination_forget(linear->elimination);
+    linear->pivoted = 1;
+}
+
+int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale)
+{
+    linear->factorisations++;
+    if (!linear->pivoted)
+        forget(linear);
+    linear->replayed = replay(linear, values, scale);
+    if (linear->replayed)
+        return 0;
+    equilibrate(linear, values, scale);
+    int failed = linear->dense ? dense_factor(linear) : sparse_factor(linear);
+    if (linear->elimination && !failed)
+        sd_elimination_learn(linear->elimination, linear->scaled);
+    return failed;
+}
+
+int32_t *sd_linear_pivoted(sd_linear *linear)
+{
+    return &linear->pivoted;
+}
+
+void sd_linear_replayed(sd_linear *linear)
+{
+    if (linear->n <= SD_REPLAYED && !linear->elimination)
+        linear->elimination = sd_elimination_new(linear->n, linear->column, linear->row);
 }
 
 void sd_linear_paired(sd_linear *linear)
@@ -203,6 +241,10 @@ void sd_linear_solve(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
     sd_number *rest = linear->work2;
+    if (linear->replayed) {
+        sd_elimination_solve(linear->elimination, x);
+        return;
+    }
     if (linear->sparse && linear->smallest >= REFINE) {
         sd_sparse_solve(linear->sparse, x, linear->work, linear->row_scale, linear->column_scale);
         return;

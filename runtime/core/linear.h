@@ -2,13 +2,15 @@
  *
  * Dense LU with partial pivoting of the smallest (numerics/ordering.py); else sparse LU: the column order is given,
  * rows are chosen by threshold partial pivoting (Gilbert & Peierls 1988), later matrices are refactorised on the found
- * pattern and pivots while these stay healthy and pivoted anew when not.
+ * pattern and pivots while these stay healthy and pivoted anew when not.  Before either, where a caller said so, the list of
+ * operations that served small matrices before.
  * G is scaled: columns by the caller (magnitudes of the unknowns), rows by their largest scaled entry, so that
  * nano-farads and mega-pascals live in one matrix.
  */
 #ifndef SYSDYN_LINEAR_H
 #define SYSDYN_LINEAR_H
 
+#include "elimination.h"
 #include "number.h"
 
 #include <stdint.h>
@@ -33,6 +35,9 @@ typedef struct sd_linear {
     const int32_t *idle;         /* [n] 1: the column may be left; of the caller */
     int32_t *place;              /* [n] column that is eliminated k-th */
     int32_t rank;                /* of the last factors: n where no column was left */
+    int32_t pivoted;             /* 0: pivots are chosen anew */
+    int32_t replayed;            /* the last factors are those of `elimination` */
+    sd_elimination *elimination; /* NULL: every matrix is pivoted */
 } sd_linear;
 
 /* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */
@@ -44,7 +49,10 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
 void sd_linear_solve(sd_linear *linear, sd_number *x);
 /* row k belongs to unknown k, and pivots there where it can; of sparse ones */
 void sd_linear_paired(sd_linear *linear);
-/* set to 0: the next factorisation chooses its pivots anew; NULL for dense ones, which always do */
-int *sd_linear_pivoted(sd_linear *linear);
+/* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
+int32_t *sd_linear_pivoted(sd_linear *linear);
+/* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the
+ * pivots of others are chosen as before */
+void sd_linear_replayed(sd_linear *linear);
 
 #endif

@@ -1,6 +1,6 @@
 /* The numbers of a factorisation: double, or double complex where SD_COMPLEX is defined.
  *
- * linear.c and sparse.c are written once and compiled twice; complex_linear.c gives the complex ones names of their own.
+ * linear.c, elimination.c and sparse.c are written once and compiled twice; complex_linear.c gives the complex ones names of their own.
  */
 #ifndef SYSDYN_NUMBER_H
 #define SYSDYN_NUMBER_H
@@ -25,6 +25,15 @@ static inline double sd_size(sd_number x)
 #define sd_linear_solve sd_linear_z_solve
 #define sd_linear_pivoted sd_linear_z_pivoted
 #define sd_linear_paired sd_linear_z_paired
+#define sd_linear_replayed sd_linear_z_replayed
+#define sd_elimination sd_elimination_z
+#define sd_elimination_new sd_elimination_z_new
+#define sd_elimination_free sd_elimination_z_free
+#define sd_elimination_forget sd_elimination_z_forget
+#define sd_elimination_order sd_elimination_z_order
+#define sd_elimination_learn sd_elimination_z_learn
+#define sd_elimination_factor sd_elimination_z_factor
+#define sd_elimination_solve sd_elimination_z_solve
 #define sd_sparse sd_sparse_z
 #define sd_sparse_new sd_sparse_z_new
 #define sd_sparse_free sd_sparse_z_free

@@ -120,9 +120,12 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     for (size_t k = 0; k < pairs; k++) {
         radau->w[k] = radau->gz + apart * nnz + k * m;
         radau->complex_linear[k] = complex_linear[k];
+        if (complex_linear[k])
+            sd_linear_z_replayed(complex_linear[k]);
     }
     radau->system = system;
     radau->linear = linear;
+    sd_linear_replayed(linear);
     radau->n = system->unknowns;
     radau->stages = sd_radau_methods[0].stages;
     radau->most_stages = stages;

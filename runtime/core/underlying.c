@@ -29,6 +29,7 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
     }
     u->system = system;
     u->linear = linear;
+    sd_linear_replayed(linear);
     u->n = system->unknowns;
     u->first = system->kinematics;
     u->solved = linear->n;

@@ -177,6 +177,8 @@ def _load() -> Any:
         "sd_run_drain": (c.c_int, [_P]),
         "sd_linear_pivoted": (_P, [_P]),
         "sd_linear_paired": (None, [_P]),
+        "sd_linear_replayed": (None, [_P]),
+        "sd_code_allow": (None, [_I]),
         "sd_linear_z_paired": (None, [_P]),
         "sd_linear_z_pivoted": (_P, [_P]),
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P, _P, _P]),

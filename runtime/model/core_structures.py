@@ -137,6 +137,9 @@ class Linear(c.Structure):
         ("idle", _P),
         ("place", _P),
         ("rank", _I),
+        ("pivoted", _I),
+        ("replayed", _I),
+        ("elimination", _P),
     ]
 
 
@@ -222,9 +225,12 @@ class Bdf(c.Structure):
                     "jyd",
                     "g",
                     "memory",
+                    "newton_power",
+                    "test_power",
                 ]
             )
         ],
+        ("h_weighed", _D),
         ("error_next", _D),
         ("steps", _L),
         ("rejected_steps", _L),

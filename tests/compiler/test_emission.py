@@ -3,11 +3,13 @@
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from carriers import CCarrier
+from carriers import CCarrier, NumpyCarrier
 from catalogue import PLACE, load, network
 from chains import chain
 from sysdyn.compiler.pipeline import compile_network
@@ -168,3 +170,30 @@ def test_many_processes_build_one_text(tmp_path):
     children = [subprocess.Popen([sys.executable, "-c", run], env=env) for _ in range(8)]
     assert [child.wait() for child in children] == [0] * 8
     assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+def test_angles_are_turned_once_and_kept_for_each_thread(tmp_path):
+    """Blocks and entries of a two-link arm from C, at points in any order and from two threads, beside NumPy."""
+    entry = load("catalogue.json")["two_link_arm"]
+    with x.fresh():
+        model = compile_network(network(entry, entry["models"][0]))
+        given = model.program, model.form, model.bind(dict.fromkeys(model.program.scalars, 1.3))
+    assert model.text.count(" sin(") == 1
+    c, oracle = CCarrier(*given), NumpyCarrier(*given, tmp_path)
+    rng = np.random.default_rng(0)
+    size = c.at[-1]
+    points = [(0.0, *rng.normal(size=(2, size))) for _ in range(3)] + [(0.0, *np.zeros((2, size)))]
+    parts = [(block, part) for block in model.program.blocks() for part in ("dy", "dyd")]
+
+    def all_of(carrier, point):
+        rows = [carrier.rows(block, *point) for block in model.program.blocks()]
+        return np.concatenate(rows + [carrier.entries(block, part, *point) for block, part in parts])
+
+    expected = [all_of(oracle, point) for point in points]
+
+    def worst(seed):
+        order = np.random.default_rng(seed).integers(0, len(points), 200)
+        return max(np.abs(all_of(c, points[k]) - expected[k]).max() for k in order)
+
+    with ThreadPoolExecutor(2) as pool:
+        assert max(pool.map(worst, (1, 2))) < 1e-13 * max(np.abs(e).max() for e in expected)

@@ -1,3 +1,5 @@
+import ctypes
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_array, random_array
@@ -124,3 +126,104 @@ def test_least_degree_fills_little_more_than_the_library(n):
     own = splu(csc_array(band[:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.1)
     other = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1)
     assert own.L.nnz + own.U.nnz <= 1.1 * (other.L.nnz + other.U.nnz)
+
+
+def replayed(matrix, *, machine=True):
+    """A solver that has seen enough matrices near this one to have an order of its own."""
+    lib.core.sd_code_allow(int(machine))
+    solver = Solver(matrix)
+    lib.core.sd_linear_replayed(solver.linear)
+    rng = np.random.default_rng(1)
+    scale = np.ones(matrix.shape[0])
+    for _ in range(3 + matrix.shape[0]):
+        assert solver.factor(matrix.data * rng.uniform(0.9, 1.1, matrix.data.size), scale) == 0
+    lib.core.sd_code_allow(1)
+    return solver
+
+
+@pytest.mark.parametrize("n", [1, 6, 16, 40, 100])
+@pytest.mark.parametrize("machine", [True, False])
+def test_a_replayed_elimination_is_as_exact_as_pivoting(n, machine):
+    """Backward error of the solution beside that of LAPACK on the same matrices: within the growth that is allowed."""
+    matrix = random_matrix(n, n, min(1.0, 3.0 / n))
+    solver = replayed(matrix, machine=machine)
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        values = matrix.data * rng.uniform(0.5, 2.0, matrix.data.size)
+        full = csc_array((values, matrix.indices, matrix.indptr), shape=(n, n)).toarray()
+        assert solver.factor(values, np.ones(n)) == 0
+        b = rng.normal(size=n)
+        size = np.abs(full).sum(axis=1).max()
+        for x in (solver.solve(b), np.linalg.solve(full, b)):
+            assert np.abs(full @ x - b).max() <= 1e-12 * (size * np.abs(x).max() + np.abs(b).max())
+    assert solver.linear.contents.factorisations > 20
+
+
+@pytest.mark.parametrize("n", [12, 80])
+def test_a_replay_bears_scales_of_forty_decades(n):
+    rng = np.random.default_rng(3)
+    matrix = random_matrix(n, 9, 2.0 / n)
+    row, column = 10.0 ** rng.uniform(-20, 20, n), 10.0 ** rng.uniform(-20, 20, n)
+    solver = Solver(matrix)
+    lib.core.sd_linear_replayed(solver.linear)
+    for _ in range(n + 4):
+        values = matrix.data * rng.uniform(0.9, 1.1, matrix.data.size)
+        scaled = values * row[matrix.indices] * np.repeat(column, np.diff(matrix.indptr))
+        assert solver.factor(scaled, 1.0 / column) == 0
+        x = rng.normal(size=n)
+        b = row * (csc_array((values, matrix.indices, matrix.indptr), shape=(n, n)) @ x)
+        assert np.allclose(solver.solve(b) * column, x, rtol=1e-8)
+    assert solver.linear.contents.replayed
+
+
+def test_machine_code_and_interpreter_agree_to_the_bit():
+    matrix = random_matrix(40, 3, 0.1)
+    one, other = replayed(matrix), replayed(matrix, machine=False)
+    b = np.random.default_rng(4).normal(size=40)
+    for solver in (one, other):
+        assert solver.factor(matrix.data) == 0
+        assert solver.linear.contents.replayed
+    assert (one.solve(b) == other.solve(b)).all()
+
+
+@pytest.mark.parametrize("n", [5, 12, 25])
+@pytest.mark.parametrize("small", [0.0, 1e-14, 1e-4])
+def test_an_order_that_makes_entries_grow_gives_way_to_pivoting(n, small):
+    """A pivot of the order found becomes small beside its column: exchanges are wanted, and made."""
+    rng = np.random.default_rng(n)
+    matrix = csc_array(rng.normal(size=(n, n)) + 3.0 * n * np.eye(n))
+    solver = replayed(matrix)
+    assert solver.linear.contents.replayed
+    values = matrix.data.copy()
+    values[np.repeat(np.arange(n), n) == np.tile(np.arange(n), n)] *= small
+    full = values.reshape(n, n).T
+    assert solver.factor(values, np.ones(n)) == 0
+    assert not solver.linear.contents.replayed
+    b = rng.normal(size=n)
+    assert np.abs(full @ solver.solve(b) - b).max() < 1e-10 * np.abs(full).sum(axis=1).max()
+    for _ in range(200):  # in time an order for these, too
+        solver.factor(values * rng.uniform(0.99, 1.01, values.size), np.ones(n))
+    assert solver.linear.contents.replayed
+
+
+def test_a_pivot_that_cancels_is_left_to_pivoting_and_refinement():
+    """The last pivot of two rows that become alike has nothing beside it to grow."""
+    matrix = csc_array(np.array([[2.0, 1.0], [1.0, 2.0]]))
+    solver = replayed(matrix)
+    assert solver.linear.contents.replayed
+    values = np.array([1.0, 1.0, 1.0, 1.0 + 1e-9])
+    assert solver.factor(values, np.ones(2)) == 0
+    assert not solver.linear.contents.replayed
+    assert solver.linear.contents.smallest < 1e-8
+    assert solver.factor(np.ones(4), np.ones(2)) == 1
+
+
+def test_a_run_of_its_own_knows_nothing_of_matrices_before():
+    """Runs of a batch on the same factors: each as if it were the first."""
+    matrix = random_matrix(20, 7, 0.2)
+    solver = replayed(matrix)
+    lib.core.sd_linear_pivoted.restype = ctypes.POINTER(ctypes.c_int32)
+    lib.core.sd_linear_pivoted(solver.linear)[0] = 0
+    lib.core.sd_linear_pivoted.restype = ctypes.c_void_p
+    assert solver.factor(matrix.data) == 0
+    assert not solver.linear.contents.replayed

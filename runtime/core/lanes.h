@@ -1,0 +1,33 @@
+/* Four numbers at a time: passes over arrays that end on a whole number of lanes, and the widest registers of a machine.
+ *
+ * SD_WIDE: a function is compiled twice, and the machine takes the one with registers of four doubles if it has them.  Both
+ * do the same operations in the same order (no fused products): results do not depend on the machine.
+ */
+#ifndef SYSDYN_LANES_H
+#define SYSDYN_LANES_H
+
+#include <stdint.h>
+#include <stdlib.h> /* says which C library it is */
+
+#define SD_LANES 4
+
+typedef double sd_lanes __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));
+
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define SD_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define SD_WIDE
+#endif
+
+/* room for n numbers in whole lanes */
+static inline int32_t sd_whole_lanes(int32_t n)
+{
+    return (n + SD_LANES - 1) / SD_LANES * SD_LANES;
+}
+
+/* x[i .. i + SD_LANES) */
+#define SD_AT(x, i) (*(sd_lanes *)((x) + (i)))
+#define SD_FROM(x, i) (*(const sd_lanes *)((x) + (i)))
+#define SD_TOTAL(x) ((x)[0] + (x)[1] + (x)[2] + (x)[3])
+
+#endif
