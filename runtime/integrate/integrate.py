@@ -54,6 +54,10 @@ where constraints are constant sums: their unknowns are interpolated differently
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 UNPULLED = 2
 """Kind of a derivative (core/radau.h): interpolated whatever pulls at its unknown."""
+RATED = 400
+"""Unknowns up to which full matrices tell whether flows are open.  Of larger systems a point with the rates of all
+balances is dear to find (a grid of 20 x 20: 2 s for 0.1 s); behind an instant their loops of stores are as the rows say.
+"""
 STAGED = 100_000
 """Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
 ROOM = 4096
@@ -170,12 +174,17 @@ class Integration:
 
     @cached_property
     def _whole_form(self) -> str:
-        """All rows that hold at a point, with every unknown.  Events change what they leave open."""
-        if "dynamics_rate" not in self.system.description.blocks:
+        """All rows that hold at a point, with every unknown; of large ones those that events do not ask about."""
+        request, system = self.request, self.system
+        if "dynamics_rate" not in system.description.blocks:
             return "settled"
-        settled, n = self.system.another("settled"), self.system.form.written
+        if request.events is not None and request.events.contacts:
+            return "rated"
+        if system.unknowns > RATED:
+            return "settled"
+        n = system.form.written
         point = self.start.t, self.y[:n], self.yd[:n]
-        return "rated" if self.request.events or flows_open(settled, *point, self._keeps) else "settled"
+        return "rated" if request.events or flows_open(system.another("settled"), *point, self._keeps) else "settled"
 
     def _settler(self, name: str, state: NDArray[np.bool_]) -> Settler:
         """Of the rows of a form."""

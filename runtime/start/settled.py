@@ -27,10 +27,6 @@ LIGHT = 1e-3
 """Weight (of squares) of displacements without inertia: they follow those that have some."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
-FULL = 400
-"""Unknowns up to which full matrices tell what the rows leave open."""
-PASSES = 20
-"""Rounds in which rows tell one unknown after the other."""
 OPEN = 1e-6
 """Of a unit vector: a part of it that is open."""
 RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
@@ -84,36 +80,13 @@ def flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[
 
 
 def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_]) -> bool:
-    jy, jyd = settled.jacobian(t, y, yd)
-    flow = (settled.kinds == "f") & ~state
-    if _told(settled, (jy, jyd), state)[flow].all():
-        return False
-    if settled.unknowns > FULL:
-        return True
-    matrix = np.hstack([settled.dense(jy)[:, ~state], settled.dense(jyd)[:, rates_of(settled)]])
+    jy, jyd = (settled.dense(values) for values in settled.jacobian(t, y, yd))
+    flow = (settled.kinds == "f")[~state]
     try:
-        open_ = null_space(equilibrated(matrix)[0])
+        open_ = null_space(equilibrated(np.hstack([jy[:, ~state], jyd[:, rates_of(settled)]]))[0])
     except NotFiniteError:
         return True
-    return bool((np.abs(open_[: flow[~state].size][flow[~state]]) > OPEN).any())
-
-
-def _told(settled: System, values: tuple[Floats, Floats], state: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """[unknowns]: those that rows with but one unknown left determine, one after the other, and the state."""
-    in_y, in_rate = (item != 0.0 for item in values)
-    row, n = settled.pattern.row, settled.unknowns
-    columns = settled.pattern.columns_of()
-    row, column = np.concatenate([row[in_y], row[in_rate]]), np.concatenate([columns[in_y], n + columns[in_rate]])
-    known = np.zeros(2 * n, dtype=bool)
-    known[:n] = state
-    for _ in range(PASSES):
-        left = ~known[column]
-        single = np.bincount(row[left], minlength=settled.rows) == 1
-        now = column[left & single[row]]
-        if not now.size:
-            break
-        known[now] = True
-    return np.asarray(known[:n])
+    return bool((np.abs(open_[: flow.size][flow]) > OPEN).any())
 
 
 class Settler:
