@@ -56,7 +56,7 @@ UNPULLED = 2
 """Kind of a derivative (core/radau.h): interpolated whatever pulls at its unknown."""
 RATED = 400
 """Unknowns up to which full matrices tell whether flows are open.  Of larger systems a point with the rates of all
-balances is dear to find (a grid of 20 x 20: 2 s for 0.1 s); behind an instant their loops of stores are as the rows say.
+balances is dear to find (a grid of 20 x 20: 2 s for 0.1 s); their loops of stores are left as rows leave them.
 """
 STAGED = 100_000
 """Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
