@@ -161,10 +161,10 @@ static void dense_solve(const sd_linear *linear, sd_number *x, sd_number *work)
     }
 }
 
-/* by the list of operations, if there is one and it serves; a column that may be left wants exchanges */
+/* by the list of operations, if there is one and it serves; columns that steep laws may leave open want exchanges */
 static int replay(sd_linear *linear, const sd_number *values, const double *scale)
 {
-    if (!linear->elimination || linear->null_pivot > 0.0 || !sd_elimination_factor(linear->elimination, values, scale))
+    if (!linear->elimination || linear->idle || !sd_elimination_factor(linear->elimination, values, scale))
         return 0;
     linear->smallest = 1.0;
     linear->rank = linear->n;
@@ -207,7 +207,7 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
         return 0;
     equilibrate(linear, values, scale);
     int failed = linear->dense ? dense_factor(linear) : sparse_factor(linear);
-    if (linear->elimination && !failed)
+    if (linear->elimination && !linear->idle && !failed)
         sd_elimination_learn(linear->elimination, linear->scaled);
     return failed;
 }

@@ -186,12 +186,12 @@ class Integration:
         point = self.start.t, self.y[:n], self.yd[:n]
         return "rated" if request.events or flows_open(system.another("settled"), *point, self._keeps) else "settled"
 
-    def _settler(self, name: str, state: NDArray[np.bool_]) -> Settler:
-        """Of the rows of a form."""
+    def _settler(self, name: str, state: NDArray[np.bool_], *, whole: bool = False) -> Settler:
+        """Of the rows of a form; whole: with every unknown, whatever leaves the runs."""
         form = self.system.form
         n = form.written
         kinematics = (form.k_q, form.k_f)
-        left = self.forms.settled if self.forms is not None and name == "settled" else None
+        left = self.forms.settled if self.forms is not None and name == "settled" and not whole else None
         system = self.system.another(name)
         return Settler(system, kinematics, self.magnitude[:n], self._time, state, self._light[:n], left)
 
@@ -330,7 +330,7 @@ class Integration:
     def _bare(self) -> bool:
         """Whether all that is observed follows from the state: nothing that a row has to be settled for."""
         description, written = self.system.description, self.system.family_of[: self.system.form.written]
-        follows = frozenset(np.unique(written[~self._keeps]).tolist())
+        follows = frozenset(written[~self._keeps].tolist())
         read = [(kernel.reads, kernel.rates) for kernel in description.blocks.get("observe", ())]
         return all(reads is not None and not (reads & follows) and rates == frozenset() for reads, rates in read)
 
@@ -414,7 +414,7 @@ class Integration:
     def restart(self) -> Restart:
         """Finds consistent points behind jumps, with every unknown."""
         if self._restart is None:
-            settler = self.settler if self.forms is None else self._settler(self._whole_form, self._keeps)
+            settler = self.settler if self.forms is None else self._settler(self._whole_form, self._keeps, whole=True)
             self._restart = Restart(settler, self._keeps)
         return self._restart
 
