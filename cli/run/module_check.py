@@ -98,9 +98,9 @@ def _points(system: System, started: Started, oracle: SampledRows, until: float)
 def _ways(number: int, size: int) -> Iterator[Array]:
     """Numbers [size] from -1.5 to -0.5 and from 0.5 to 1.5 that know nothing of each other, so many times."""
     for k in range(number):
-        found = uniform((k + 1) * size)[k * size :]
+        found = uniform(size, behind=k * size)
         found += 0.5
-        found[uniform((k + 1) * size, 1)[k * size :] < 0.5] *= -1.0
+        found[uniform(size, 1, k * size) < 0.5] *= -1.0
         yield found
 
 

@@ -422,7 +422,7 @@ class Integration:
         """The point behind a jump of the text at t (s); where no state jumps, what is left of the unknowns tells."""
         if self.forms is not None and self._whole_form == "settled":
             n = self.system.form.written
-            found = still(self.settler, t, (y, yd), self.roles.state[:n], self.magnitude[:n])
+            found = still(self.settler, t, (y, yd), self._keeps, self.magnitude[:n])
             if found is not None:
                 return found
         return self.restart.across(t, y, yd)

@@ -23,9 +23,11 @@ def distinct(values: NDArray[Scalar]) -> NDArray[Scalar]:
     return found[new]
 
 
-def uniform(number: int, which: int = 0) -> NDArray[np.float64]:
-    """Numbers [number] that fill [0, 1) evenly; which: 0 or 1, two that know nothing of each other."""
-    found = np.arange(1.0, 1.0 + number)
+def uniform(number: int, which: int = 0, behind: int = 0) -> NDArray[np.float64]:
+    """Numbers [number] that fill [0, 1) evenly; which: 0 or 1, two that know nothing of each other; behind: so many
+    that come before them.
+    """
+    found = np.arange(1.0 + behind, 1.0 + behind + number)
     found *= EVEN[which]
     found -= np.floor(found)  # as the remainder by one, in a tenth of its time
     return found
