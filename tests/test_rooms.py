@@ -39,6 +39,15 @@ def test_every_room_has_a_page_of_files_that_exist(room):
         assert (room / name).is_dir(), name
 
 
+def test_each_room_of_the_core_includes_only_those_above_it():
+    core = ROOT / "runtime" / "core"
+    order = re.findall(r"^\| `(\w+)/` \|", (core / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert {path.parent.name for path in core.glob("*/*.[ch]")} == set(order)
+    for path in core.glob("*/*.[ch]"):
+        for room in re.findall(r'^#include "(\w+)/', path.read_text(encoding="utf-8"), re.MULTILINE):
+            assert order.index(room) <= order.index(path.parent.name), path
+
+
 def test_nothing_but_the_rooms_stands_at_the_top():
     """What a command leaves where it is run is not committed with the rest."""
     if shutil.which("git") is None or not (ROOT / ".git").exists():

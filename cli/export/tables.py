@@ -29,7 +29,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """One index form (core/assembly.h): sizes, pattern by compressed columns, calls, rows q' - f, held rows."""
+    """One index form (core/system/assembly.h): sizes, pattern by compressed columns, calls, rows q' - f, held rows."""
 
     unknowns: int
     rows: int
@@ -86,7 +86,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Index form 0: the differential unknowns of the full layout, and what is solved for (core/underlying.h).
+    """Index form 0: the differential unknowns of the full layout, and what is solved for (core/steppers/underlying.h).
 
     column, row: pattern of dF/dy + cj dF/dyd, from the components of the matrix.
     """

@@ -1,4 +1,4 @@
-"""Binding: the numbers of one set of parameter values: p, ix, shapes, initial values (runtime/core/model.h).
+"""Binding: the numbers of one set of parameter values: p, ix, shapes, initial values (runtime/core/system/model.h).
 
 Parameters are evaluated in the order of their dependencies, over whole index ranges at once.  Overriding one never
 touches the compiled text.  Received: a network, its program and descriptor form, and overrides by name or

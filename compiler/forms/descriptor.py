@@ -5,7 +5,7 @@
     Hamilton (4.14)-(4.15)   q' = f;  p' + Phi_q^T kappa + Psi_f^T mu = U;  0 = p - dT*/df;  and the rest as above
 
 Families are the unknowns, row families the equations; a kernel is a loop nest with local expressions that are added
-to rows.  Blocks and their meaning: runtime/core/model.h.
+to rows.  Blocks and their meaning: runtime/core/system/model.h.
 """
 
 from __future__ import annotations

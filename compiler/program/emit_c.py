@@ -1,4 +1,4 @@
-"""Program -> C text, after runtime/core/model.h: functions sd_<block>_rows, _dy, _dyd.
+"""Program -> C text, after runtime/core/system/model.h: functions sd_<block>_rows, _dy, _dyd.
 
 One loop a kernel, one static function a routine.  The text holds no name of the user's: unknowns are places, rows
 numbers (the manifest has the names).  Sizes and parameters are read from ix and p, so arrays of any length give the

@@ -1,4 +1,4 @@
-"""Program -> Python text on NumPy arrays, after runtime/core/model.h: <block>_rows, _dy, _dyd.
+"""Program -> Python text on NumPy arrays, after runtime/core/system/model.h: <block>_rows, _dy, _dyd.
 
 Loops are vectorised: one loop makes slices wherever a place moves by one, several loops are flattened into index
 arrays, last loop fastest.  The order of entries is that of the C text.

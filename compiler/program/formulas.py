@@ -1,7 +1,7 @@
 """Formulas -> Program: values that are computed once for a set of parameters, by the code that computes rows.
 
 A formula is an expression under a loop nest; its values stand one behind the other, last loop fastest, as entries of a
-Jacobian do.  The functions that come of it have the contract's arguments (runtime/core/model.h) and write `v`.
+Jacobian do.  The functions that come of it have the contract's arguments (runtime/core/system/model.h) and write `v`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A form of a model without what can be eliminated, as the core's steppers and the settling see it.
 
-The system of core/condensed.h: kept unknowns z, kept rows, e = c + T z for the others.  Stretches of families
+The system of core/system/condensed.h: kept unknowns z, kept rows, e = c + T z for the others.  Stretches of families
 whose sums read stretches of families become one loop each, whatever their number.
 """
 

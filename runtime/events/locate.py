@@ -12,7 +12,7 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats
 
 PARTS = 4
-"""Of a step, as core/run.c looks at it."""
+"""Of a step, as core/run/run.c looks at it."""
 ITERATIONS = 60
 
 Dense = Callable[[float], Floats]

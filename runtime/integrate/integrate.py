@@ -50,10 +50,10 @@ CRAWL = 200_000
 CREPT = 1e-7
 SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change,
-where constraints are constant sums: their unknowns are interpolated differently (core/radau_dense.c).  Of curved ones
+where constraints are constant sums: their unknowns are interpolated differently (steppers/radau_dense.c).  Of curved ones
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 UNPULLED = 2
-"""Kind of a derivative (core/radau.h): interpolated whatever pulls at its unknown."""
+"""Kind of a derivative (core/steppers/radau.h): interpolated whatever pulls at its unknown."""
 RATED = 400
 """Unknowns up to which full matrices tell whether flows are open.  Of larger systems a point with the rates of all
 balances is dear to find (a grid of 20 x 20: 2 s for 0.1 s); their loops of stores are left as rows leave them.
@@ -68,7 +68,7 @@ Progress = Callable[[float], None]
 
 
 def _audited(system: System) -> Ints:
-    """Places of the members of the audit in y, in the order of core/run.h; -1 where there is none."""
+    """Places of the members of the audit in y, in the order of core/run/run.h; -1 where there is none."""
     found = np.full(7, -1, dtype=np.int32)
     order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
     for k in system.description.families_of("audit"):
@@ -565,5 +565,5 @@ def integrate(
     sink: Sink,
     progress: Progress | None = None,
 ) -> Finished:
-    """One integration; see Request.  sink receives blocks of rows [k, ROW_HEAD + 2 observed] (core/run.h)."""
+    """One integration; see Request.  sink receives blocks of rows [k, ROW_HEAD + 2 observed] (core/run/run.h)."""
     return Integration(system, start, request).run(sink, progress)

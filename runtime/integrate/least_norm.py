@@ -1,4 +1,4 @@
-"""The least multipliers of redundant constraints, at every point that is written (core/least_norm.h)."""
+"""The least multipliers of redundant constraints, at every point that is written (core/system/least_norm.h)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ledgers of one integration (core/ledgers.h), and what came of each."""
+"""The ledgers of one integration (core/run/ledgers.h), and what came of each."""
 
 from __future__ import annotations
 

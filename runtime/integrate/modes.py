@@ -1,4 +1,4 @@
-"""What the core knows of a run's events: the modes met so far, and the transitions between them (core/modes.h).
+"""What the core knows of a run's events: the modes met so far, and the transitions between them (core/run/modes.h).
 
 The handler says what happens; where it was simple (no impact, no flow assigned) it is told to the core, which takes
 the same transition by itself from then on as long as the conditions behind it hold.  Before the handler is asked again

@@ -67,7 +67,7 @@ class Request:
 
     @property
     def tolerance(self) -> float:
-        """What the error test compares with: radau's estimate is of a lower order (core/radau.h)."""
+        """What the error test compares with: radau's estimate is of a lower order (core/steppers/radau.h)."""
         return 0.1 * self.rtol ** (2.0 / 3.0) if self.method == "radau" else self.rtol
 
 

@@ -37,7 +37,7 @@ from sysdyn.runtime.trace.trace import Parameter, Trace
 from sysdyn.values import dataclass
 
 MOST = 48
-"""Instants of comparison that are taken of a run's steps, at most twice that (core/many.c)."""
+"""Instants of comparison that are taken of a run's steps, at most twice that (core/run/many.c)."""
 DONE = 0
 WHY = ("", "start", "structure", "stopped", "accuracy", "energy", "claim")
 """What kept a run from a result, by its state."""

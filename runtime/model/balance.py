@@ -1,4 +1,4 @@
-"""Rows of a matrix by its entries, of which unknown magnitudes are balanced (core/magnitudes.h)."""
+"""Rows of a matrix by its entries, of which unknown magnitudes are balanced (core/start/magnitudes.h)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The manifest and the binding as typed frozen values.
 
-Receives the manifest's "structure" and the binding as core/model.h lays them down (plain mappings and arrays);
+Receives the manifest's "structure" and the binding as core/system/model.h lays them down (plain mappings and arrays);
 hands on a `Description`: unknown families, row families, blocks with their kernels, p, ix, initial values.
 """
 

@@ -26,7 +26,7 @@ class RowLabel:
 
 
 class ContractError(Exception):
-    """A compiled model does not keep the contract of core/model.h."""
+    """A compiled model does not keep the contract of core/system/model.h."""
 
 
 class TraceError(Exception):

@@ -40,7 +40,7 @@ _SWEEPS = 8
 
 @dataclass(frozen=True, slots=True)
 class Sizing:
-    """The core's tables for the magnitudes of one form (core/sizing.h), and the arrays that they point to."""
+    """The core's tables for the magnitudes of one form (core/start/sizing.h), and the arrays that they point to."""
 
     core: lib.Sizing
     kept: tuple[object, ...]
@@ -78,7 +78,7 @@ def _sizing(system: System) -> Sizing:
 
 
 def _kinds(system: System) -> Ints:
-    """What each unknown is, as core/sizing.h says it [unknowns]."""
+    """What each unknown is, as core/start/sizing.h says it [unknowns]."""
     masks = (
         system.are("q", "f", "p", "s"),
         system.are("f"),
@@ -211,7 +211,7 @@ def magnitudes(
 ) -> tuple[Floats, float]:
     """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s].
 
-    far: the motion linearised at the start, which says how far each unknown gets (sd_relaxed in core/sizing.h): dF/dy,
+    far: the motion linearised at the start, which says how far each unknown gets (sd_relaxed, start/sizing.h): dF/dy,
     dF/dyd [entries], rates [unknowns], the order of the columns; None: as its rate says.
     """
     span = max(t_end - t0, 0.0) or 1.0

@@ -234,7 +234,7 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
 
 def determined(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats | None:
     """The u that rows of size one determine, unknowns that stand in none of them zero; None where they leave others
-    open.  Rows in excess are not looked at (core/tall.h).
+    open.  Rows in excess are not looked at (core/linear/tall.h).
     """
     i, j, v = entries
     here = v != 0.0
@@ -345,7 +345,7 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) 
 def _in_core(
     problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, limits: tuple[int, int], *, measure: bool
 ) -> Solution:
-    """The same of a small problem (core/search.h); measure: x as it is, of any."""
+    """The same of a small problem (core/start/search.h); measure: x as it is, of any."""
     found, scaled = x.copy(), np.zeros(problem.number)
     use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
     masks = lib.pointer(use), lib.pointer(free)

@@ -104,7 +104,7 @@ def tall_order(pattern: Pattern) -> Ints:
 
 
 def _large(pattern: Pattern) -> Ints:
-    """The same by approximate degrees, in the core (core/order.h)."""
+    """The same by approximate degrees, in the core (core/linear/order.h)."""
     found = np.zeros(pattern.unknowns, dtype=np.int32)
     places = lib.pointer(pattern.column), lib.pointer(pattern.row)
     if lib.core.sd_column_order(pattern.rows, pattern.unknowns, *places, lib.pointer(found)):

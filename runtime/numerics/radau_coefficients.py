@@ -1,11 +1,11 @@
-"""The coefficients of Radau IIA of 3, 5 and 7 stages, derived with 60 digits, and core/radau_coefficients.c of them.
+"""The coefficients of Radau IIA of 3, 5 and 7 stages, with 60 digits, and core/steppers/radau_coefficients.c of them.
 
 The stages lie at the roots of P_s - P_{s-1} (Legendre, on [0, 1]; the last one is 1), A integrates Lagrange's
 polynomials of these nodes, so A satisfies C(s) and, with the weights b (its last row), D(s-1) and B(2s-1).  Hairer &
 Wanner, Solving Ordinary Differential Equations II, IV.5 and IV.8; the same authors, Stiff differential equations solved
 by Radau methods, J. Comput. Appl. Math. 111 (1999): A^-1 = S diag(gamma, lambda_k, conj lambda_k) S^-1 with columns of
 S that end in 1.  The error is estimated by weights b^ with a weight 1/gamma at the start of the step, of order s.
-`python -m sysdyn.runtime.numerics.radau_coefficients > runtime/core/radau_coefficients.c` writes the file anew.
+`python -m sysdyn.runtime.numerics.radau_coefficients` prints that file anew.
 """
 
 from __future__ import annotations
@@ -204,13 +204,13 @@ def _method(stages: int) -> str:
 
 
 def text() -> str:
-    """core/radau_coefficients.c."""
+    """core/steppers/radau_coefficients.c."""
     head = [
-        "/* Coefficients of Radau IIA with 3, 5 and 7 stages (see radau.h).",
+        "/* Coefficients of Radau IIA with 3, 5 and 7 stages (see steppers/radau.h).",
         " *",
         " * Written by numerics/radau_coefficients.py, which says what they are; not by hand.",
         " */",
-        '#include "radau.h"',
+        '#include "steppers/radau.h"',
         "",
         "const sd_radau_method sd_radau_methods[SD_METHODS] = {",
     ]

@@ -1,6 +1,6 @@
 """The settled system: every row that holds at a consistent point, and its least-change projection in the core.
 
-Unknowns x = (y as written, the derivatives that occur); see core/settle.h.  `Settler` owns the core's structure.
+Unknowns x = (y as written, the derivatives that occur); see core/system/settle.h.  `Settler` owns the core's structure.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class Settler:
         return found, slots
 
     def _sorts(self) -> Ints:
-        """Of the rows, as core/settle.h names them: constraints, rates of other rows, others, left out."""
+        """Of the rows, as core/system/settle.h names them: constraints, rates of other rows, others, left out."""
         found = np.zeros(max(self.system.rows, 1), dtype=np.int32)
         for group, family, first in self.system.form.groups:
             sort = 1 if group in ("phi", "phi_rate", "psi") else 2 if group in RATES else 0
@@ -232,7 +232,7 @@ class Settler:
         return found, [slots[0], full], tall_order(found)
 
     def by_basis(self, slack: float) -> None:
-        """Points settle within a basis where the state moves by no more than slack, in magnitudes (core/settle.h)."""
+        """Points settle within a basis where the state moves by no more than slack, in magnitudes (settle.h)."""
         self._wide = self.system.once(("basis", *self._key), self._basis)
         pattern, slots, order = self._wide
         arrays = (pattern.column, pattern.row, order, *slots)

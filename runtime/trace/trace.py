@@ -85,7 +85,7 @@ class Met:
 
 
 class TraceWriter:
-    """A trace being written.  rows: [k, 8 + 2 observed] as core/run.h lays them down.
+    """A trace being written.  rows: [k, 8 + 2 observed] as core/run/run.h lays them down.
 
     Two stores stand beside the trace (.NAME.<token>.a, .b).  Each flush brings the one that is not visible up to date
     and then gives it the trace's name (hard link, rename): what bears the name is never being written.  Nor is what a

@@ -26,7 +26,7 @@ from sysdyn.values import dataclass
 
 BLOCK = 1024
 BEFORE = 8
-"""Numbers of a row before its quantities (core/run.h)."""
+"""Numbers of a row before its quantities (core/run/run.h)."""
 HEAD = 1 << 16
 """Bytes for what is not numbers."""
 

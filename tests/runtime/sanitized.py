@@ -45,7 +45,7 @@ def build(folder, flags=FLAGS):
 
     with (ROOT / "pyproject.toml").open("rb") as file:
         (module,) = tomllib.load(file)["tool"]["setuptools"]["ext-modules"]
-    include = [f"-I{sysconfig.get_path('include')}", f"-I{np.get_include()}"]
+    include = [f"-I{sysconfig.get_path('include')}", f"-I{np.get_include()}", f"-I{ROOT / 'runtime' / 'core'}"]
     objects = [folder / (Path(source).stem + ".o") for source in module["sources"]]
 
     def compiled(pair):

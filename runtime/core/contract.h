@@ -1,7 +1,0 @@
-/* What the core needs of the contract between compiled models and the runtime: all of model.h. */
-#ifndef SYSDYN_CONTRACT_H
-#define SYSDYN_CONTRACT_H
-
-#include "model.h"
-
-#endif

@@ -1,0 +1,329 @@
+/* Orders and lists of operations for small matrices: see elimination.h. */
+#include "linear/elimination.h"
+
+#include "linear/machine_code.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define GROWTH 1e2         /* largest multiplier, in scaled terms: more costs digits */
+#define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
+#define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
+#define SHARE 4            /* nor do large ones before this part of n */
+#define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
+
+static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
+static int32_t magnitude(const sd_elimination *e, int32_t k) { return e->factors + e->n + k; }
+static int32_t size_of(const sd_elimination *e, int32_t k) { return e->factors + 2 * e->n + k; }
+static int32_t growth_of(const sd_elimination *e, int32_t k) { return e->factors + 3 * e->n + k; }
+static int32_t constants(const sd_elimination *e) { return e->factors + 4 * e->n; }
+
+static void clear(sd_list *list)
+{
+    free(list->sum);
+    free(list->pair);
+    *list = (sd_list){0};
+}
+
+static void drop_order(sd_elimination *e)
+{
+    e->ready = 0;
+    sd_code_free(e->code);
+    e->code = NULL;
+    clear(&e->factor);
+    clear(&e->solve);
+    free(e->cell);
+    e->cell = NULL;
+}
+
+void sd_elimination_forget(sd_elimination *elimination)
+{
+    drop_order(elimination);
+    elimination->samples = elimination->seen = elimination->waited = 0;
+    elimination->wait = FIRST > elimination->n / SHARE ? FIRST : elimination->n / SHARE;
+}
+
+void sd_elimination_free(sd_elimination *elimination)
+{
+    if (!elimination)
+        return;
+    drop_order(elimination);
+    free(elimination->sample);
+    free(elimination->pivot_row);
+    free(elimination->weak);
+    free(elimination);
+}
+
+sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32_t *row)
+{
+    sd_elimination *e = calloc(1, sizeof *e);
+    if (!e)
+        return NULL;
+    e->n = n;
+    e->entries = column[n];
+    e->column = column;
+    e->row = row;
+    e->sample = calloc(SD_SAMPLES * (size_t)e->entries + 1, sizeof(sd_number));
+    e->pivot_row = calloc(2 * (size_t)n + 1, sizeof(int32_t));
+    e->weak = calloc((size_t)n + 1, sizeof(double));
+    if (!e->sample || !e->pivot_row || !e->weak) {
+        sd_elimination_free(e);
+        return NULL;
+    }
+    e->pivot_column = e->pivot_row + n;
+    sd_elimination_forget(e);
+    return e;
+}
+
+/* --- the lists -------------------------------------------------------------------------------------------------- */
+
+/* room for one more, doubled when it is used up.  0; 2: no memory */
+static int widen(void **items, int32_t used, int32_t *room, size_t size)
+{
+    if (used < *room)
+        return 0;
+    int32_t more = *room ? 2 * *room : 64;
+    void *moved = realloc(*items, (size_t)more * size);
+    if (!moved)
+        return 2;
+    *items = moved;
+    *room = more;
+    return 0;
+}
+
+static int add_pair(sd_list *list, int32_t a, int32_t b)
+{
+    if (widen((void **)&list->pair, list->pairs, &list->pair_room, 2 * sizeof(int32_t)))
+        return 2;
+    list->pair[2 * list->pairs] = a;
+    list->pair[2 * list->pairs + 1] = b;
+    list->pairs++;
+    return 0;
+}
+
+/* ends a sum whose pairs are those behind the last one's */
+static int add_sum(sd_list *list, enum sd_sum_kind kind, int32_t target, int32_t source, int32_t by)
+{
+    if (widen((void **)&list->sum, list->sums, &list->room, sizeof(sd_sum)))
+        return 2;
+    int32_t first = list->sums ? list->sum[list->sums - 1].last : 0;
+    list->sum[list->sums++] = (sd_sum){kind, target, source, by, first, list->pairs};
+    return 0;
+}
+
+/* the factor at pivot places (i, k): its entry less products of what is left of it and above it */
+static int list_factor(sd_elimination *e, const int32_t *cell, const int32_t *source, int32_t i, int32_t k)
+{
+    int32_t n = e->n, least = i < k ? i : k, failed = 0;
+    for (int32_t m = 0; m < least; m++)
+        if (cell[i * n + m] >= 0 && cell[m * n + k] >= 0)
+            failed |= add_pair(&e->factor, cell[i * n + m], cell[m * n + k]);
+    enum sd_sum_kind kind = k < i ? SD_SUM_TIMES : k == i ? SD_SUM_INVERSE : SD_SUM_PLAIN;
+    return failed | add_sum(&e->factor, kind, cell[i * n + k], source[i * n + k], cell[k * n + k]);
+}
+
+/* row i of the factors, its size before and the growth of its multipliers */
+static int list_row(sd_elimination *e, const int32_t *cell, const int32_t *source, int32_t i)
+{
+    int32_t n = e->n, failed = 0;
+    for (int32_t k = 0; k < n; k++)
+        if (source[i * n + k] >= 0)
+            failed |= add_pair(&e->factor, source[i * n + k], magnitude(e, k));
+    failed |= add_sum(&e->factor, SD_SUM_LARGEST, size_of(e, i), -1, -1);
+    for (int32_t k = 0; k < n; k++)
+        if (cell[i * n + k] >= 0)
+            failed |= list_factor(e, cell, source, i, k);
+    for (int32_t k = 0; k < i; k++)
+        if (cell[i * n + k] >= 0)
+            failed |= add_pair(&e->factor, cell[i * n + k], size_of(e, k));
+    return failed | add_sum(&e->factor, SD_SUM_LARGEST, growth_of(e, i), -1, -1);
+}
+
+static int list_solution(sd_elimination *e, const int32_t *cell)
+{
+    int32_t n = e->n, failed = 0;
+    for (int32_t i = 0; i < n; i++) {
+        for (int32_t k = 0; k < i; k++)
+            if (cell[i * n + k] >= 0)
+                failed |= add_pair(&e->solve, cell[i * n + k], right(e, k));
+        failed |= add_sum(&e->solve, SD_SUM_PLAIN, right(e, i), e->inside + e->pivot_row[i], -1);
+    }
+    for (int32_t i = n - 1; i >= 0; i--) {
+        for (int32_t k = i + 1; k < n; k++)
+            if (cell[i * n + k] >= 0)
+                failed |= add_pair(&e->solve, cell[i * n + k], e->inside + e->pivot_column[k]);
+        failed |= add_sum(&e->solve, SD_SUM_TIMES, e->inside + e->pivot_column[i], right(e, i), cell[i * n + i]);
+    }
+    return failed;
+}
+
+/* cell [n][n]: numbers of the factors, source [n][n]: entries of the matrix behind the cells; by pivot places, -1: none */
+static void number_cells(sd_elimination *e, const char *entry, int32_t *cell, int32_t *source)
+{
+    int32_t n = e->n;
+    e->factors = n; /* inverse pivots first */
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t k = 0; k < n; k++)
+            cell[i * n + k] = k == i ? k : entry[e->pivot_column[k] * n + e->pivot_row[i]] ? e->factors++ : -1;
+    e->inside = constants(e) + 2;
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t k = 0; k < n; k++) {
+            source[i * n + k] = -1;
+            int32_t c = e->pivot_column[k];
+            for (int32_t p = e->column[c]; p < e->column[c + 1]; p++)
+                if (e->row[p] == e->pivot_row[i])
+                    source[i * n + k] = e->inside + p;
+        }
+}
+
+/* below what a pivot is weak: by the largest entry of its column in the newest matrix */
+static void measure_columns(sd_elimination *e)
+{
+    const sd_number *newest = e->sample + (size_t)(e->samples - 1) * (size_t)e->entries;
+    for (int32_t k = 0; k < e->n; k++) {
+        double largest = 0.0;
+        for (int32_t p = e->column[e->pivot_column[k]]; p < e->column[e->pivot_column[k] + 1]; p++)
+            largest = fmax(largest, sd_size(newest[p]));
+        e->weak[k] = WEAK * largest;
+    }
+}
+
+static int write_lists(sd_elimination *e, const char *entry)
+{
+    size_t all = (size_t)e->n * (size_t)e->n;
+    int32_t *cell = malloc((2 * all + 1) * sizeof *cell), failed = 0;
+    if (!cell)
+        return 2;
+    number_cells(e, entry, cell, cell + all);
+    e->cell = calloc((size_t)e->inside, sizeof(sd_number));
+    for (int32_t i = 0; i < e->n && !failed; i++)
+        failed = list_row(e, cell, cell + all, i);
+    failed = failed || !e->cell || list_solution(e, cell) || e->factor.pairs + e->solve.pairs > PAIRS;
+    free(cell);
+    return failed;
+}
+
+/* an order for the newest matrix and as many of those before it as one order fits */
+static void prepare(sd_elimination *e)
+{
+    char *entry = malloc((size_t)e->n * (size_t)e->n + 1);
+    int failed = entry == NULL;
+    drop_order(e);
+    for (int32_t samples = e->samples; samples > 0 && !failed; samples = samples / 2) {
+        int none = sd_elimination_order(e, samples, entry);
+        if (none && samples > 1)
+            continue;
+        failed = none || write_lists(e, entry);
+        break;
+    }
+    free(entry);
+    if (failed) {
+        drop_order(e);
+        return;
+    }
+    measure_columns(e);
+    e->ready = 1;
+#ifndef SD_COMPLEX
+    const uint64_t bits = UINT64_MAX >> 1;
+    e->cell[constants(e)] = 1.0;
+    memcpy(&e->cell[constants(e) + 1], &bits, sizeof bits);
+    e->code = sd_code_new(&e->factor, &e->solve, e->inside, constants(e), constants(e) + 1);
+#endif
+}
+
+void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
+{
+    sd_elimination *e = elimination;
+    size_t size = (size_t)e->entries;
+    e->seen++;
+    int due = e->waited >= e->wait;
+    if (due || !(e->seen & (e->seen - 1))) { /* of the first ones the 1st, 2nd, 4th, ... */
+        if (e->samples == SD_SAMPLES)
+            memmove(e->sample, e->sample + size, (size_t)--e->samples * size * sizeof(sd_number));
+        memcpy(e->sample + (size_t)e->samples++ * size, scaled, size * sizeof(sd_number));
+    }
+    if (!due)
+        return;
+    e->waited = 0;
+    e->wait += e->wait / 2; /* where no order lasts, looking for one stays cheap */
+    prepare(e);
+}
+
+/* --- new values -------------------------------------------------------------------------------------------------- */
+
+static sd_number at(const sd_elimination *e, const sd_number *outside, int32_t place)
+{
+    return place < e->inside ? e->cell[place] : outside[place - e->inside];
+}
+
+static void interpret(sd_elimination *e, const sd_list *list, sd_number *outside)
+{
+    for (int32_t s = 0; s < list->sums; s++) {
+        const sd_sum *sum = &list->sum[s];
+        const int32_t *pair = list->pair;
+        sd_number value = sum->source < 0 ? 0.0 : at(e, outside, sum->source);
+        if (sum->kind == SD_SUM_LARGEST) {
+            double most = 0.0;
+            for (int32_t p = sum->first; p < sum->last; p++) {
+                double size = sd_size(at(e, outside, pair[2 * p]) * at(e, outside, pair[2 * p + 1]));
+                most = most > size ? most : size;
+            }
+            value = most;
+        } else {
+            for (int32_t p = sum->first; p < sum->last; p++)
+                value -= at(e, outside, pair[2 * p]) * at(e, outside, pair[2 * p + 1]);
+        }
+        if (sum->kind == SD_SUM_TIMES)
+            value *= e->cell[sum->by];
+        if (sum->kind == SD_SUM_INVERSE)
+            value = 1.0 / value;
+        if (sum->target < e->inside)
+            e->cell[sum->target] = value;
+        else
+            outside[sum->target - e->inside] = value;
+    }
+}
+
+/* multipliers are moderate, and what is left of each pivot's column is more than round-off */
+static int healthy(const sd_elimination *e)
+{
+    const sd_number *inverse = e->cell, *size = e->cell + size_of(e, 0), *growth = e->cell + growth_of(e, 0);
+    const sd_number *scale = e->cell + magnitude(e, 0);
+    int fine = 1;
+    for (int32_t k = 0; k < e->n; k++) {
+        double row = sd_size(size[k]);
+        fine &= sd_size(growth[k]) <= GROWTH * row;
+        fine &= sd_size(inverse[k]) * row * e->weak[k] <= sd_size(scale[k]);
+    }
+    return fine;
+}
+
+int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
+{
+    sd_elimination *e = elimination;
+    e->waited++;
+    if (!e->ready)
+        return 0;
+    sd_number *magnitudes = e->cell + magnitude(e, 0);
+    for (int32_t k = 0; k < e->n; k++)
+        magnitudes[k] = scale ? scale[e->pivot_column[k]] : 1.0;
+#ifndef SD_COMPLEX
+    if (e->code)
+        e->code->factor((double *)values, e->cell);
+    else
+#endif
+        interpret(e, &e->factor, (sd_number *)values);
+    return healthy(e);
+}
+
+void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
+{
+#ifndef SD_COMPLEX
+    if (elimination->code) {
+        elimination->code->solve(x, elimination->cell);
+        return;
+    }
+#endif
+    interpret(elimination, &elimination->solve, x);
+}

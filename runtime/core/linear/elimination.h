@@ -1,0 +1,68 @@
+/* Elimination of a small matrix by a list of operations: found once, replayed with new values.
+ *
+ * The order of pivots is Markowitz's (1957) with threshold pivoting, on several matrices at once that the same run has
+ * met; no row is exchanged later.  What is done then is a list of sums over fixed cells, which an interpreter runs, or
+ * straight machine code (machine_code.h).  Values are not scaled: a factorisation without exchanges is the same under any
+ * scaling of rows and columns.  Its growth is judged in scaled terms: columns by magnitudes of the unknowns, rows by their
+ * largest entry; multipliers and pivots beyond the limits say that another order is wanted.
+ */
+#ifndef SYSDYN_ELIMINATION_H
+#define SYSDYN_ELIMINATION_H
+
+#include "linear/number.h"
+
+#include <stdint.h>
+
+#define SD_REPLAYED 100 /* largest matrix; above, loops over a pattern cost little more than the numbers themselves */
+
+#define SD_SAMPLES 6    /* matrices of which an order is found */
+
+/* how the target of a sum is made of S = source - sum over pairs of a b */
+enum sd_sum_kind { SD_SUM_PLAIN, SD_SUM_TIMES, SD_SUM_INVERSE, SD_SUM_LARGEST }; /* S; S times the cell `by`; 1 / S; largest |a b| */
+
+/* one operation; places below `inside` are cells, others those of the caller's array; source -1: 0 */
+typedef struct sd_sum {
+    int32_t kind, target, source, by, first, last; /* its pairs [first, last) */
+} sd_sum;
+
+typedef struct sd_list {
+    int32_t sums, pairs, room, pair_room;
+    sd_sum *sum;
+    int32_t *pair;               /* [pairs][2] places a, b */
+} sd_list;
+
+typedef struct sd_code sd_code;
+
+typedef struct sd_elimination {
+    int32_t n, entries;
+    const int32_t *column, *row; /* pattern, compressed columns, of the caller */
+    int32_t ready;               /* an order was found */
+    int32_t factors, inside;     /* cells of factors; of all */
+    int32_t samples, seen;
+    int32_t wait, waited;        /* matrices from one order to the next at least; since the last */
+    sd_number *sample;           /* [SD_SAMPLES][entries] scaled matrices, the newest last */
+    sd_number *cell;             /* inverse pivots, other factors; then n each: right side, magnitudes, sizes of rows, their
+                                    growth; constants */
+    int32_t *pivot_row, *pivot_column; /* [n] */
+    double *weak;                /* [n] least size of each pivot, scaled, as its column was when the order was found */
+    sd_list factor, solve;
+    sd_code *code;               /* NULL: interpreted */
+} sd_elimination;
+
+sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32_t *row);
+void sd_elimination_free(sd_elimination *elimination);
+/* as new: nothing is known of any matrix */
+void sd_elimination_forget(sd_elimination *elimination);
+/* a matrix [entries] with rows of largest entry 1 that was factorised otherwise; in time an order is found for it and
+ * those before it */
+void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled);
+/* values [entries], scale [n] magnitudes of the unknowns or NULL.  1: factorised; 0: no order yet, or not a healthy one */
+int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale);
+/* x [n]: right side in, solution out */
+void sd_elimination_solve(sd_elimination *elimination, sd_number *x);
+
+/* elimination_order.c: pivots of the newest `samples` matrices, and the filled pattern: entry [n][n] by columns, of the
+ * caller.  0: found; 1: there is no such order; 2: no memory */
+int sd_elimination_order(sd_elimination *elimination, int32_t samples, char *entry);
+
+#endif

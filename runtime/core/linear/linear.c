@@ -1,0 +1,265 @@
+/* Scaling, dense LU and the choice between dense and sparse: see linear.h. */
+#include "linear/linear.h"
+#include "linear/sparse.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define REFINE 1e-8 /* pivots smaller than this part of their column: one step of iterative refinement */
+
+void sd_linear_free(sd_linear *linear)
+{
+    if (!linear)
+        return;
+    sd_sparse_free(linear->sparse);
+    sd_elimination_free(linear->elimination);
+    free(linear->row_scale);
+    free(linear->work);
+    free(linear->dense);
+    free(linear->pivot);
+    free(linear);
+}
+
+sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order)
+{
+    sd_linear *linear = calloc(1, sizeof *linear);
+    if (!linear)
+        return NULL;
+    size_t m = (size_t)n, nnz = (size_t)column[n];
+    linear->n = n;
+    linear->entries = column[n];
+    linear->column = column;
+    linear->row = row;
+    linear->row_scale = calloc(2 * m + 1, sizeof(double));
+    linear->work = calloc(2 * m + nnz + 1, sizeof(sd_number));
+    linear->pivot = calloc(2 * m + 1, sizeof(int32_t));
+    linear->place = linear->pivot ? linear->pivot + m : NULL;
+    linear->rank = n;
+    if (order)
+        linear->sparse = sd_sparse_new(n, n, column, row, order);
+    else
+        linear->dense = calloc(m * m + 1, sizeof(sd_number));
+    if (!linear->row_scale || !linear->work || !linear->pivot || !(order ? (void *)linear->sparse : (void *)linear->dense)) {
+        sd_linear_free(linear);
+        return NULL;
+    }
+    linear->column_scale = linear->row_scale + m;
+    linear->work2 = linear->work + m;
+    linear->scaled = linear->work + 2 * m;
+    return linear;
+}
+
+/* scaled := R values C with rows of largest entry 1 */
+static void equilibrate(sd_linear *linear, const sd_number *values, const double *scale)
+{
+    for (int32_t i = 0; i < linear->n; i++)
+        linear->row_scale[i] = 0.0;
+    for (int32_t j = 0; j < linear->n; j++) {
+        double s = linear->column_scale[j] = scale ? scale[j] : 1.0;
+        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++) {
+            double size = sd_size(linear->scaled[e] = values[e] * s);
+            if (size > linear->row_scale[linear->row[e]])
+                linear->row_scale[linear->row[e]] = size;
+        }
+    }
+    for (int32_t i = 0; i < linear->n; i++)
+        linear->row_scale[i] = linear->row_scale[i] > 0.0 ? 1.0 / linear->row_scale[i] : 1.0;
+    for (int32_t e = 0; e < linear->entries; e++)
+        linear->scaled[e] *= linear->row_scale[linear->row[e]];
+}
+
+static void swap_columns(sd_number *a, int32_t n, int32_t j, int32_t k, int32_t *place)
+{
+    int32_t p = place[j];
+    place[j] = place[k];
+    place[k] = p;
+    for (int32_t i = 0; i < n && j != k; i++) {
+        sd_number swap = a[(size_t)j * n + i];
+        a[(size_t)j * n + i] = a[(size_t)k * n + i];
+        a[(size_t)k * n + i] = swap;
+    }
+}
+
+/* LU of the scaled matrix by columns with row exchanges; columns without a pivot, where they are allowed, come last */
+static int dense_factor(sd_linear *linear)
+{
+    int32_t n = linear->n;
+    sd_number *a = linear->dense;
+    memset(a, 0, (size_t)n * (size_t)n * sizeof *a);
+    for (int32_t j = 0; j < n; j++)
+        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
+            a[(size_t)j * n + linear->row[e]] += linear->scaled[e];
+    for (int32_t i = 0; i < n; i++)
+        linear->pivot[i] = linear->place[i] = i;
+    linear->smallest = 1.0;
+    linear->rank = n;
+    for (int32_t k = 0; k < linear->rank; k++) {
+        sd_number *ck = a + (size_t)k * n;
+        double size = 0.0;
+        int32_t best = k;
+        for (int32_t i = k; i < n; i++)
+            if (sd_size(ck[i]) > sd_size(ck[best]))
+                best = i;
+        int32_t c = linear->place[k];
+        for (int32_t e = linear->column[c]; e < linear->column[c + 1]; e++)
+            size = fmax(size, sd_size(linear->scaled[e]));
+        double relative = size > 0.0 ? sd_size(ck[best]) / size : 0.0;
+        if (relative < linear->null_pivot && linear->idle[c]) {
+            swap_columns(a, n, k--, --linear->rank, linear->place);
+            continue;
+        }
+        if (!(relative >= linear->smallest)) {
+            linear->smallest = relative;
+            linear->bad_row = linear->pivot[best];
+            linear->bad_column = c;
+        }
+        if (!(sd_size(ck[best]) > 0.0) || !isfinite(sd_size(ck[best])))
+            return 1;
+        if (best != k) {
+            int32_t p = linear->pivot[k];
+            linear->pivot[k] = linear->pivot[best];
+            linear->pivot[best] = p;
+            for (int32_t j = 0; j < n; j++) {
+                sd_number swap = a[(size_t)j * n + k];
+                a[(size_t)j * n + k] = a[(size_t)j * n + best];
+                a[(size_t)j * n + best] = swap;
+            }
+        }
+        sd_number inverse = 1.0 / ck[k];
+        for (int32_t i = k + 1; i < n; i++)
+            ck[i] *= inverse;
+        for (int32_t j = k + 1; j < n; j++) {
+            sd_number *cj = a + (size_t)j * n, u = cj[k];
+            if (u == 0.0)
+                continue;
+            for (int32_t i = k + 1; i < n; i++)
+                cj[i] -= ck[i] * u;
+        }
+    }
+    return 0;
+}
+
+static void dense_solve(const sd_linear *linear, sd_number *x, sd_number *work)
+{
+    int32_t n = linear->n;
+    const sd_number *a = linear->dense;
+    for (int32_t i = 0; i < n; i++)
+        work[i] = x[linear->pivot[i]];
+    for (int32_t k = 0; k < linear->rank; k++) {
+        const sd_number *ck = a + (size_t)k * n;
+        for (int32_t i = k + 1; i < n; i++)
+            work[i] -= ck[i] * work[k];
+    }
+    for (int32_t k = linear->rank; k < n; k++)
+        x[linear->place[k]] = 0.0;
+    for (int32_t k = linear->rank - 1; k >= 0; k--) {
+        const sd_number *ck = a + (size_t)k * n;
+        sd_number v = x[linear->place[k]] = work[k] / ck[k];
+        for (int32_t i = 0; i < k; i++)
+            work[i] -= ck[i] * v;
+    }
+}
+
+/* by the list of operations, if there is one and it serves; columns that steep laws may leave open want exchanges */
+static int replay(sd_linear *linear, const sd_number *values, const double *scale)
+{
+    if (!linear->elimination || linear->idle || !sd_elimination_factor(linear->elimination, values, scale))
+        return 0;
+    linear->smallest = 1.0;
+    linear->rank = linear->n;
+    return 1;
+}
+
+static int sparse_factor(sd_linear *linear)
+{
+    sd_sparse *lu = linear->sparse;
+    int failed = 1;
+    if (lu->pivoted)
+        failed = sd_sparse_refactor(lu, linear->column, linear->row, linear->scaled);
+    if (failed) {
+        failed = sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
+        linear->pivotings++;
+    }
+    linear->smallest = lu->smallest;
+    linear->bad_row = lu->bad_row;
+    linear->bad_column = lu->bad_column;
+    return failed;
+}
+
+/* all that was learnt of matrices before */
+static void forget(sd_linear *linear)
+{
+    if (linear->sparse)
+        linear->sparse->pivoted = 0;
+    if (linear->elimination)
+        sd_elimination_forget(linear->elimination);
+    linear->pivoted = 1;
+}
+
+int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale)
+{
+    linear->factorisations++;
+    if (!linear->pivoted)
+        forget(linear);
+    linear->replayed = replay(linear, values, scale);
+    if (linear->replayed)
+        return 0;
+    equilibrate(linear, values, scale);
+    int failed = linear->dense ? dense_factor(linear) : sparse_factor(linear);
+    if (linear->elimination && !linear->idle && !failed)
+        sd_elimination_learn(linear->elimination, linear->scaled);
+    return failed;
+}
+
+int32_t *sd_linear_pivoted(sd_linear *linear)
+{
+    return &linear->pivoted;
+}
+
+void sd_linear_replayed(sd_linear *linear)
+{
+    if (linear->n <= SD_REPLAYED && !linear->elimination)
+        linear->elimination = sd_elimination_new(linear->n, linear->column, linear->row);
+}
+
+void sd_linear_paired(sd_linear *linear)
+{
+    if (linear->sparse)
+        linear->sparse->diagonal = 1;
+}
+
+static void scaled_solve(sd_linear *linear, sd_number *x)
+{
+    if (linear->dense)
+        dense_solve(linear, x, linear->work);
+    else
+        sd_sparse_solve(linear->sparse, x, linear->work, NULL, NULL);
+}
+
+void sd_linear_solve(sd_linear *linear, sd_number *x)
+{
+    int32_t n = linear->n;
+    sd_number *rest = linear->work2;
+    if (linear->replayed) {
+        sd_elimination_solve(linear->elimination, x);
+        return;
+    }
+    if (linear->sparse && linear->smallest >= REFINE) {
+        sd_sparse_solve(linear->sparse, x, linear->work, linear->row_scale, linear->column_scale);
+        return;
+    }
+    for (int32_t i = 0; i < n; i++)
+        rest[i] = x[i] *= linear->row_scale[i];
+    scaled_solve(linear, x);
+    if (linear->smallest < REFINE) {
+        for (int32_t j = 0; j < n; j++)
+            for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
+                rest[linear->row[e]] -= linear->scaled[e] * x[j];
+        scaled_solve(linear, rest);
+        for (int32_t i = 0; i < n; i++)
+            x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;
+    }
+    for (int32_t i = 0; i < n; i++)
+        x[i] *= linear->column_scale[i];
+}

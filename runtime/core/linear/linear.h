@@ -1,0 +1,58 @@
+/* Linear systems G x = b on one fixed pattern, factorised again and again with new values.
+ *
+ * Dense LU with partial pivoting of the smallest (numerics/ordering.py); else sparse LU: the column order is given,
+ * rows are chosen by threshold partial pivoting (Gilbert & Peierls 1988), later matrices are refactorised on the found
+ * pattern and pivots while these stay healthy and pivoted anew when not.  Before either, where a caller said so, the list of
+ * operations that served small matrices before.
+ * G is scaled: columns by the caller (magnitudes of the unknowns), rows by their largest scaled entry, so that
+ * nano-farads and mega-pascals live in one matrix.
+ */
+#ifndef SYSDYN_LINEAR_H
+#define SYSDYN_LINEAR_H
+
+#include "linear/elimination.h"
+#include "linear/number.h"
+
+#include <stdint.h>
+
+typedef struct sd_sparse sd_sparse;
+
+typedef struct sd_linear {
+    int32_t n, entries;
+    const int32_t *column, *row; /* pattern, compressed columns, of the caller */
+    double *row_scale, *column_scale;
+    sd_number *scaled;           /* entries of the scaled matrix */
+    sd_number *dense;               /* LU of small matrices, [n][n] by columns; NULL for sparse ones */
+    int32_t *pivot;
+    sd_sparse *sparse;
+    sd_number *work, *work2;
+    double smallest;             /* smallest pivot relative to its column: 0 singular */
+    int32_t bad_row, bad_column; /* where it was found */
+    int64_t factorisations, pivotings;
+    /* A column that nothing determines, where `idle` allows it: its solution is zero, the row that is left over holds or
+     * not.  (Laws whose slopes underflow: the node between two diodes that block.)  Of dense matrices alone. */
+    double null_pivot;           /* part of its column below which a pivot is none; 0: every pivot counts */
+    const int32_t *idle;         /* [n] 1: the column may be left; of the caller */
+    int32_t *place;              /* [n] column that is eliminated k-th */
+    int32_t rank;                /* of the last factors: n where no column was left */
+    int32_t pivoted;             /* 0: pivots are chosen anew */
+    int32_t replayed;            /* the last factors are those of `elimination` */
+    sd_elimination *elimination; /* NULL: every matrix is pivoted */
+} sd_linear;
+
+/* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */
+sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order);
+void sd_linear_free(sd_linear *linear);
+/* values [entries], scale [n] magnitudes of the unknowns or NULL.  0 done, 1 singular (bad_row, bad_column), 2 memory. */
+int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale);
+/* x [n]: right side in, solution out */
+void sd_linear_solve(sd_linear *linear, sd_number *x);
+/* row k belongs to unknown k, and pivots there where it can; of sparse ones */
+void sd_linear_paired(sd_linear *linear);
+/* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
+int32_t *sd_linear_pivoted(sd_linear *linear);
+/* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the
+ * pivots of others are chosen as before */
+void sd_linear_replayed(sd_linear *linear);
+
+#endif

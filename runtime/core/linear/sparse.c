@@ -1,0 +1,311 @@
+/* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
+#include "linear/sparse.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
+#define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
+
+void sd_sparse_free(sd_sparse *lu)
+{
+    if (!lu)
+        return;
+    free(lu->order);
+    free(lu->l_start);
+    free(lu->l_row);
+    free(lu->u_row);
+    free(lu->l_value);
+    free(lu->u_value);
+    free(lu->inverse);
+    free(lu);
+}
+
+sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const int32_t *row, const int32_t *order)
+{
+    sd_sparse *lu = calloc(1, sizeof *lu);
+    if (!lu)
+        return NULL;
+    size_t m = (size_t)n, all = (size_t)rows;
+    lu->n = n;
+    lu->rows = rows;
+    lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
+    lu->order = calloc(2 * m + 5 * all + 1, sizeof(int32_t));
+    lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
+    lu->inverse = calloc(2 * m + all + 1, sizeof(sd_number));
+    lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
+    lu->u_row = malloc((size_t)lu->u_room * sizeof(int32_t));
+    lu->l_value = malloc((size_t)lu->l_room * sizeof(sd_number));
+    lu->u_value = malloc((size_t)lu->u_room * sizeof(sd_number));
+    if (!lu->order || !lu->l_start || !lu->inverse || !lu->l_row || !lu->u_row || !lu->l_value || !lu->u_value) {
+        sd_sparse_free(lu);
+        return NULL;
+    }
+    lu->source = lu->order + m;
+    lu->place = lu->source + m;
+    lu->stack = lu->place + all;
+    lu->head = lu->stack + all;
+    lu->mark = lu->head + all;
+    lu->count = lu->mark + all;
+    lu->u_start = lu->l_start + m + 1;
+    lu->x = lu->inverse + m;
+    memcpy(lu->order, order, m * sizeof *order);
+    for (int32_t e = 0; e < column[n]; e++)
+        lu->count[row[e]]++;
+    return lu;
+}
+
+/* rows reached from column c through the columns of L found so far: stack[top..n) in the order of elimination */
+static int32_t reach(sd_sparse *lu, const int32_t *column, const int32_t *row, int32_t c, int32_t stamp)
+{
+    int32_t top = lu->rows;
+    for (int32_t e = column[c]; e < column[c + 1]; e++) {
+        int32_t depth = 0;
+        if (lu->mark[row[e]] == stamp)
+            continue;
+        lu->stack[0] = row[e]; /* the search path grows from the left, the result from the right */
+        lu->mark[row[e]] = stamp;
+        lu->head[0] = lu->place[row[e]] < 0 ? 0 : lu->l_start[lu->place[row[e]]];
+        while (depth >= 0) {
+            int32_t here = lu->stack[depth], k = lu->place[here], down = -1;
+            int32_t last = k < 0 ? 0 : lu->l_start[k + 1];
+            for (int32_t p = lu->head[depth]; k >= 0 && p < last; p++) {
+                if (lu->mark[lu->l_row[p]] != stamp) {
+                    down = lu->l_row[p];
+                    lu->head[depth] = p + 1;
+                    break;
+                }
+            }
+            if (down < 0) {
+                lu->stack[--top] = here;
+                depth--;
+                continue;
+            }
+            depth++;
+            lu->stack[depth] = down;
+            lu->mark[down] = stamp;
+            lu->head[depth] = lu->place[down] < 0 ? 0 : lu->l_start[lu->place[down]];
+        }
+    }
+    return top;
+}
+
+/* room for one more column of L and of U */
+static int grow(int64_t need, int64_t *room, int32_t **rows, sd_number **values)
+{
+    if (need <= *room)
+        return 0;
+    int64_t more = 2 * *room > need ? 2 * *room : need;
+    int32_t *r = realloc(*rows, (size_t)more * sizeof *r);
+    if (!r)
+        return 2;
+    *rows = r;
+    sd_number *v = realloc(*values, (size_t)more * sizeof *v);
+    if (!v)
+        return 2;
+    *values = v;
+    *room = more;
+    return 0;
+}
+
+/* the row that pivots in column c: the sparsest among those whose entry is near the largest; -1 where all are zero */
+static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *largest)
+{
+    int32_t best = -1;
+    *largest = 0.0;
+    for (int32_t i = top; i < lu->rows; i++)
+        if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
+            *largest = sd_size(lu->x[lu->stack[i]]);
+    if (lu->diagonal && lu->place[c] < 0 && *largest > 0.0 && sd_size(lu->x[c]) >= THRESHOLD * *largest)
+        return c;
+    for (int32_t i = top; i < lu->rows && *largest > 0.0; i++) {
+        int32_t r = lu->stack[i];
+        if (lu->place[r] >= 0 || sd_size(lu->x[r]) < THRESHOLD * *largest)
+            continue;
+        if (best < 0 || lu->count[r] < lu->count[best] || (lu->count[r] == lu->count[best] && r < best))
+            best = r;
+    }
+    return best;
+}
+
+/* lets go of the factors */
+static void leave(sd_sparse *lu)
+{
+    free(lu->l_row), free(lu->u_row), free(lu->l_value), free(lu->u_value);
+    lu->l_row = lu->u_row = NULL;
+    lu->l_value = lu->u_value = NULL;
+    lu->l_room = lu->u_room = 0;
+}
+
+int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
+{
+    int32_t n = lu->n, rows = lu->rows;
+    int64_t nl = 0, nu = 0;
+    lu->pivoted = 0;
+    lu->smallest = 1.0;
+    for (int32_t i = 0; i < rows; i++) {
+        lu->place[i] = -1;
+        lu->mark[i] = -1;
+        lu->x[i] = 0.0;
+    }
+    for (int32_t k = 0; k < n; k++) {
+        int32_t c = lu->order[k];
+        if (lu->most > 0 && nl + nu > lu->most) {
+            leave(lu);
+            return 3;
+        }
+        if (grow(nl + rows - k, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
+            return 2;
+        lu->l_start[k] = (int32_t)nl;
+        lu->u_start[k] = (int32_t)nu;
+        int32_t top = reach(lu, column, row, c, k);
+        double size = 0.0;
+        for (int32_t e = column[c]; e < column[c + 1]; e++) {
+            lu->x[row[e]] += value[e];
+            size = fmax(size, sd_size(value[e]));
+        }
+        /* eliminate with the finished columns, in order */
+        for (int32_t i = top; i < rows; i++) {
+            int32_t r = lu->stack[i], j = lu->place[r];
+            if (j < 0)
+                continue;
+            sd_number u = lu->x[r];
+            lu->u_row[nu] = j;
+            lu->u_value[nu++] = u;
+            for (int32_t p = lu->l_start[j]; p < lu->l_start[j + 1]; p++)
+                lu->x[lu->l_row[p]] -= lu->l_value[p] * u;
+        }
+        double largest;
+        int32_t pivot = choose(lu, c, top, &largest);
+        double relative = size > 0.0 ? largest / size : 0.0;
+        if (relative < lu->null_pivot) { /* it follows from the others */
+            for (int32_t i = top; i < rows; i++)
+                lu->x[lu->stack[i]] = 0.0;
+            nu = lu->u_start[k];
+            lu->source[k] = -1;
+            lu->inverse[k] = 0.0;
+            lu->l_start[k + 1] = (int32_t)nl;
+            lu->u_start[k + 1] = (int32_t)nu;
+            continue;
+        }
+        if (relative < lu->smallest) {
+            lu->smallest = relative;
+            lu->bad_column = c;
+            lu->bad_row = pivot;
+        }
+        if (pivot < 0 || !isfinite(largest)) {
+            for (int32_t r = 0; r < rows && pivot < 0; r++)
+                if (lu->place[r] < 0)
+                    lu->bad_row = pivot = r;
+            lu->bad_column = c;
+            return 1;
+        }
+        sd_number inverse = 1.0 / lu->x[pivot];
+        lu->inverse[k] = inverse;
+        lu->place[pivot] = k;
+        lu->source[k] = pivot;
+        for (int32_t i = top; i < rows; i++) {
+            int32_t r = lu->stack[i];
+            if (lu->place[r] < 0 && (lu->dropped == 0.0 || sd_size(lu->x[r] * inverse) > lu->dropped)) {
+                lu->l_row[nl] = r;
+                lu->l_value[nl++] = lu->x[r] * inverse;
+            }
+            lu->x[r] = 0.0;
+        }
+        lu->l_start[k + 1] = (int32_t)nl;
+        lu->u_start[k + 1] = (int32_t)nu;
+    }
+    for (int32_t r = 0; r < rows && rows > n; r++)
+        if (lu->place[r] < 0)
+            lu->place[r] = n;
+    int64_t kept = 0, p = 0;
+    for (int32_t k = 0; k < n; k++) { /* in the numbers of the pivots, without rows that have none */
+        for (; p < lu->l_start[k + 1]; p++) {
+            lu->l_row[kept] = lu->place[lu->l_row[p]];
+            lu->l_value[kept] = lu->l_value[p];
+            kept += lu->l_row[kept] < n;
+        }
+        lu->l_start[k + 1] = (int32_t)kept;
+    }
+    lu->pivoted = 1;
+    return 0;
+}
+
+int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
+{
+    sd_number *x = lu->x;
+    lu->smallest = 1.0;
+    for (int32_t k = 0; k < lu->n; k++) {
+        int32_t c = lu->order[k];
+        if (lu->source[k] < 0)
+            continue;
+        for (int32_t e = column[c]; e < column[c + 1]; e++)
+            x[lu->place[row[e]]] += value[e];
+        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++) {
+            int32_t j = lu->u_row[p];
+            sd_number u = x[j];
+            x[j] = 0.0;
+            lu->u_value[p] = u;
+            for (int32_t l = lu->l_start[j]; l < lu->l_start[j + 1]; l++)
+                x[lu->l_row[l]] -= lu->l_value[l] * u;
+        }
+        sd_number diagonal = x[k], inverse = 1.0 / diagonal;
+        double largest = sd_size(diagonal);
+        x[k] = 0.0;
+        lu->inverse[k] = inverse;
+        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++) {
+            sd_number v = x[lu->l_row[l]];
+            x[lu->l_row[l]] = 0.0;
+            lu->l_value[l] = v * inverse;
+            largest = sd_size(v) > largest ? sd_size(v) : largest;
+        }
+        double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
+        lu->smallest = relative < lu->smallest ? relative : lu->smallest;
+        if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
+            memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);
+            lu->pivoted = 0;
+            return 1;
+        }
+    }
+    x[lu->n] = 0.0;
+    return 0;
+}
+
+void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
+{
+    int32_t n = lu->n;
+    for (int32_t k = 0; k < n; k++) {
+        int32_t r = lu->source[k];
+        work[k] = row_scale ? x[r] * row_scale[r] : x[r];
+    }
+    for (int32_t k = 0; k < n; k++) {
+        sd_number v = work[k];
+        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
+            work[lu->l_row[l]] -= lu->l_value[l] * v;
+    }
+    for (int32_t k = n - 1; k >= 0; k--) {
+        sd_number v = work[k] * lu->inverse[k];
+        int32_t c = lu->order[k];
+        x[c] = column_scale ? v * column_scale[c] : v;
+        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
+            work[lu->u_row[p]] -= lu->u_value[p] * v;
+    }
+}
+
+void sd_sparse_basic(const sd_sparse *lu, const sd_number *b, sd_number *x, sd_number *work)
+{
+    memset(x, 0, (size_t)lu->rows * sizeof *x);
+    for (int32_t k = 0; k < lu->n; k++) {
+        sd_number v = b[lu->order[k]];
+        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
+            v -= lu->u_value[p] * work[lu->u_row[p]];
+        work[k] = v * lu->inverse[k];
+    }
+    for (int32_t k = lu->n - 1; k >= 0; k--) {
+        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
+            work[k] -= lu->l_value[l] * work[lu->l_row[l]];
+        if (lu->source[k] >= 0)
+            x[lu->source[k]] = work[k];
+    }
+}

@@ -1,0 +1,607 @@
+/* The loop over runs: see many.h. */
+#define _POSIX_C_SOURCE 199309L
+#include "run/many.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+#define MOST 48          /* instants of comparison, at most twice that (many/batch.py) */
+#define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
+#define SAFETY 2.5
+#define AIM 2.0
+#define LEFT 0.3
+#define LITTLE 0.1
+#define SLOWEST 0.75
+#define STRETCH 1.5
+#define SHORT 60
+#define UNSEEN 100.0
+#define SHORT_CREDIT 0.75
+#define FIRST_DROP 1e-2
+#define PARTED 10.0
+#define MUCH 0.3
+#define BEND 4.0
+#define LOOSE 1e-5
+#define TAME 1e-6
+#define ROUND_OFF (64.0 * DBL_EPSILON)
+#define NOTHING 1e-12    /* of the largest of the same unit: what is left of a zero (model/scales.py) */
+#define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (integrate/runs.py) */
+#define MOVED 1e-10      /* of its magnitude: an anchor that moves by more is not what the text gives */
+#define CONTRACTS 0.5    /* largest residual over the one before: Newton's method converges (Deuflhard 2004, 2.1) */
+#define ALIKE 1e-8       /* of its magnitude: two starts that are one */
+#define VANISHED 1e-6    /* pivot of the start's matrix, or entry of its Jacobian, over that of the nominal start */
+#define SAME 1e-12       /* of an instant: a claim's */
+#define TRACE 1
+#define STEP 2
+#define COMPARED 4
+
+static double cpu_now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void restore(const sd_region *region, int32_t regions)
+{
+    for (int32_t k = 0; k < regions; k++)
+        memcpy(region[k].at, region[k].copy, (size_t)region[k].size);
+}
+
+/* --- the start ------------------------------------------------------------------------------------------------- */
+
+/* 1: an entry of the start's Jacobian vanishes that counts in the nominal one, or a rate appears in a row */
+static int other_pattern(const sd_many *many)
+{
+    for (int32_t e = 0; e < many->start->system->entries; e++) {
+        double y = many->jy[e], yd = many->jyd[e];
+        if (!isfinite(y) || !isfinite(yd) || (many->jyd0[e] == 0.0 && yd != 0.0))
+            return 1;
+        if (many->counts[e] & 1 && !(fabs(y) > VANISHED * fabs(many->jy0[e])))
+            return 1;
+        if (many->counts[e] & 2 && !(fabs(yd) > VANISHED * fabs(many->jyd0[e])))
+            return 1;
+    }
+    return 0;
+}
+
+/* 1: the inertia has a negative direction (LDL^T; a column without a pivot has no inertia) */
+static int negative_inertia(const sd_many *many)
+{
+    int32_t n = many->flows;
+    double *m = many->inertia;
+    memset(m, 0, (size_t)n * (size_t)n * sizeof *m);
+    for (int32_t k = 0; k < many->inertias; k++) {
+        const double *from = many->inertia_rate[k] ? many->jyd : many->jy;
+        m[many->inertia_row[k] * n + many->inertia_column[k]] += many->inertia_sign[k] * from[many->inertia_entry[k]];
+    }
+    for (int32_t k = 0; k < n; k++) {
+        double own = m[k * n + k];
+        if (own < -1e-9 * fabs(own) || !isfinite(own))
+            return 1;
+    }
+    for (int32_t k = 0; k < n; k++) {
+        double d = m[k * n + k], size = 0.0;
+        for (int32_t i = k; i < n; i++)
+            size = fmax(size, fabs(m[i * n + k]));
+        if (d < -1e-9 * size)
+            return 1;
+        if (d <= 1e-12 * size)
+            continue;
+        for (int32_t i = k + 1; i < n; i++)
+            for (int32_t j = k + 1; j < n; j++)
+                m[i * n + j] -= m[i * n + k] / d * m[k * n + j];
+        for (int32_t i = k + 1; i < n; i++)
+            if (m[i * n + i] < 0.0 && m[i * n + i] > -1e-9 * fabs(m[i * n + k] / d * m[k * n + i]))
+                m[i * n + i] = 0.0; /* round-off */
+    }
+    return 0;
+}
+
+/* points are settled in these magnitudes */
+static void scale(sd_settle *settle, const double *magnitude, double tau)
+{
+    memcpy(settle->scale, magnitude, (size_t)settle->unknowns * sizeof *magnitude);
+    for (int32_t k = 0; k < settle->rates; k++)
+        settle->scale[settle->unknowns + k] = magnitude[settle->rate[k]] / tau;
+}
+
+/* what is left of a zero is zero, in the settler's magnitudes, and what the text gives is what it gives: balances would
+ * be sized by round-off */
+static void clean(const sd_many *many, const double *anchor, double *y, double *yd)
+{
+    const sd_settle *settle = many->start;
+    for (int32_t i = 0; i < settle->unknowns; i++)
+        if (fabs(y[i] - (many->anchored[i] ? anchor[i] : 0.0)) <= NOTHING * settle->scale[i])
+            y[i] = many->anchored[i] ? anchor[i] : 0.0;
+    for (int32_t k = 0; k < settle->rates; k++)
+        if (fabs(yd[settle->rate[k]]) <= NOTHING * settle->scale[settle->unknowns + k])
+            yd[settle->rate[k]] = 0.0;
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+}
+
+/* 1: y, yd settled, the anchored as they were, everything finite, on the root of the nominal start; magnitude: by which,
+ * NULL: those of the nominal start */
+static int settled(sd_many *many, const double *anchor, const double *magnitude, double *y, double *yd)
+{
+    restore(many->region, many->regions);
+    if (magnitude)
+        scale(many->start, magnitude, many->tau);
+    if (sd_settle_point(many->start, many->t0, y, yd) || *many->start->system->stop)
+        return 0;
+    if (!(many->start->contracted <= CONTRACTS))
+        return 0;
+    clean(many, anchor, y, yd);
+    for (int32_t i = 0; i < many->written; i++) {
+        if (!isfinite(y[i]) || !isfinite(yd[i]))
+            return 0;
+        if (many->anchored[i] && !(fabs(y[i] - anchor[i]) <= MOVED * fmax(many->size[i], fabs(anchor[i]))))
+            return 0;
+    }
+    return 1;
+}
+
+/* 1: what the text guesses, if that is not what it guessed at the nominal start, leads to y, yd too */
+static int guessed(sd_many *many, const double *anchor, const double *y, const double *yd)
+{
+    int32_t n = many->written, other = 0;
+    double *a = many->passes[1].y, *b = many->passes[1].start_rate;
+    memcpy(a, y, (size_t)many->passes[0].n * sizeof *y);
+    memcpy(b, yd, (size_t)many->passes[0].n * sizeof *yd);
+    for (int32_t i = 0; i < n; i++)
+        if (many->guessed[i] && anchor[i] != many->guess[i]) {
+            other = 1;
+            a[i] = anchor[i];
+        }
+    if (!other)
+        return 1;
+    if (!settled(many, anchor, NULL, a, b))
+        return 0;
+    for (int32_t i = 0; i < n; i++)
+        if (!(fabs(a[i] - y[i]) <= ALIKE * fmax(many->size[i], fabs(y[i]))))
+            return 0;
+    return 1;
+}
+
+/* magnitudes at this start, as a run of its own finds them (runtime/integrate/origin.py); 1: they cannot be had */
+static int sized(sd_many *many)
+{
+    const sd_pass *pass = &many->passes[0];
+    memset(pass->yd, 0, (size_t)pass->n * sizeof(double));
+    for (int32_t i = 0; i < pass->n; i++)
+        if (pass->differential[i])
+            pass->yd[i] = pass->start_rate[i];
+    sd_jacobian(many->system, many->t0, pass->y, pass->start_rate, many->form_jy, many->form_jyd);
+    return sd_magnitudes(many->sizing, many->system, many->t0, many->t1 - many->t0, pass->y, pass->yd, many->form_jy,
+                         many->form_jyd, pass->yd, many->order, many->found, &many->tau);
+}
+
+/* y, yd of passes[0] := the consistent start with these anchors */
+static int begin(sd_many *many, const double *anchor)
+{
+    double *y = many->passes[0].y, *yd = many->passes[0].start_rate;
+    memset(y, 0, (size_t)many->passes[0].n * sizeof *y);
+    memset(yd, 0, (size_t)many->passes[0].n * sizeof *yd);
+    memcpy(y, many->y0, (size_t)many->written * sizeof *y);
+    memcpy(yd, many->yd0, (size_t)many->written * sizeof *yd);
+    for (int32_t i = 0; i < many->written; i++)
+        if (many->anchored[i])
+            y[i] = anchor[i];
+    if (!settled(many, anchor, NULL, y, yd) || !guessed(many, anchor, y, yd))
+        return SD_MANY_START;
+    sd_jacobian(many->start->system, many->t0, y, yd, many->jy, many->jyd);
+    if (other_pattern(many) || !(many->start->linear->smallest >= VANISHED * many->smallest) || negative_inertia(many))
+        return SD_MANY_STRUCTURE;
+    return sized(many) || !settled(many, anchor, many->found, y, yd) ? SD_MANY_START : SD_MANY_DONE;
+}
+
+/* --- one integration ------------------------------------------------------------------------------------------- */
+
+static void clear_ledgers(sd_ledgers *ledgers)
+{
+    size_t count = (size_t)ledgers->count * sizeof(double), elements = (size_t)ledgers->elements * sizeof(double);
+    double *of_count[] = {ledgers->gross,   ledgers->largest,    ledgers->stored,  ledgers->balance,
+                          ledgers->highest, ledgers->dissipated, ledgers->supplied};
+    double *of_element[] = {ledgers->most, ledgers->value, ledgers->before};
+    for (int k = 0; k < 7; k++)
+        memset(of_count[k], 0, count);
+    for (int k = 0; k < 3; k++)
+        memset(of_element[k], 0, elements);
+    for (int32_t k = 0; k < ledgers->count; k++)
+        ledgers->element[k] = -1;
+    for (int32_t i = 0; i < ledgers->elements; i++)
+        ledgers->inertia[i] = ledgers->inertia[i] == SD_POSITIVE ? SD_INERTIA : ledgers->inertia[i];
+    ledgers->records = 0;
+    ledgers->begun = 0;
+    ledgers->lost = -1;
+}
+
+/* every structure as it was set up, the start of this run in it; last: instants of the run before (NULL: as set up) */
+static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longest, const sd_samples *last)
+{
+    sd_run *run = pass->run;
+    const double *y = many->passes[0].y, *yd = many->passes[0].start_rate;
+    restore(pass->region, pass->regions);
+    if (run->ledgers)
+        clear_ledgers(run->ledgers);
+    memset(run->largest, 0, (size_t)many->observed * sizeof(double));
+    if (pass != many->passes) {
+        memcpy(pass->y, y, (size_t)pass->n * sizeof *y);
+        memcpy(pass->start_rate, yd, (size_t)pass->n * sizeof *yd);
+    }
+    memset(pass->yd, 0, (size_t)pass->n * sizeof *yd);
+    for (int32_t i = 0; i < pass->n; i++)
+        if (pass->differential[i])
+            pass->yd[i] = yd[i];
+    for (int32_t i = 0; i < pass->n; i++)
+        pass->magnitude[i] = fmax(many->found[i], pass->least[i]);
+    scale(run->settle, pass->magnitude, many->tau);
+    if (pass->project)
+        scale(pass->project, pass->magnitude, many->tau);
+    memset(pass->met, 0, (size_t)pass->n * sizeof(double));
+    *pass->rtol = tolerance;
+    *pass->h_max = longest;
+    if (last) {
+        run->instant = last->time;
+        run->instant_kind = many->kind;
+        run->instants = last->number;
+    }
+    run->stepper->start(run->stepper->self, many->t0, pass->y, pass->yd, 0.0);
+}
+
+static void put(const sd_many *many, sd_samples *samples, int32_t at, const double *row)
+{
+    double *value = samples->value + (size_t)at * many->columns, *late = samples->late + (size_t)at * many->columns;
+    samples->time[at] = row[0];
+    for (int32_t q = 0; q < many->columns; q++) {
+        value[q] = row[SD_ROW_HEAD + many->column[q]];
+        late[q] = many->late * fabs(row[SD_ROW_HEAD + many->observed + many->column[q]]);
+        late[q] = isnan(late[q]) ? 0.0 : late[q];
+    }
+}
+
+/* every stride-th row of the trace, the last one behind them (integrate/common_instants.py) */
+static void thin(sd_many *many, sd_samples *own, const double *row)
+{
+    int32_t kept = many->stride * own->number; /* the row that is kept next */
+    many->last_time = row[0];
+    put(many, own, own->number, row);
+    if (many->seen++ != kept)
+        return;
+    if (++own->number <= 2 * MOST)
+        return;
+    for (int32_t k = 0; 2 * k < own->number; k++) {
+        own->time[k] = own->time[2 * k];
+        size_t bytes = (size_t)many->columns * sizeof(double);
+        memmove(own->value + (size_t)k * many->columns, own->value + (size_t)2 * k * many->columns, bytes);
+        memmove(own->late + (size_t)k * many->columns, own->late + (size_t)2 * k * many->columns, bytes);
+    }
+    own->number = (own->number + 1) / 2;
+    many->stride *= 2;
+}
+
+static int holds(int32_t op, double left, double right, double within)
+{
+    switch (op) {
+    case 0:
+        return fabs(left - right) <= within;
+    case 1:
+        return fabs(left - right) > within;
+    case 2:
+    case 3:
+        return op == 3 || within != 0.0 ? left <= right + within : left < right;
+    default:
+        return op == 5 || within != 0.0 ? left >= right - within : left > right;
+    }
+}
+
+static void claim(sd_many *many, const double *row, int last)
+{
+    for (int32_t k = 0; k < many->claims; k++) {
+        const sd_claim *c = &many->claim[k];
+        int here = c->moment == 2 && fabs(row[0] - c->at) <= SAME * fmax(fabs(c->at), 1.0);
+        if (last ? c->moment != 1 : c->moment == 1 || (c->moment == 2 && !here))
+            continue;
+        const double *value = row + SD_ROW_HEAD;
+        if (!holds(c->op, value[c->left], value[c->right], c->within < 0 ? 0.0 : value[c->within]))
+            many->broken = 1;
+        many->judged += c->moment > 0;
+    }
+}
+
+/* rows of the integration so far: what the comparison, the claims and the results want of them */
+static void take(sd_many *many, sd_run *run, sd_samples *own, sd_samples *there)
+{
+    for (int32_t k = 0; k < run->rows; k++) {
+        const double *row = run->row + (size_t)k * (size_t)(SD_ROW_HEAD + 2 * many->observed);
+        int32_t kind = (int32_t)row[1];
+        if ((kind & COMPARED) && there->number < there->room)
+            put(many, there, there->number++, row);
+        if (kind & (TRACE | STEP))
+            claim(many, row, 0);
+        if (!(kind & TRACE))
+            continue;
+        if (!many->known)
+            thin(many, own, row);
+        int32_t number = many->rows++, due = many->thinned < many->thins && many->thin[many->thinned] == number;
+        for (int32_t q = 0; q < many->columns; q++) {
+            double v = row[SD_ROW_HEAD + many->column[q]];
+            many->end[q] = v;
+            if (number == 0 || v < many->least[q])
+                many->least[q] = v;
+            if (number == 0 || v > many->most[q])
+                many->most[q] = v;
+            if (due)
+                many->thick[q * many->thins + many->thinned] = v;
+        }
+        many->thinned += due;
+    }
+    many->held = run->rows;
+    if (*run->stepper->t >= *run->stepper->t_end && run->rows)
+        claim(many, run->row + (size_t)(run->rows - 1) * (size_t)(SD_ROW_HEAD + 2 * many->observed), 1);
+    run->rows = 0;
+}
+
+static void count(sd_many *many, const sd_pass *pass, int64_t sign)
+{
+    for (int k = 0; k < SD_MANY_COUNTERS; k++)
+        many->counted[k] += pass->counter[k] ? sign * *pass->counter[k] : 0;
+}
+
+/* from the start to the end; own: its samples, there: those at instants of the last run */
+static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *there, int64_t *steps)
+{
+    sd_run *run = pass->run;
+    int64_t left = many->max_steps;
+    count(many, pass, -1);
+    own->number = there->number = 0;
+    many->stride = 1;
+    many->seen = many->rows = many->thinned = many->broken = many->judged = 0;
+    for (;;) {
+        int64_t before = *run->stepper->taken;
+        double from = cpu_now();
+        int state = sd_run_advance(run, left, 1e9);
+        many->spent += cpu_now() - from;
+        *steps += *run->stepper->taken - before;
+        left -= *run->stepper->taken - before;
+        take(many, run, own, there);
+        if (state == SD_FINISHED)
+            break;
+        if (state != SD_FULL || left <= 0 || many->keep == SD_MANY_ROWS)
+            return SD_MANY_FAILED;
+    }
+    count(many, pass, 1);
+    if (!many->known && own->number && own->time[own->number - 1] < many->last_time)
+        own->number++; /* the last row stands behind the others already */
+    return run->beyond > BEYOND ? SD_MANY_ACCURACY : SD_MANY_DONE; /* a step passed over something */
+}
+
+/* --- the accuracy ---------------------------------------------------------------------------------------------- */
+
+/* size [columns] of the traced quantities, noise [columns] below which one is zero */
+static void measures(const sd_many *many, const sd_pass *pass, double *size, double *noise, double *unit)
+{
+    const sd_run *run = pass->run;
+    memset(unit, 0, (size_t)many->units * sizeof *unit);
+    for (int32_t i = 0; i < many->written; i++)
+        if (many->unit_of[i] >= 0)
+            unit[many->unit_of[i]] = fmax(unit[many->unit_of[i]], pass->met[i]);
+    for (int32_t q = 0; q < many->columns; q++)
+        unit[many->unit[q]] = fmax(unit[many->unit[q]], run->largest[many->column[q]]);
+    for (int32_t q = 0; q < many->columns; q++) {
+        size[q] = fmax(run->largest[many->column[q]], NOTHING * unit[many->unit[q]]);
+        noise[q] = ROUND_OFF * unit[many->unit[q]];
+    }
+}
+
+/* what a value at a step moves by within the time tolerance: as its rate says, but no faster than BEND times what the
+ * steps beside it show (integrate/accuracy.py) */
+static double lateness(const sd_many *many, const sd_samples *own, int32_t k, int32_t q)
+{
+    double least = INFINITY;
+    size_t columns = (size_t)many->columns;
+    for (int32_t side = k - 1; !many->known && side <= k; side++) {
+        if (side < 0 || side + 1 >= own->number)
+            continue;
+        double rise = own->value[(size_t)(side + 1) * columns + q] - own->value[(size_t)side * columns + q];
+        least = fmin(least, fabs(rise / (own->time[side + 1] - own->time[side])));
+    }
+    return fmin(own->late[(size_t)k * columns + q], BEND * many->late * least);
+}
+
+/* largest relative difference of two runs, and the same over the accuracy wanted */
+static double difference(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine,
+                         double *over)
+{
+    double *size = many->work, *noise = size + many->columns, worst = 0.0;
+    measures(many, pass, size, noise, noise + many->columns);
+    *over = 0.0;
+    if (coarse->number != fine->number)
+        return *over = INFINITY;
+    for (int32_t q = 0; q < many->columns; q++) {
+        double largest = 0.0, apart = 0.0;
+        if (size[q] == 0.0 || isinf(many->target[q]))
+            continue;
+        for (int32_t k = 0; k < fine->number; k++) {
+            size_t at = (size_t)k * many->columns + q;
+            double a = coarse->value[at], b = fine->value[at];
+            double d = fmax(fabs(b - a) - fmax(lateness(many, coarse, k, q), fine->late[at]), 0.0);
+            d = isfinite(a) && isfinite(b) ? d : INFINITY;
+            largest = fmax(largest, fmax(fabs(a), fabs(b)));
+            apart = fmax(apart, d);
+        }
+        if (largest <= noise[q])
+            continue;
+        if (size[q] > UNSEEN * largest)
+            apart = INFINITY; /* it did something between the instants of comparison */
+        apart = isfinite(size[q]) ? apart / size[q] : INFINITY;
+        worst = fmax(worst, apart);
+        *over = fmax(*over, apart / many->target[q]);
+    }
+    return worst;
+}
+
+/* 1: two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it is */
+static int parted(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine)
+{
+    double *size = many->work, *noise = size + many->columns;
+    measures(many, pass, size, noise, noise + many->columns);
+    for (int32_t q = 0; q < many->columns && fine->number; q++) {
+        double most = fabs(fine->value[q]);
+        if (!(most > noise[q]))
+            continue;
+        for (int32_t k = 1; k < fine->number; k++) {
+            size_t at = (size_t)k * many->columns + q;
+            double a = coarse->value[at], b = fine->value[at];
+            if (fabs(b - a) - fine->late[at] > fmax(PARTED * most, MUCH * fmax(fabs(a), fabs(b))))
+                return 1;
+            most = fmax(most, fabs(b));
+        }
+    }
+    return 0;
+}
+
+static double shrink(double power, double step, double far)
+{
+    double ratio = fmax(pow(10.0, -power * step), pow(far, power));
+    return SAFETY * ratio / (1.0 - ratio);
+}
+
+/* 1: every ledger balances */
+static int balanced(const sd_many *many, const sd_ledgers *ledgers)
+{
+    for (int32_t k = 0; ledgers && k < ledgers->count; k++) {
+        double turnover = ledgers->gross[k];
+        for (int32_t i = 0; i < ledgers->elements; i++)
+            turnover += ledgers->of[i] == k ? ledgers->most[i] : 0.0;
+        if (!(ledgers->highest[k] <= many->energy * turnover))
+            return 0;
+    }
+    return 1;
+}
+
+/* of the samples only those at instants of other ones, which are fewer: a draft has no two within a part of a step */
+static void match(const sd_many *many, sd_samples *mine, const sd_samples *other)
+{
+    int32_t n = 0;
+    size_t columns = (size_t)many->columns, bytes = columns * sizeof(double);
+    for (int32_t k = 0; k < mine->number && n < other->number; k++) {
+        if (mine->time[k] != other->time[n])
+            continue;
+        mine->time[n] = mine->time[k];
+        memmove(mine->value + n * columns, mine->value + k * columns, bytes);
+        memmove(mine->late + n * columns, mine->late + k * columns, bytes);
+        n++;
+    }
+    mine->number = n;
+}
+
+/* runs until the last one's estimated error is what was asked: `control` of integrate/accuracy.py */
+static int control(sd_many *many, int64_t *steps, double *estimate)
+{
+    sd_samples *last = &many->sample[0], *own = &many->sample[1], *there = &many->sample[2];
+    double tolerance = many->tolerance[0], next = many->tolerance[1], longest = many->passes[1].longest;
+    double before = -1.0, step_before = 0.0, power = -1.0;
+    int64_t taken = 0, taken_before;
+    /* of a run that is the last one, nobody asks for rows at its own steps */
+    int lean = many->keep == 0 && !many->claims && !many->known;
+    prepare(many, &many->passes[0], tolerance, many->passes[0].longest, NULL);
+    int state = integrate(many, &many->passes[0], last, there, &taken);
+    *steps += taken;
+    int lost = state == SD_MANY_ACCURACY; /* its rows say nothing: the next run is compared with nothing */
+    state = lost ? SD_MANY_DONE : state;
+    if (many->known)
+        last = there, there = &many->sample[0];
+    for (int number = 2; state == SD_MANY_DONE && number <= RUNS; number++) {
+        taken_before = taken;
+        taken = 0;
+        for (int32_t k = 0; !many->known && k < last->number; k++)
+            many->kind[k] = COMPARED | (lean && k == last->number - 1 ? TRACE : 0);
+        prepare(many, &many->passes[1], next, longest, many->known ? NULL : last);
+        many->passes[1].run->every_step = many->passes[1].run->every_step && !lean;
+        state = integrate(many, &many->passes[1], own, there, &taken);
+        *steps += taken;
+        int lost_now = state == SD_MANY_ACCURACY;
+        if (state && !lost_now)
+            return state;
+        state = SD_MANY_DONE;
+        if (many->known)
+            match(many, there, last);
+        double over, apart = difference(many, &many->passes[1], last, there, &over);
+        if (lost || lost_now)
+            apart = over = INFINITY;
+        double step = log10(tolerance / next), part;
+        if (taken == taken_before && apart < ROUND_OFF)
+            return SD_MANY_ACCURACY; /* two runs that took the same steps say nothing */
+        if (before >= 0.0 && over > before)
+            part = 1.0;
+        else {
+            double credit = taken >= SHORT ? many->credit : fmin(many->credit, SHORT_CREDIT);
+            if (before >= 0.0 && over > 0.0 && isfinite(before))
+                power = fmax(0.3, fmin(1.0, log10(before / over) / step_before));
+            part = shrink(power < 0.0 ? credit : fmin(power, credit), step, many->far);
+        }
+        *estimate = apart * part;
+        int away = next > LOOSE && parted(many, &many->passes[1], last, there);
+        if (over * part <= 1.0 && !away) {
+            if (!balanced(many, many->passes[1].run->ledgers))
+                return SD_MANY_ENERGY;
+            int32_t at = 0;
+            for (int32_t k = 0; k < many->claims; k++)
+                at += many->claim[k].moment > 0;
+            return many->broken || many->judged < at ? SD_MANY_CLAIM : SD_MANY_DONE;
+        }
+        if (next <= 1.01 * many->finest)
+            break;
+        if (lean) { /* once more, with the rows that the next one is compared at */
+            lean = 0;
+            number--;
+            taken = taken_before;
+            continue;
+        }
+        lost = lost_now;
+        before = over;
+        step_before = step;
+        double drop = pow(1.0 / fmax(AIM * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
+        tolerance = next;
+        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, power < 0.0 ? LITTLE : LEFT)) * next, many->finest);
+        next = away ? fmin(next, TAME) : next;
+        longest /= STRETCH;
+        sd_samples *swap = last;
+        if (many->known) {
+            last = there;
+            there = swap;
+        } else {
+            last = own;
+            own = swap;
+        }
+    }
+    return state ? state : SD_MANY_ACCURACY;
+}
+
+void sd_many_runs(sd_many *many, int32_t runs, const double *p, const double *anchor, int32_t *state, int64_t *steps,
+                  double *estimate, double *cpu, double *end, double *least, double *most, double *thick)
+{
+    size_t columns = (size_t)many->columns;
+    double from = cpu_now();
+    for (int32_t k = 0; k < runs; k++) {
+        many->end = end + k * columns;
+        many->least = least + k * columns;
+        many->most = most + k * columns;
+        many->thick = thick + k * columns * (size_t)many->thins;
+        many->held = 0;
+        many->spent = 0.0;
+        memset(many->counted, 0, sizeof many->counted);
+        memcpy(many->p, p + (size_t)k * many->parameters, (size_t)many->parameters * sizeof *p);
+        steps[k] = 0;
+        estimate[k] = NAN;
+        state[k] = begin(many, anchor + (size_t)k * many->written);
+        if (state[k] == SD_MANY_DONE)
+            state[k] = control(many, &steps[k], &estimate[k]);
+        double to = cpu_now();
+        cpu[k] = to - from;
+        from = to;
+    }
+}

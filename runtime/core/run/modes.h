@@ -1,0 +1,103 @@
+/* Events that have happened before, without their handler.
+ *
+ * Between events a run is in a mode: which constraints hold, in which sense dry friction slips, which branch each law
+ * has, on which side of zero each relation is.  The handler (runtime/events) finds where an event leads; what it did is
+ * kept as a transition: a mode, what crossed or which samples were due, what was assigned, the mode behind it.  Where
+ * the same happens again the transition is taken, and each condition of the mode behind it is looked at as the handler
+ * would; where one does not hold nothing has been done, and the handler is asked (Lygeros et al. 2003: modes, guards and
+ * resets of hybrid automata).  Instants are located as events/locate.py does, by Ridders' method (1979) on the settled
+ * dense output.
+ */
+#ifndef SYSDYN_MODES_H
+#define SYSDYN_MODES_H
+
+#include "system/assembly.h"
+
+struct sd_run;
+
+enum sd_contact_kind { SD_PSI, SD_FRICTION, SD_PHI, SD_GUARDED, SD_FOLLOWS };
+
+/* What ends a smooth piece: side * observed[row] falls below -tolerance. */
+typedef struct sd_watch {
+    int32_t row, side;
+    double tolerance;
+} sd_watch;
+
+/* The rows of one system that read "multiplier = 0" in a mode: as in assembly.h. */
+typedef struct sd_held {
+    int32_t held, clear;
+    const int32_t *row, *unknown, *slot, *rate, *cleared;
+} sd_held;
+
+typedef struct sd_mode {
+    int32_t watches, first;           /* first: transition from here, -1: none */
+    const int32_t *row, *side, *rate; /* [watches] of block observe; side 1 or -1; row of the rate or -1 */
+    const double *value;              /* [places] of the parameters that a mode fixes */
+    const double *relation;           /* [relations] sides */
+    const int32_t *holds;             /* [contacts] */
+    const sd_held *held;              /* [systems] */
+} sd_mode;
+
+typedef struct sd_transition {
+    int32_t to, next;                 /* next: transition from the same mode, -1: none */
+    int32_t crossed, due, rounds, moves; /* moves 0: nothing but sides change, the step goes on */
+    const int32_t *which, *sample;    /* [crossed] watches, [due] samples, both ascending */
+    const int32_t *end;               /* [rounds] of its assignments */
+    const int32_t *kind, *place, *read; /* [end of the last] 0: a parameter, 1: an unknown; place; row that it becomes */
+    const double *sides;              /* [1 + rounds][relations] once what crossed has changed, and behind each round */
+    int64_t entries;                  /* events that it counts as */
+} sd_transition;
+
+/* rows as in events/plan.py; sense: place in p */
+typedef struct sd_contact {
+    int32_t kind, value, rate, multiplier, bound, guard, sense;
+} sd_contact;
+
+typedef struct sd_kink {
+    int32_t branch, value, rate, above, below;
+} sd_kink;
+
+typedef struct sd_modes {
+    const sd_mode *mode;
+    const sd_transition *transition;
+    int32_t now;                      /* the mode, -1: unknown here */
+    int32_t parameters, places, relations, contacts, kinks, systems, samples, observed, alikes, unknowns;
+    double *p;                        /* [parameters] */
+    const int32_t *place;             /* [places] in p */
+    const int32_t *relation_row, *relation_moves; /* [relations] */
+    const sd_contact *contact;
+    const sd_kink *kink;
+    sd_system *const *system;         /* [systems] whose rows follow */
+    const double *period;             /* [samples] s */
+    int64_t *next;                    /* [samples] number of the next one */
+    double first, segment;            /* s: of the samples, end of the segment */
+    double last, nothing;             /* s: the event before, what is no time behind it */
+    double begin;                     /* s: from here on the last step has not been looked at */
+    double longest;                   /* s: step */
+    double *t_end, *h_max;            /* of the method */
+    double *largest;                  /* [observed] of values and terms, at points asked for */
+    double small, still;              /* of `largest`: zero; of a magnitude: what a state moves by and has not jumped */
+    const int32_t *alike, *alike_end; /* rows of one size, group by group; [alikes] */
+    const int32_t *state;             /* [written] 1: keeps its value across an event */
+    const int32_t *differential, *unnamed; /* [unknowns] 1: has a rate; its size may show when it begins to move */
+    const double *met, *magnitude, *resolved; /* [unknowns] */
+    double unknown_size, round_off;
+    double *rate;                     /* [unknowns] start_rate of the run */
+    double *y, *yd, *before, *before_d, *restart, *restart_d; /* [unknowns], room for what is written and audited */
+    double *values, *low, *high;      /* [observed] */
+    double *p_before, *p_after;       /* [parameters] */
+    int32_t *exact;                   /* [relations] 1: it crosses now, and is zero to the last bit */
+    double *found;                    /* [watches] */
+    int32_t *which;                   /* [watches] */
+    sd_watch *watch;                  /* [watches] */
+    double *log;                      /* [room][width] t, transition, before and after of what was assigned */
+    int64_t left;                     /* events that may still be */
+    int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */
+} sd_modes;
+
+/* What changes within the last step: SD_RUNNING: done; SD_EVENT: the handler is asked; SD_FULL: no room for rows. */
+int sd_modes_event(struct sd_run *run);
+/* What is due where a step has met its end: the same, SD_FINISHED where nothing is due or the handler is asked. */
+int sd_modes_sample(struct sd_run *run);
+
+#endif

@@ -1,0 +1,504 @@
+/* The driver of one integration: see run.h. */
+#define _POSIX_C_SOURCE 199309L
+#include "run/run.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define POLL 4  /* steps between two looks at the clock */
+
+sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
+                   int32_t audited)
+{
+    sd_run *run = calloc(1, sizeof *run);
+    if (!run)
+        return NULL;
+    size_t n = (size_t)(extended > stepper->n ? extended : stepper->n) + 8, m = (size_t)observed + 8;
+    size_t a = (size_t)audited + 8;
+    run->memory = calloc(4 * n + 3 * m + 5 * a, sizeof(double));
+    if (!run->memory) {
+        free(run);
+        return NULL;
+    }
+    run->stepper = stepper;
+    run->settle = settle;
+    run->written = written;
+    run->observed = observed;
+    run->point = run->memory;
+    run->point_d = run->point + n;
+    run->aux = run->point_d + n;
+    run->aux_d = run->aux + n;
+    run->values = run->aux_d + n;
+    run->largest = run->values + m;
+    run->slope = run->largest + m;
+    run->audited = audited;
+    run->power = run->slope + m;
+    run->after = run->power + a;
+    run->sample = run->after + a;
+    run->integral = run->sample + a;
+    run->end = run->integral + a;
+    return run;
+}
+
+void sd_run_free(sd_run *run)
+{
+    if (!run)
+        return;
+    free(run->memory);
+    free(run);
+}
+
+/* out [audited]: kinetic and potential energy, powers dissipated and supplied, the rows of the ledgers */
+static void audit(const sd_run *run, double t, const double *y, const double *yd, double *out)
+{
+    memset(out, 0, (size_t)run->audited * sizeof *out);
+    if (run->audit)
+        run->audit->rows(&run->audit->frame, t, y, yd, out);
+}
+
+/* run->integral += weight * run->sample */
+static void weigh(sd_run *run, double weight)
+{
+    for (int32_t k = 2; k < run->audited; k++)
+        run->integral[k] += weight * run->sample[k];
+}
+
+static void sample(sd_run *run, double t)
+{
+    run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+    audit(run, t, run->aux, run->aux_d, run->sample);
+}
+
+/* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node, and 0 at
+ * the others, by Gauss's rule of degree 3 or 7 */
+static void shares(const sd_stepper *stepper, double to, double *share)
+{
+    static const double gauss[2][4] = {{-0.28867513459481288225, 0.28867513459481288225},
+                                       {-0.43056815579702628761, -0.16999052179242812840, 0.16999052179242812840,
+                                        0.43056815579702628761}};
+    static const double weight[2][4] = {{0.5, 0.5},
+                                        {0.17392742256872692869, 0.32607257743127307131, 0.32607257743127307131,
+                                         0.17392742256872692869}};
+    int high = stepper->nodes > 3, points = stepper->nodes + 1;
+    double node[SD_NODES + 1] = {0.0};
+    memcpy(node + 1, stepper->node, (size_t)stepper->nodes * sizeof *node);
+    for (int k = 0; k < points; k++) {
+        double own = 1.0, sum = 0.0;
+        for (int j = 0; j < points; j++)
+            own *= j == k ? 1.0 : node[k] - node[j];
+        for (int p = 0; p < (high ? 4 : 2); p++) {
+            double s = to * (0.5 + gauss[high][p]), value = weight[high][p];
+            for (int j = 0; j < points; j++)
+                value *= j == k ? 1.0 : s - node[j];
+            sum += value;
+        }
+        share[k] = to * sum / own;
+    }
+}
+
+/* the method's own quadrature over the part `part` of the last step */
+static void integrate_nodes(sd_run *run, double part)
+{
+    const sd_stepper *stepper = run->stepper;
+    double from = run->t_from, h = stepper->length ? *stepper->length : *stepper->t - from, share[SD_NODES + 1];
+    if (part < 1.0) { /* the whole step takes nothing of its start */
+        shares(stepper, part, share);
+        memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
+        weigh(run, h * share[0]);
+    }
+    for (int32_t k = 0; k < stepper->nodes; k++) {
+        double weight = part < 1.0 ? share[k + 1] : stepper->node_weight[k];
+        if (weight == 0.0)
+            continue;
+        if (stepper->show)
+            stepper->show(stepper->self, k, run->aux, run->aux_d);
+        const double *y = stepper->show ? run->aux : stepper->node_y[k];
+        audit(run, from + stepper->node[k] * h, y, stepper->show ? run->aux_d : stepper->node_yd[k], run->sample);
+        weigh(run, h * weight);
+    }
+    for (int32_t k = 2; stepper->moves && k < run->audited; k++)
+        run->integral[k] += stepper->moves[k];
+}
+
+/* run->integral [audited]: of the powers from the start of the last step to `to`, within that step */
+static void integrate(sd_run *run, double to)
+{
+    static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
+    const sd_stepper *stepper = run->stepper;
+    double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from);
+    memset(run->integral, 0, (size_t)run->audited * sizeof(double));
+    run->sampled = 0;
+    if (!run->audit || half == 0.0)
+        return;
+    if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {
+        integrate_nodes(run, to == *stepper->t ? 1.0 : (to - from) / (*stepper->t - from));
+        return;
+    }
+    if (stepper->part_y) {
+        sample(run, to);
+        for (int32_t k = 0; k < stepper->nodes; k++) {
+            audit(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k], run->sample);
+            weigh(run, (to - from) * stepper->node_weight[k]);
+        }
+        for (int32_t k = 2; stepper->part_moves && k < run->audited; k++)
+            run->integral[k] += stepper->part_moves[k];
+        return;
+    }
+    memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
+    weigh(run, half / 6.0);
+    for (int k = -1; k <= 1; k += 2) {
+        sample(run, middle + k * inner * half);
+        weigh(run, 5.0 * half / 6.0);
+    }
+    sample(run, to);
+    weigh(run, half / 6.0);
+    run->sampled = to == *stepper->t;
+}
+
+/* The same where an event ends the step at `to`: Gauss's rule of degree 5, after many nodes 9, on settled points.  Within
+ * a step the stages of what follows from constraints alone (the current of a source) are of lower order than their sum
+ * over it. */
+static void integrate_cut(sd_run *run, double to)
+{
+    static const double node[2][5] = {{-0.77459666924148337704, 0.0, 0.77459666924148337704},
+                                      {-0.90617984593866399280, -0.53846931010568309104, 0.0, 0.53846931010568309104,
+                                       0.90617984593866399280}};
+    static const double weight[2][5] = {{5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0},
+                                        {0.23692688505618908751, 0.47862867049936646804, 0.56888888888888888889,
+                                         0.47862867049936646804, 0.23692688505618908751}};
+    int high = run->stepper->nodes > 3;
+    double half = 0.5 * (to - run->t_from), middle = 0.5 * (to + run->t_from);
+    memset(run->integral, 0, (size_t)run->audited * sizeof(double));
+    for (int k = 0; k < (high ? 5 : 3) && run->audit && half > 0.0; k++) {
+        double t = middle + node[high][k] * half;
+        run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+        sd_settle_point(run->settle, t, run->aux, run->aux_d);
+        audit(run, t, run->aux, run->aux_d, run->sample);
+        weigh(run, half * weight[high][k]);
+    }
+}
+
+/* How far the unknowns of a row within a step lie beyond those of the steps. */
+static void note_beyond(sd_run *run)
+{
+    for (int32_t j = 0; j < run->stepper->n; j++)
+        if (fabs(run->point[j]) > run->beyond * run->magnitude[j] && run->magnitude[j] > 0.0)
+            run->beyond = fabs(run->point[j]) / run->magnitude[j];
+}
+
+/* The row just written once more for the comparison alone, with the slopes of the dense output.  The rates of a settled
+ * point are those of the equations: a motion that relaxes at once makes of any error a rate without bound. */
+static void emit_compared(sd_run *run, double *row)
+{
+    size_t width = (size_t)(SD_ROW_HEAD + 2 * run->observed);
+    int32_t others = (int32_t)row[1] & ~SD_COMPARED;
+    if (others) {
+        memcpy(row + width, row, width * sizeof *row);
+        row[1] = (double)others;
+        row += width;
+        row[1] = SD_COMPARED;
+        run->rows++;
+    }
+    memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
+}
+
+/* The point moved onto the equations; where only runs are compared by it, roughly, or not where states alone are seen. */
+static void settle_row(sd_run *run, double t, int32_t kind)
+{
+    if (kind == SD_COMPARED && run->bare)
+        return;
+    double enough = run->settle->enough;
+    if (kind == SD_COMPARED)
+        run->settle->enough = fmax(enough, run->rough);
+    sd_settle_point(run->settle, t, run->point, run->point_d);
+    run->settle->enough = enough;
+}
+
+/* derivatives at the ends of the last steps as exact as the rows within the last one want them */
+static void refine(sd_run *run)
+{
+    int32_t kinds = 0;
+    for (int32_t k = run->next; k < run->instants && run->instant[k] < run->t_to; k++)
+        kinds |= run->instant_kind[k];
+    if (!kinds)
+        return;
+    double enough = run->settle->enough;
+    if (kinds == SD_COMPARED)
+        run->settle->enough = fmax(enough, run->rough);
+    run->stepper->refine(run->stepper->self, run->settle);
+    run->settle->enough = enough;
+}
+
+/* one output row at an instant of the last step, written as of `label`; two where it is compared too */
+static void emit(sd_run *run, double t, double label, double kind, int at_step)
+{
+    double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
+    double *out = run->end, dissipated = 0.0, supplied = 0.0;
+    if (run->fresh) {
+        memcpy(run->point, run->stepper->y, (size_t)run->stepper->n * sizeof(double));
+        memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
+    } else {
+        if (!at_step) {
+            integrate(run, t);
+            dissipated = run->integral[2];
+            supplied = run->integral[3];
+        }
+        run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    }
+    int compared = !at_step && (int32_t)kind & SD_COMPARED && run->observe_rate;
+    if (compared) {
+        memset(run->slope, 0, (size_t)run->observed * sizeof(double));
+        run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d, run->slope);
+    }
+    if (run->settle)
+        settle_row(run, t, (int32_t)kind);
+    if (run->least_norm)
+        sd_least_norm_apply(run->least_norm, t, run->point, run->point_d);
+    if (run->magnitude && !at_step)
+        note_beyond(run);
+    dissipated = at_step ? run->dissipated : run->step_dissipated + dissipated;
+    supplied = at_step ? run->supplied : run->step_supplied + supplied;
+    audit(run, t, run->point, run->point_d, out);
+    if (!run->started)
+        run->stored = out[0] + out[1];
+    double energy = out[0] + out[1] - run->stored + dissipated - supplied;
+    double constraints = run->settle ? run->settle->constraints : 0.0;
+    double head[SD_ROW_HEAD] = {label, kind, out[0], out[1], dissipated, supplied, energy, constraints};
+    double drift = fmax(run->settle ? run->settle->drift : 0.0, run->projected && run->started ? *run->projected : 0.0);
+    double behind[7] = {energy, out[0], out[1], dissipated, supplied, constraints, drift};
+    memcpy(row, head, sizeof head);
+    for (int k = 0; k < 7; k++)
+        if (run->audit_at[k] >= 0) {
+            run->point[run->audit_at[k]] = behind[k];
+            run->point_d[run->audit_at[k]] = 0.0;
+        }
+    memset(row + SD_ROW_HEAD, 0, 2 * (size_t)run->observed * sizeof *row);
+    if (run->observe)
+        run->observe->rows(&run->observe->frame, t, run->point, run->point_d, row + SD_ROW_HEAD);
+    if (run->observe_rate)
+        run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d,
+                                row + SD_ROW_HEAD + run->observed);
+    memset(run->values, 0, (size_t)run->observed * sizeof(double));
+    if (run->observe_scale)
+        run->observe_scale->rows(&run->observe_scale->frame, t, run->point, run->point_d, run->values);
+    for (int32_t i = 0; i < run->observed; i++) {
+        double size = fmax(fabs(row[SD_ROW_HEAD + i]), fabs(run->values[i]));
+        if (size > run->largest[i])
+            run->largest[i] = size;
+    }
+    run->t_row = label;
+    run->rows++;
+    run->rows_written++;
+    if (compared)
+        emit_compared(run, row);
+}
+
+/* kind of the row at the end of a step, or at the start */
+static double kind_here(const sd_run *run, int asked)
+{
+    int32_t kind = asked ? run->instant_kind[run->next] : 0;
+    kind |= (run->every_step ? 1 : 0) | (run->sample_steps ? 2 : 0);
+    return (double)kind;
+}
+
+/* rows of the last step that are still to be written; 1: no room left */
+int sd_run_drain(sd_run *run)
+{
+    double t = run->t_to;
+    if (run->pending && run->settle && run->stepper->refine)
+        refine(run);
+    while (run->pending) {
+        if (run->rows + 1 >= run->room)
+            return 1;
+        int asked = run->next < run->instants && run->instant[run->next] <= t;
+        if (asked && run->instant[run->next] < t) {
+            if (run->instant[run->next] < run->t_row + run->apart * (t - run->t_from)) {
+                run->next++;
+                continue;
+            }
+            double kind = (double)run->instant_kind[run->next];
+            double instant = run->instant[run->next++];
+            emit(run, instant, instant, kind, 0);
+            continue;
+        }
+        double kind = kind_here(run, asked);
+        if (t == *run->stepper->t_end || t < *run->stepper->t)
+            kind = (double)((int32_t)kind | run->end_kind);
+        run->next += asked;
+        if (kind > 0.0)
+            emit(run, t, t, kind, 1);
+        run->pending = 0;
+    }
+    return 0;
+}
+
+/* The point started from, which `emit` has put into run->point: powers there; rows asked for, as of `label` where the
+ * instant is not earlier. */
+static void rows_of_start(sd_run *run, double label)
+{
+    double t = *run->stepper->t;
+    int32_t before = run->rows;
+    while (run->next < run->instants && run->instant[run->next] < label) {
+        double kind = (double)run->instant_kind[run->next];
+        emit(run, t, run->instant[run->next++], kind, 1);
+    }
+    int asked = run->next < run->instants && run->instant[run->next] <= t;
+    double kind = (double)((int32_t)kind_here(run, asked) | run->start_kind);
+    emit(run, t, label, kind, 1);
+    run->next += asked;
+    while (run->next < run->instants && run->instant[run->next] <= t)
+        run->next++; /* between label and t there is nothing new */
+    if (kind == 0.0 && run->rows > before) {
+        run->rows--; /* nobody asked for it */
+        run->rows_written--;
+    }
+    audit(run, t, run->point, run->point_d, run->after);
+    if (run->ledgers)
+        sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after);
+    run->t_from = run->t_to = t;
+    run->fresh = 0;
+}
+
+/* the start: energies, powers and the first row */
+static int begin(sd_run *run)
+{
+    if (run->rows >= run->room)
+        return 1;
+    run->fresh = 1;
+    rows_of_start(run, *run->stepper->t);
+    run->started = 1;
+    return 0;
+}
+
+void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
+                    const double *before_d)
+{
+    double *old = run->sample, *new = run->end;
+    size_t written = (size_t)run->written * sizeof(double);
+    memcpy(run->aux, before, written);
+    memcpy(run->aux_d, before_d, written);
+    audit(run, run->t_to, run->aux, run->aux_d, old);
+    memcpy(run->aux, y, written);
+    memcpy(run->aux_d, yd, written);
+    audit(run, t, run->aux, run->aux_d, new);
+    run->supplied += (new[0] + new[1]) - (old[0] + old[1]);
+    if (run->ledgers)
+        sd_ledgers_jump(run->ledgers, old, new);
+    run->stepper->start(run->stepper->self, t, y, yd, 0.0);
+    run->fresh = 1;
+    rows_of_start(run, label);
+}
+
+void sd_run_observe(sd_run *run, double t, double *values)
+{
+    run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+    if (run->settle)
+        sd_settle_point(run->settle, t, run->aux, run->aux_d);
+    memset(values, 0, (size_t)run->observed * sizeof *values);
+    run->observe->rows(&run->observe->frame, t, run->aux, run->aux_d, values);
+}
+
+/* whether something watched changes within the last step */
+static int changes(sd_run *run, double from)
+{
+    const sd_stepper *stepper = run->stepper;
+    for (int part = 1; part <= SD_PARTS && run->watches; part++) {
+        double t = part == SD_PARTS ? *stepper->t : from + (*stepper->t - from) * part / SD_PARTS;
+        stepper->dense(stepper->self, t, run->aux, run->aux_d);
+        memset(run->values, 0, (size_t)run->observed * sizeof(double));
+        run->observe->rows(&run->observe->frame, t, run->aux, run->aux_d, run->values);
+        for (int32_t i = 0; i < run->watches; i++)
+            if (run->watch[i].side * run->values[run->watch[i].row] < -run->watch[i].tolerance)
+                return 1;
+    }
+    return 0;
+}
+
+/* quadratures over the step just accepted, powers and balances at its end */
+static void measure(sd_run *run, double from, double t)
+{
+    run->t_from = from;
+    run->t_to = t;
+    run->sampled = 0;
+    run->step_dissipated = run->dissipated;
+    run->step_supplied = run->supplied;
+    if (t < *run->stepper->t && run->settle && !run->stepper->part_y)
+        integrate_cut(run, t);
+    else
+        integrate(run, t);
+    run->dissipated += run->integral[2];
+    run->supplied += run->integral[3];
+    if (run->audit && run->sampled) {
+        memcpy(run->after, run->sample, (size_t)run->audited * sizeof(double));
+    } else if (run->audit) {
+        run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+        audit(run, t, run->aux, run->aux_d, run->after);
+    }
+    if (run->ledgers) {
+        sd_ledgers_add(run->ledgers, run->integral);
+        sd_ledgers_note(run->ledgers, t, run->aux, run->aux_d, run->after);
+    }
+    /* powers at the start of the next step are kept apart until the rows of this one are written */
+    run->pending = 1;
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+int sd_run_accept(sd_run *run, double to, int32_t kind)
+{
+    int32_t before = run->end_kind;
+    memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
+    measure(run, run->t_from, to);
+    run->end_kind |= kind;
+    int full = sd_run_drain(run);
+    run->end_kind = full ? run->end_kind : before;
+    return full;
+}
+
+/* one step, or what happens where one ends */
+static int advance(sd_run *run)
+{
+    double from = *run->stepper->t;
+    if (from >= *run->stepper->t_end)
+        return run->modes && run->modes->samples ? sd_modes_sample(run) : SD_FINISHED;
+    memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
+    if (run->stepper->step(run->stepper->self))
+        return SD_FAILED;
+    run->t_from = from;
+    if (changes(run, from)) {
+        if (!run->modes)
+            return SD_EVENT;
+        run->modes->begin = from;
+        return sd_modes_event(run);
+    }
+    measure(run, from, *run->stepper->t);
+    if (run->ledgers && run->ledgers->lost >= 0)
+        return SD_FAILED;
+    return sd_run_drain(run) ? SD_FULL : SD_RUNNING;
+}
+
+int sd_run_advance(sd_run *run, int64_t steps, double seconds)
+{
+    double until = now() + seconds;
+    if (!run->started && begin(run))
+        return SD_FULL;
+    for (int64_t k = 0; k < steps; k++) {
+        if (run->pending && sd_run_drain(run))
+            return SD_FULL;
+        if (*run->stepper->system->stop)
+            return SD_FAILED;
+        int state = run->modes && run->modes->waits ? sd_modes_event(run) : advance(run);
+        if (state != SD_RUNNING)
+            return state;
+        if (k % POLL == POLL - 1 && now() > until)
+            return SD_RUNNING;
+    }
+    return *run->stepper->t >= *run->stepper->t_end && !run->pending ? SD_FINISHED : SD_RUNNING;
+}

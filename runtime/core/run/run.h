@@ -1,0 +1,90 @@
+/* One integration in chunks: steps, quadratures of the energy balance, values at the instants asked for.
+ *
+ * An output row is [t, kind, kinetic, potential, dissipated, supplied, energy, constraints,
+ *                   observe [observed], observe_rate [observed]]   (SI units; kind, a sum: 1 row of the
+ * trace, 2 accepted step, 4 instant at which runs are compared).  At the instants the dense output is moved onto the
+ * constraints and their hidden derivatives (settle.h), so multipliers and accelerations are as exact as positions.
+ * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt.  The integrals of each accepted step:
+ * where laws are steep by the method's stages, at which they hold, else by the 4-point Gauss-Lobatto rule (exact to
+ * degree 5) on the dense output.
+ * Where an integration restarts after a jump, what T + V gained there was supplied by the impulses that forced it.
+ */
+#ifndef SYSDYN_RUN_H
+#define SYSDYN_RUN_H
+
+#include "system/least_norm.h"
+#include "run/ledgers.h"
+#include "run/modes.h"
+#include "system/settle.h"
+#include "steppers/stepper.h"
+
+#define SD_ROW_HEAD 8
+#define SD_TRACE 1    /* kind of a row of the trace */
+#define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
+#define SD_COMPARED 4 /* kind of a row that runs are compared by (integrate/request.py) */
+
+enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };
+
+typedef struct sd_run {
+    sd_stepper *stepper;
+    sd_settle *settle;
+    sd_least_norm *least_norm;        /* NULL: multipliers are as they come */
+    sd_ledgers *ledgers;              /* NULL: none is kept */
+    int32_t written;                  /* unknowns as written: y of blocks observe, audit */
+    int32_t observed;
+    int32_t audited;                  /* rows of block audit */
+    const sd_call *audit;             /* NULL: no audit block */
+    const sd_call *observe, *observe_rate, *observe_scale;   /* NULL where missing */
+    const int32_t *audit_at;          /* [7] places of energy, kinetic, potential, dissipated, supplied, constraints,
+                                         * drift */
+    const double *instant;            /* [instants] ascending, within the span */
+    const int32_t *instant_kind;      /* [instants] kind of the row */
+    int32_t instants, every_step, sample_steps;
+    int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
+    double rough;                     /* scaled residual that will do for rows by which runs are compared and nothing else */
+    double apart;                     /* part of a step: instants within it that are nearer to the row before are passed
+                                       * over; 0: none is */
+    const double *start_rate;         /* [unknowns] yd at the (re)start, also of what the stepper does not differentiate */
+    double *row;                      /* [room][SD_ROW_HEAD + 2 observed] */
+    int32_t room;
+    /* progress */
+    int32_t rows, next, pending, started, fresh;   /* fresh: at a point started from, no step yet */
+    int32_t sampled;                               /* aux and sample are of the end of the last step */
+    double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
+    double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
+    double t_from, t_row;                          /* t_row: instant of the last row */
+    double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
+                                                        * sample; integrals over the step; of a row */
+    double *point, *point_d, *aux, *aux_d, *values, *largest, *slope, *memory; /* largest [observed]: of observe_scale;
+                                       * slope [observed]: rates of the dense output as it is */
+    int64_t rows_written;
+    double first_energy;
+    /* events */
+    const sd_watch *watch;            /* [watches] */
+    int32_t watches, end_kind;        /* end_kind: kind of the row where a step meets t_end, beside those asked for */
+    int32_t start_kind;               /* the same of the row of a restart */
+    double t_to;                      /* end of what counts of the last step */
+    const double *magnitude;          /* [n] of the unknowns at steps; NULL: not looked at */
+    double beyond;                    /* largest |unknown| of a row within a step, in these magnitudes */
+    const double *projected;          /* drift of the last step before the method itself projected it; NULL: it does not */
+    sd_modes *modes;                  /* NULL: every event goes to its handler */
+} sd_run;
+
+sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
+                   int32_t audited);
+void sd_run_free(sd_run *run);
+/* goes on from y, yd [n] at t with the row of the instant `label`; before [written], before_d: the point at the end of the
+ * last step */
+void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
+                    const double *before_d);
+/* the last step counts up to `to`, where a row of kind `kind` is written beside those asked for; after SD_EVENT.  1: the
+ * rows are full, `sd_run_drain` goes on */
+int sd_run_accept(sd_run *run, double to, int32_t kind);
+int sd_run_drain(sd_run *run);
+/* values [observed] of block observe at t within the last step, settled */
+void sd_run_observe(sd_run *run, double t, double *values);
+/* steps until `steps` more are taken, `seconds` are over, the rows are full, the end, a failure, or a step within which
+ * something watched changes (SD_EVENT: the step is not counted yet, see sd_run_accept) */
+int sd_run_advance(sd_run *run, int64_t steps, double seconds);
+
+#endif

@@ -1,0 +1,315 @@
+#include "start/search.h"
+
+#include "linear/dense.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EMPTY 1e-160
+#define RANK 1e-11
+#define GRANTED 3.6e9
+#define ITERATIONS 40
+#define EVALUATION 1e6
+#define EACH 40.0
+#define HALVINGS 12
+#define LOST 3
+#define ROUND_OFF 2e-15
+#define BESIDE 1e-8
+
+static void expand(const sd_rows_of_start *s, const double *x, double *y, double *yd)
+{
+    memset(y, 0, (size_t)s->extended * sizeof *y);
+    memset(yd, 0, (size_t)s->extended * sizeof *yd);
+    memcpy(y, x, (size_t)s->written * sizeof *y);
+    for (int32_t k = 0; k < s->rates; k++)
+        yd[s->rate[k]] = x[s->written + k];
+    for (int32_t k = 0; k < s->kinematics; k++)
+        yd[s->k_q[k]] = y[s->k_f[k]];
+}
+
+int sd_start_residual(const sd_rows_of_start *s, double t, const double *x, double *r)
+{
+    double *y = malloc(2 * (size_t)s->extended * sizeof *y + 8);
+    if (!y)
+        return -2;
+    expand(s, x, y, y + s->extended);
+    sd_residual(s->system, t, y, y + s->extended, r);
+    for (int32_t k = 0; k < s->missed; k++)
+        r[s->miss[k]] -= x[s->written + s->rates + k];
+    free(y);
+    return 0;
+}
+
+int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, double *values)
+{
+    int32_t entries = s->system->entries;
+    double *y = malloc((2 * (size_t)s->extended + (size_t)entries + 1) * sizeof *y);
+    if (!y)
+        return -2;
+    double *jyd = y + 2 * (size_t)s->extended;
+    expand(s, x, y, y + s->extended);
+    sd_jacobian(s->system, t, y, y + s->extended, values, jyd);
+    for (int32_t k = 0; k < s->rated; k++)
+        values[entries + k] = jyd[s->entry[k]];
+    for (int32_t k = 0; k < s->missed; k++)
+        values[entries + s->rated + k] = -1.0;
+    free(y);
+    return 0;
+}
+
+int sd_start_scale(const sd_rows_of_start *s, const double *nominal, const int32_t *rated, const int32_t *member,
+                   int32_t members, double t, const double *x, int32_t flags, double *scale)
+{
+    size_t rows = (size_t)s->balance.rows;
+    double *r = malloc((rows + (size_t)s->balance.entries + 1) * sizeof *r);
+    if (!r)
+        return -2;
+    int failed = sd_start_residual(s, t, x, r) | sd_start_jacobian(s, t, x, r + rows);
+    if (!failed)
+        failed = sd_scale(&s->balance, nominal, s->written, rated, member, members, x, r + rows, r, flags, scale);
+    free(r);
+    return failed;
+}
+
+int sd_start_sizes(const sd_rows_of_start *s, double t, const double *x, const double *scale, double *size)
+{
+    const sd_balance *m = &s->balance;
+    double *values = malloc(((size_t)m->entries + 1) * sizeof *values);
+    if (!values)
+        return -2;
+    int failed = sd_start_jacobian(s, t, x, values);
+    memset(size, 0, (size_t)m->rows * sizeof *size);
+    for (int32_t e = 0; e < m->entries; e++) {
+        double of = fabs(x[m->column[e]]);
+        size[m->row[e]] += fabs(values[e]) * (scale[m->column[e]] >= of || isnan(scale[m->column[e]]) ? scale[m->column[e]] : of);
+    }
+    free(values);
+    return failed;
+}
+
+/* What one iteration needs; the arrays of one block of memory. */
+typedef struct {
+    int32_t rows, unknowns;                       /* in use, free */
+    int32_t *row_at, *column_at;                  /* [all rows], [all unknowns] number among these, or -1 */
+    double *values, *unit, *row_scale;            /* [entries], [all unknowns], [all rows] */
+    double *a, *work, *aim, *size;                /* [rows, unknowns] twice, [all rows] twice */
+    double *u, *target, *tried, *r, *scaled;      /* [all unknowns] thrice, [all rows] twice */
+} room;
+
+static int32_t numbers(int32_t count, const int32_t *use, int32_t *at)
+{
+    int32_t found = 0;
+    for (int32_t k = 0; k < count; k++)
+        at[k] = use[k] ? found++ : -1;
+    return found;
+}
+
+/* the linearised rows at x, of the size of their terms, in scaled unknowns: w->a; w->row_scale */
+static void linearise(const sd_search *s, const double *x, room *w)
+{
+    const sd_balance *m = &s->start->balance;
+    sd_start_jacobian(s->start, s->t, x, w->values);
+    memset(w->size, 0, (size_t)m->rows * sizeof *w->size);
+    memset(w->a, 0, (size_t)w->rows * (size_t)w->unknowns * sizeof *w->a);
+    for (int32_t e = 0; e < m->entries; e++) {
+        if (!s->use[m->row[e]] || !s->free[m->column[e]] || !isfinite(w->values[e]))
+            w->values[e] = 0.0;
+        w->size[m->row[e]] += fabs(w->values[e]) * s->scale[m->column[e]];
+    }
+    for (int32_t r = 0; r < m->rows; r++)
+        w->row_scale[r] = w->size[r] > 0.0 ? 1.0 / w->size[r] : 1.0;
+    for (int32_t e = 0; e < m->entries; e++)
+        if (w->values[e] != 0.0) {
+            int32_t i = w->row_at[m->row[e]], j = w->column_at[m->column[e]];
+            w->a[(size_t)i * w->unknowns + j] += w->values[e] * w->unit[m->column[e]] * w->row_scale[m->row[e]];
+        }
+}
+
+/* largest scaled row at x; w->scaled */
+static double measure(sd_search *s, const double *x, room *w, double *norm)
+{
+    int32_t rows = s->start->balance.rows;
+    double largest = 0.0, sum = 0.0;
+    s->spent += EVALUATION + EACH * s->start->balance.entries;
+    sd_start_residual(s->start, s->t, x, w->r);
+    for (int32_t r = 0; r < rows; r++) {
+        w->scaled[r] = s->use[r] ? w->r[r] * w->row_scale[r] : 0.0;
+        double size = fabs(w->scaled[r]);
+        largest = size > largest || isnan(size) ? size : largest;
+        sum += size * size;
+    }
+    *norm = sqrt(sum);
+    return isfinite(largest) ? largest : INFINITY;
+}
+
+/* target [unknowns]: the u of least norm with a u = a u_now - rows; beside: the step of least norm, added to u_now */
+static int nearest(const sd_search *s, room *w, int beside)
+{
+    int32_t m = w->rows, n = w->unknowns, all = s->start->balance.rows;
+    for (int32_t r = 0; r < all; r++) {
+        int32_t i = w->row_at[r];
+        if (i < 0)
+            continue;
+        const double *a = w->a + (size_t)i * n;
+        double aim = -w->scaled[r], most = 0.0, sum = 0.0;
+        for (int32_t j = 0; j < n && !beside; j++)
+            aim += a[j] * w->u[j];
+        for (int32_t j = 0; j < n; j++)
+            most = isfinite(a[j]) ? fmax(most, fabs(a[j])) : INFINITY;
+        if (!isfinite(most) || !isfinite(aim))
+            return -1;
+        /* by a power of two before squares are formed, which could overflow; then rows of equal size */
+        int exponent;
+        frexp(most > EMPTY ? most : 1.0, &exponent);
+        double power = ldexp(1.0, exponent);
+        for (int32_t j = 0; j < n; j++) {
+            double v = a[j] / power;
+            w->work[(size_t)i * n + j] = v;
+            sum += v * v;
+        }
+        double size = sum > 0.0 ? sqrt(sum) : 1.0;
+        for (int32_t j = 0; j < n; j++)
+            w->work[(size_t)i * n + j] /= size;
+        w->aim[i] = aim / power / size;
+    }
+    int failed = sd_nearest(m, n, w->work, w->aim, RANK, w->target);
+    for (int32_t j = 0; j < n && beside; j++)
+        w->target[j] += w->u[j];
+    return failed;
+}
+
+static int used(const sd_search *s, const double *r)
+{
+    for (int32_t k = 0; k < s->start->balance.rows; k++)
+        if (s->use[k] && !isfinite(r[k]))
+            return 0;
+    return 1;
+}
+
+static void count(sd_search *s, const room *w)
+{
+    double rows = w->rows, unknowns = w->unknowns, entries = s->start->balance.entries;
+    double whole = 15.0 * rows * unknowns * fmin(rows, unknowns) + EVALUATION + EACH * entries;
+    s->largest = fmax(s->largest, whole);
+    s->spent += whole;
+}
+
+static void iterate(sd_search *s, room *w, double *x)
+{
+    size_t all = (size_t)s->start->balance.unknowns, rows = (size_t)s->start->balance.rows;
+    int stale = 0, taken = 0, lost = 0;
+    for (int k = 0; k < s->most + s->folds && taken != s->most && lost != LOST; k++) {
+        taken++;
+        linearise(s, x, w);
+        count(s, w);
+        double norm, size = measure(s, x, w, &norm);
+        if (size < s->residual) {
+            stale = size > 0.5 * s->residual ? stale : 0;
+            memcpy(s->x, x, all * sizeof *x);
+            s->residual = size;
+            for (size_t r = 0; r < rows; r++)
+                s->scaled[r] = fabs(w->scaled[r]);
+        }
+        stale++;
+        if (size <= ROUND_OFF || !isfinite(size) || stale > (s->residual < 1e-12 ? 4 : 15))
+            break;
+        if (s->spent > s->share * fmax(GRANTED, ITERATIONS * s->largest))
+            break;
+        for (size_t c = 0; c < all; c++)
+            if (w->column_at[c] >= 0)
+                w->u[w->column_at[c]] = (x[c] - s->guess[c]) / w->unit[c];
+        if (nearest(s, w, size < BESIDE && stale > 1))
+            break;
+        int good = 1;
+        for (int32_t j = 0; j < w->unknowns; j++)
+            good &= isfinite(w->target[j]);
+        if (!good)
+            break;
+        double step = 1.0, now = INFINITY;
+        int halvings = 0;
+        for (; halvings < HALVINGS; halvings++, step *= 0.5) {
+            memcpy(w->tried, x, all * sizeof *x);
+            for (size_t c = 0; c < all; c++)
+                if (w->column_at[c] >= 0)
+                    w->tried[c] += step * (w->target[w->column_at[c]] - w->u[w->column_at[c]]) * w->unit[c];
+            measure(s, w->tried, w, &now);
+            if (isfinite(now) && now <= fmax((1.0 - 0.1 * step) * norm, 1e-11))
+                break;
+        }
+        lost = halvings < HALVINGS ? 0 : lost + 1;
+        if (s->residual >= 1e-12 && now <= 0.5 * norm) { /* rows that shrink as fast as their terms do */
+            stale = 0;
+            taken--;
+        }
+        if (!used(s, w->r))
+            break;
+        memcpy(x, w->tried, all * sizeof *x);
+    }
+}
+
+int sd_search_solve(sd_search *s)
+{
+    const sd_balance *m = &s->start->balance;
+    size_t all = (size_t)m->unknowns, rows = (size_t)m->rows, entries = (size_t)m->entries;
+    room w;
+    int32_t *at = malloc((rows + all + 1) * sizeof *at);
+    if (!at)
+        return -2;
+    w.row_at = at;
+    w.column_at = at + rows;
+    w.rows = numbers(m->rows, s->use, w.row_at);
+    w.unknowns = numbers(m->unknowns, s->free, w.column_at);
+    size_t full = (size_t)w.rows * (size_t)w.unknowns;
+    double *memory = malloc((entries + 5 * all + 5 * rows + 2 * full + 1) * sizeof *memory);
+    if (!memory) {
+        free(at);
+        return -2;
+    }
+    w.values = memory;
+    w.unit = w.values + entries;
+    w.row_scale = w.unit + all;
+    w.a = w.row_scale + rows;
+    w.work = w.a + full;
+    w.aim = w.work + full;
+    w.size = w.aim + rows;
+    w.u = w.size + rows;
+    w.target = w.u + all;
+    w.tried = w.target + all;
+    w.r = w.tried + all;
+    w.scaled = w.r + rows;
+    double *x = w.scaled + rows;
+    for (size_t c = 0; c < all; c++)
+        w.unit[c] = s->scale[c] / s->weight[c];
+    memcpy(x, s->x, all * sizeof *x);
+    s->residual = INFINITY;
+    for (size_t r = 0; r < rows; r++)
+        s->scaled[r] = INFINITY;
+    iterate(s, &w, x);
+    free(memory);
+    free(at);
+    return 0;
+}
+
+int sd_search_measure(sd_search *s)
+{
+    const sd_balance *m = &s->start->balance;
+    size_t rows = (size_t)m->rows;
+    double *size = calloc(rows + (size_t)m->entries + 1, sizeof *size);
+    if (!size)
+        return -2;
+    double *values = size + rows;
+    int failed = sd_start_jacobian(s->start, s->t, s->x, values) | sd_start_residual(s->start, s->t, s->x, s->scaled);
+    for (int32_t e = 0; e < m->entries; e++)
+        if (s->use[m->row[e]] && s->free[m->column[e]] && isfinite(values[e]))
+            size[m->row[e]] += fabs(values[e]) * s->scale[m->column[e]];
+    s->residual = 0.0;
+    for (size_t r = 0; r < rows; r++) {
+        double scaled = s->use[r] ? fabs(s->scaled[r] * (size[r] > 0.0 ? 1.0 / size[r] : 1.0)) : 0.0;
+        s->scaled[r] = scaled;
+        s->residual = scaled > s->residual || isnan(scaled) ? scaled : s->residual;
+    }
+    s->residual = isfinite(s->residual) ? s->residual : INFINITY;
+    free(size);
+    return failed;
+}

@@ -1,0 +1,54 @@
+/* The search for a start on small models: rows of the settled form in few unknowns, by Gauss-Newton steps of least norm.
+ *
+ * What runtime/numerics/least_change.py does for a Problem and runtime/start/starter.py for its rows, on full matrices;
+ * every constant is that file's.
+ */
+#ifndef SYSDYN_SEARCH_H
+#define SYSDYN_SEARCH_H
+
+#include "system/assembly.h"
+#include "start/magnitudes.h"
+
+/* The equations of a start.  Unknowns x [unknowns] = y as written, the derivatives that occur, what guesses miss. */
+typedef struct sd_rows_of_start {
+    sd_system *system;                /* form "start" */
+    sd_balance balance;               /* of all entries: those of the system, of rates, of what is missed */
+    int32_t written, rates, missed;
+    int32_t rated;                    /* entries of the system whose unknown has a derivative among the rates */
+    int32_t kinematics;
+    const int32_t *rate;              /* [rates] place in y */
+    const int32_t *entry;             /* [rated] place in the system's pattern */
+    const int32_t *miss;              /* [missed] row */
+    const int32_t *k_q, *k_f;         /* [kinematics] places of displacements and of their flows */
+    int32_t extended;                 /* length of y as blocks see it */
+} sd_rows_of_start;
+
+/* r [rows]; values [entries] */
+int sd_start_residual(const sd_rows_of_start *start, double t, const double *x, double *r);
+int sd_start_jacobian(const sd_rows_of_start *start, double t, const double *x, double *values);
+
+/* scale [unknowns]: as sd_scale, at x; -2: no memory */
+int sd_start_scale(const sd_rows_of_start *start, const double *nominal, const int32_t *rated, const int32_t *member,
+                   int32_t members, double t, const double *x, int32_t flags, double *scale);
+
+/* size [rows] := sum of |slope| times the larger of scale and |x| over the entries of each row; -2: no memory */
+int sd_start_sizes(const sd_rows_of_start *start, double t, const double *x, const double *scale, double *size);
+
+/* One problem: rows `use` in the unknowns `free`, which move from the guess by scale / weight. */
+typedef struct sd_search {
+    const sd_rows_of_start *start;
+    const int32_t *use, *free;                      /* [rows], [unknowns] */
+    const double *guess, *scale, *weight;           /* [unknowns] */
+    double t;
+    int32_t most, folds;                            /* iterations; those not counted while rows shrink as their terms do */
+    double share, spent, largest;                   /* of the work (least_change.Work) */
+    double *x, *scaled;                             /* [unknowns], [rows]: the best point, from x, and its scaled rows */
+    double residual;                                /* the largest of them */
+} sd_search;
+
+/* 0; -2: no memory */
+int sd_search_solve(sd_search *search);
+/* the scaled rows at search->x and the largest of them, of a problem of any size */
+int sd_search_measure(sd_search *search);
+
+#endif

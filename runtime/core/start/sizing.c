@@ -1,0 +1,301 @@
+#include "start/sizing.h"
+
+#include "linear/linear.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ROUND_OFF 1e-12 /* of the largest of the same unit: smaller ones are what is left of a zero */
+#define NOTHING 1e-14   /* of the largest of the same kind and unit: less is what arithmetic leaves of a zero */
+#define FRESH 1e-9      /* of what a rate makes of a quantity in the time scale so far: a start below it is round-off */
+#define UNKNOWN 1.0     /* magnitude of what is zero with all that could size it (scales.py) */
+#define GROUP 1e-3      /* of their like: the least that zeros count as (scales.py) */
+#define PART 1e-2       /* of the span: the time scale at most */
+#define NOISE 1e-6      /* values below this part of what balances their rows are round-off, or zero by chance */
+#define QUIET 1e-9      /* efforts below this part of (largest energy) / q are round-off, and flows of their like */
+#define TINY (DBL_MIN * 1e30) /* less is no magnitude */
+
+/* most [kinds] := the largest of each kind and unit */
+static void group_largest(const sd_balance *b, const double *x, double *most)
+{
+    memset(most, 0, (size_t)b->kinds * sizeof *most);
+    for (int32_t k = 0; k < b->unknowns; k++)
+        most[b->kind[k]] = sd_larger(most[b->kind[k]], x[k]);
+}
+
+int sd_relaxed(const sd_system *system, const int32_t *order, int32_t rungs, const double *rung, const double *jy,
+               const double *jyd, const double *yd, double tau, double *far)
+{
+    int32_t n = system->unknowns, rows = system->rows, entries = system->entries, still = 1;
+    for (int32_t k = 0; k < n; k++) {
+        far[k] = tau * fabs(yd[k]);
+        still &= yd[k] == 0.0;
+    }
+    if (still || sd_first_bad(entries, jy) >= 0 || sd_first_bad(entries, jyd) >= 0)
+        return 0;
+    double *memory = calloc(2 * (size_t)rows + (size_t)n + (size_t)entries + 1, sizeof(double));
+    sd_linear *linear = sd_linear_new(n, system->column, system->row, order);
+    if (!memory || !linear) {
+        free(memory);
+        sd_linear_free(linear);
+        return -1;
+    }
+    double *push = memory, *step = push + rows, *moved = step + rows, *values = moved + n;
+    for (int32_t j = 0; j < n; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            push[system->row[e]] += jyd[e] * yd[j];
+    for (int32_t k = 0; k < rungs; k++) {
+        double h = tau * rung[k];
+        for (int32_t e = 0; e < entries; e++)
+            values[e] = jy[e] + jyd[e] / h;
+        if (sd_linear_factor(linear, values, NULL) == 0) {
+            memcpy(step, push, (size_t)rows * sizeof *step);
+            sd_linear_solve(linear, step);
+            for (int32_t i = 0; i < n; i++)
+                moved[i] = fmax(moved[i], fabs(step[i]));
+        } else {
+            memcpy(moved, far, (size_t)n * sizeof *moved);
+        }
+    }
+    for (int32_t i = 0; i < n; i++)
+        far[i] = isfinite(moved[i]) ? sd_smaller(moved[i], far[i]) : far[i];
+    sd_linear_free(linear);
+    free(memory);
+    return 0;
+}
+
+/* the shortest of: a part of the span, y / y', sqrt(q / f'), what moves with t; size [n], most [kinds]: room */
+static double time_scale(const sd_sizing *s, const sd_system *system, double span, double quick, const double *y,
+                         const double *yd, double *size, double *most)
+{
+    const sd_balance *b = s->balance;
+    double found = sd_smaller(PART * span, quick), least = INFINITY;
+    for (int32_t k = 0; k < b->unknowns; k++)
+        size[k] = fabs(y[k]);
+    group_largest(b, size, most);
+    for (int32_t k = 0; k < b->unknowns; k++) {
+        double rate = fabs(yd[k]);
+        size[k] = most[b->kind[k]];
+        /* values that are nothing beside what their rate makes of them are round-off */
+        if ((s->kind[k] & SD_STATE) && size[k] > FRESH * rate * found && rate > 0.0)
+            least = sd_smaller(least, size[k] / rate);
+    }
+    found = least < found ? least : found;
+    least = INFINITY;
+    for (int32_t k = 0; k < system->kinematics; k++) {
+        double q = size[system->k_q[k]], rate = fabs(yd[system->k_f[k]]);
+        if (q > 0.0 && rate > 0.0)
+            least = sd_smaller(least, sqrt(q / rate));
+    }
+    return least < found ? least : found;
+}
+
+/* own [n] := the largest |value| among the entries of each unknown */
+static void own_entries(const sd_sizing *s, int which, const double *value, double *own)
+{
+    const sd_balance *b = s->balance;
+    memset(own, 0, (size_t)b->unknowns * sizeof *own);
+    for (int32_t k = 0; k < s->owns[which]; k++) {
+        int32_t e = s->own[which][k], c = b->column[e];
+        own[c] = sd_larger(own[c], fabs(value[e]));
+    }
+}
+
+/* sd_compliance; room [3 n + kinds] */
+static void compliance(const sd_sizing *s, const double *jy, const double *jyd, double *divisor, double *room)
+{
+    const sd_balance *b = s->balance;
+    int32_t n = b->unknowns;
+    double *inertia = room, *one = inertia + n, *other = one + n, *plain = other + n;
+    own_entries(s, 0, jyd, inertia);
+    own_entries(s, 2, jy, one);
+    own_entries(s, 3, jy, other);
+    for (int32_t k = 0; k < n; k++)
+        if ((s->kind[k] & SD_MOMENTUM) && s->partner[k] >= 0) {
+            int32_t f = s->partner[k];
+            inertia[f] = sd_larger(inertia[f], other[k] > 0.0 ? one[f] / other[k] : 0.0);
+        }
+    own_entries(s, 1, jy, one); /* stiffness */
+    memset(plain, 0, (size_t)b->kinds * sizeof *plain);
+    for (int32_t k = 0; k < n; k++) {
+        int moved = s->kind[k] & SD_DISPLACEMENT, carried = (s->kind[k] & SD_MOMENTUM) && s->partner[k] >= 0;
+        divisor[k] = moved ? 1.0 / one[k] : carried ? inertia[s->partner[k]] : 1.0;
+        if ((moved || carried) && !(divisor[k] > 0.0 && isfinite(divisor[k])))
+            plain[b->kind[k]] = 1.0;
+    }
+    for (int32_t k = 0; k < n; k++)
+        divisor[k] = plain[b->kind[k]] > 0.0 ? 1.0 : divisor[k];
+}
+
+int sd_compliance(const sd_sizing *s, const double *jy, const double *jyd, double *divisor)
+{
+    double *room = malloc((3 * (size_t)s->balance->unknowns + (size_t)s->balance->kinds + 1) * sizeof *room);
+    if (!room)
+        return -1;
+    compliance(s, jy, jyd, divisor, room);
+    free(room);
+    return 0;
+}
+
+/* flows at rest, and not accelerated but by round-off: a small part of what would move their q in the span; least
+ * [kinematics]: room */
+static void flows(const sd_system *system, double span, double *found, double *least)
+{
+    for (int32_t k = 0; k < system->kinematics; k++) {
+        least[k] = 0.1 * found[system->k_q[k]] / (span != 0.0 ? span : 1.0);
+        least[k] = found[system->k_f[k]] < NOISE * least[k] ? GROUP * least[k] : -1.0;
+    }
+    for (int32_t k = 0; k < system->kinematics; k++)
+        if (least[k] >= 0.0)
+            found[system->k_f[k]] = least[k];
+}
+
+/* what is not zero at the start counts as it is, zeros as what they move, GROUP of their like at least */
+static void known_sizes(const sd_sizing *s, const sd_system *system, const double *y, const double *divisor,
+                        double *moves, double *known, double *most)
+{
+    const sd_balance *b = s->balance;
+    int32_t n = b->unknowns;
+    for (int32_t k = 0; k < n; k++)
+        known[k] = sd_larger(fabs(y[k]), moves[k]);
+    group_largest(b, known, most);
+    for (int32_t k = 0; k < system->kinematics; k++) { /* rates that are round-off */
+        int32_t f = system->k_f[k];
+        if (fabs(y[f]) < QUIET * sd_larger(known[f], GROUP * most[b->kind[f]]))
+            moves[system->k_q[k]] = 0.0;
+    }
+    for (int32_t k = 0; k < n; k++)
+        known[k] = sd_larger(fabs(y[k]), moves[k]) / divisor[k];
+    group_largest(b, known, most);
+    for (int32_t k = 0; k < n; k++) {
+        double largest = divisor[k] * most[b->kind[k]], own = sd_larger(fabs(y[k]), moves[k]);
+        known[k] = fabs(y[k]) > NOTHING * largest ? own : sd_larger(own, GROUP * largest);
+        known[k] = s->nominal[k] > 0.0 ? s->nominal[k] : known[k];
+    }
+}
+
+/* excited [rows] := at least the effort that counts in each row of dynamics, by what stands in the row [rows] */
+static void efforts(const sd_sizing *s, const double *found, const double *row, double *excited)
+{
+    double most = 0.0;
+    for (int32_t k = 0; k < s->efforts; k++)
+        most = sd_larger(most, row[s->effort[k]] * found[s->moved[k]]);
+    for (int32_t k = 0; k < s->efforts; k++) {
+        double q = found[s->moved[k]];
+        excited[s->effort[k]] = sd_larger(excited[s->effort[k]], QUIET * most / (q > 0.0 ? q : INFINITY));
+    }
+}
+
+/* found [n]: what is too small beside what balances the rows is taken from these; size [entries], excited [rows]; kept [n],
+ * balanced [n], row [rows]: room */
+static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *size, double *excited, double *found,
+                          double *kept, double *balanced, double *row)
+{
+    const sd_balance *b = s->balance;
+    int32_t n = b->unknowns;
+    /* what round-off leaves of a zero is nothing beside what the sources will make of it */
+    memset(balanced, 0, (size_t)n * sizeof *balanced);
+    char *small = sd_small(b, size);
+    if (!small)
+        return -1;
+    int failed = sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
+    for (int32_t k = 0; k < n; k++)
+        found[k] = carries[k] && found[k] < ROUND_OFF * balanced[k] ? balanced[k] : found[k];
+    /* momenta and dynamic variables are balanced against flows, what follows from the state against all of it */
+    for (int32_t k = 0; k < n; k++)
+        balanced[k] = carries[k] && (s->kind[k] & (SD_DISPLACEMENT | SD_FLOW)) ? found[k] : 0.0;
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_LARGEST | SD_CAPPED, balanced);
+    for (int32_t k = 0; k < n; k++) {
+        int whole = !(s->kind[k] & (SD_MOMENTUM | SD_DYNAMIC)) || found[k] > NOISE * balanced[k];
+        found[k] = whole ? found[k] : balanced[k];
+        balanced[k] = kept[k] = carries[k] ? found[k] : 0.0;
+    }
+    memcpy(row, excited, (size_t)b->rows * sizeof *row);
+    for (int32_t e = 0; e < b->entries; e++)
+        row[b->row[e]] = sd_larger(row[b->row[e]], size[e] * kept[b->column[e]]);
+    efforts(s, found, row, excited);
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
+    free(small);
+    for (int32_t k = 0; k < n; k++)
+        found[k] = found[k] > NOISE * balanced[k] ? found[k] : balanced[k];
+    return failed;
+}
+
+/* which unknowns carry the state: of flows those with inertia, or a momentum */
+static void carriers(const sd_sizing *s, const double *jyd, int32_t *carries)
+{
+    const sd_balance *b = s->balance;
+    for (int32_t k = 0; k < b->unknowns; k++)
+        carries[k] = (s->kind[k] & SD_STATE) && (!(s->kind[k] & SD_FLOW) || (s->kind[k] & SD_OF_MOMENTUM));
+    for (int32_t e = 0; e < b->entries; e++)
+        if (jyd[e] != 0.0 && (s->kind[b->column[e]] & SD_STATE))
+            carries[b->column[e]] = 1;
+}
+
+int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span, const double *y, const double *yd,
+                  const double *jy, const double *jyd, const double *rate, const int32_t *order, double *found,
+                  double *tau)
+{
+    const sd_balance *b = s->balance;
+    size_t n = (size_t)b->unknowns, rows = (size_t)b->rows, entries = (size_t)b->entries, kinds = (size_t)b->kinds;
+    double *memory = calloc(7 * n + 3 * rows + 3 * entries + 2 * kinds + (size_t)system->kinematics + 3, sizeof(double));
+    int32_t *carries = calloc(n + 1, sizeof *carries);
+    if (!memory || !carries) {
+        free(memory);
+        free(carries);
+        return -1;
+    }
+    double *moves = memory, *divisor = moves + n, *kept = divisor + n, *room = kept + n; /* room [3 n + kinds] */
+    double *most = room + 3 * n + kinds, *balanced = most + kinds, *excited = balanced + n, *row = excited + rows;
+    double *own_jy = row + 2 * rows, *own_jyd = own_jy + entries + 1, *size = own_jyd + entries + 1;
+    double *least = size + entries;
+    double quick = sd_excitation(system, t0, t0 + span - t0, y, yd, s->part, s->parts, NOISE, excited);
+    *tau = time_scale(s, system, span, quick, y, yd, room, most);
+    sd_jacobian(system, t0, y, yd, own_jy, own_jyd);
+    carriers(s, own_jyd, carries);
+    int failed = quick < 0.0;
+    if (rate)
+        failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
+    for (size_t k = 0; k < n; k++)
+        moves[k] = !carries[k] ? 0.0 : rate ? moves[k] : *tau * fabs(yd[k]);
+    compliance(s, own_jy, own_jyd, divisor, room);
+    known_sizes(s, system, y, divisor, moves, found, most);
+    flows(system, span, found, least);
+    for (size_t e = 0; e < entries; e++) {
+        size[e] = fabs(own_jy[e]) + fabs(own_jyd[e]) / *tau;
+        size[e] = isfinite(size[e]) ? size[e] : 0.0;
+    }
+    failed |= balanced_sizes(s, carries, size, excited, found, kept, balanced, row);
+    group_largest(b, found, most);
+    for (size_t k = 0; k < n; k++)
+        found[k] = found[k] == 0.0 ? most[b->kind[k]] : found[k];
+    for (int32_t k = 0; k < system->kinematics; k++)
+        if (found[system->k_q[k]] == 0.0)
+            found[system->k_q[k]] = *tau * found[system->k_f[k]];
+    for (size_t k = 0; k < n; k++)
+        found[k] = found[k] > TINY ? found[k] : UNKNOWN;
+    free(memory);
+    free(carries);
+    return failed ? -1 : 0;
+}
+
+int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const double *met, const double *magnitude,
+                 double *found)
+{
+    const sd_balance *b = s->balance;
+    double *most = calloc((size_t)b->kinds + (size_t)system->kinematics + 1, sizeof *most);
+    if (!most)
+        return -1;
+    group_largest(b, met, most);
+    for (int32_t k = 0; k < b->unknowns; k++)
+        found[k] = sd_larger(met[k], GROUP * most[b->kind[k]]);
+    flows(system, span, found, most + b->kinds);
+    for (int32_t k = 0; k < b->unknowns; k++) {
+        int free_ = (s->kind[k] & SD_STATE) && s->nominal[k] == 0.0;
+        found[k] = free_ ? sd_smaller(sd_larger(found[k], NOISE * magnitude[k]), magnitude[k]) : magnitude[k];
+    }
+    free(most);
+    return 0;
+}

@@ -1,0 +1,354 @@
+/* The step of the BDF: predict, correct, test, choose order and step size (see bdf.h). */
+#include "steppers/bdf.h"
+#include "linear/lanes.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define VECTORS 14
+#define ITERATIONS 4        /* of Newton a step */
+#define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
+#define TRUST 0.02          /* least contraction assumed of a first correction (an exponential law may lie ahead) */
+#define SLOW 0.9            /* contraction above which Newton gives up */
+#define STAGNANT 0.1        /* of the tolerance: corrections this small that do not shrink are round-off */
+#define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
+#define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
+#define LAX 3.0             /* a steep row may be off by as many tolerances of its terms */
+#define FINEST_ROW 1e-9     /* part of a steep row's terms that round-off of its unknowns leaves */
+
+static int step(void *bdf)
+{
+    return sd_bdf_step(bdf);
+}
+
+static void dense(const void *bdf, double t, double *y, double *yd)
+{
+    sd_bdf_dense(bdf, t, y, yd);
+}
+
+static void start(void *bdf, double t, const double *y, const double *yd, double h)
+{
+    sd_bdf_start(bdf, t, y, yd, h);
+}
+
+sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
+{
+    sd_bdf *bdf = calloc(1, sizeof *bdf);
+    if (!bdf)
+        return NULL;
+    size_t m = (size_t)sd_whole_lanes(system->unknowns), nnz = (size_t)sd_whole_lanes(system->entries);
+    bdf->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + 3 * nnz + 1, sizeof(double));
+    if (!bdf->memory) {
+        free(bdf);
+        return NULL;
+    }
+    double *next = bdf->memory;
+    for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
+        bdf->phi[i] = next;
+    double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->test_weight, &bdf->delta,
+                          &bdf->predicted, &bdf->predicted_d, &bdf->scale, &bdf->terms, &bdf->rate,
+                          &bdf->newton_power, &bdf->test_power};
+    for (int i = 0; i < VECTORS; i++, next += m)
+        *vectors[i] = next;
+    bdf->jy = next;
+    bdf->jyd = bdf->jy + nnz;
+    bdf->g = bdf->jyd + nnz;
+    bdf->system = system;
+    bdf->linear = linear;
+    sd_linear_replayed(linear);
+    bdf->n = system->unknowns;
+    bdf->max_order = SD_MAX_ORDER;
+    bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->phi[0], bdf->yd, &bdf->taken,
+                                step, dense, NULL, start};
+    return bdf;
+}
+
+sd_stepper *sd_bdf_stepper(sd_bdf *bdf)
+{
+    return &bdf->stepper;
+}
+
+void sd_bdf_free(sd_bdf *bdf)
+{
+    if (!bdf)
+        return;
+    free(bdf->memory);
+    free(bdf);
+}
+
+/* magnitudes of the columns: index-2 unknowns and index-3 multipliers with powers of h */
+static void set_scales(sd_bdf *bdf)
+{
+    const double power[3] = {1.0, 1.0 / bdf->h, 1.0 / (bdf->h * bdf->h)};
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->scale[i] = bdf->magnitude[i] * power[bdf->power[i]];
+}
+
+void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h)
+{
+    bdf->t = t;
+    bdf->taken = 0;
+    bdf->tested = 0;
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->tested += bdf->test[i] >= 0;
+    memcpy(bdf->phi[0], y, (size_t)bdf->n * sizeof *y);
+    memcpy(bdf->y, y, (size_t)bdf->n * sizeof *y);
+    memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
+    memset(bdf->ee, 0, (size_t)bdf->n * sizeof *yd);
+    bdf->h = 1.0;
+    bdf->h_weighed = 0.0;
+    sd_bdf_weights(bdf);
+    sd_bdf_step_weights(bdf);
+    bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, bdf->t_end - t);
+    bdf->h = fmin(bdf->h, bdf->h_max);
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->phi[1][i] = bdf->h * yd[i];
+    bdf->psi[0] = bdf->h;
+    bdf->order = 1;
+    bdf->order_used = 0;
+    bdf->h_used = 0.0;
+    bdf->ns = 0;
+    bdf->rising = bdf->max_order > 1;
+    bdf->contraction = 20.0;
+    bdf->ready = 0;
+}
+
+/* G := dF/dy + cj dF/dyd and its factors; a fresh Jacobian where asked */
+static int factorise(sd_bdf *bdf, double t, int fresh)
+{
+    if (fresh) {
+        sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
+        bdf->jacobian_age = 0;
+        bdf->fresh_jacobian = 1;
+        if (*bdf->system->stop)
+            return SD_STOPPED;
+        if (sd_first_bad(bdf->system->entries, bdf->jy) >= 0 || sd_first_bad(bdf->system->entries, bdf->jyd) >= 0) {
+            bdf->ready = 0;
+            int32_t e = sd_first_bad(bdf->system->entries, bdf->jy);
+            bdf->bad_row = bdf->system->row[e >= 0 ? e : sd_first_bad(bdf->system->entries, bdf->jyd)];
+            return SD_NONFINITE;
+        }
+    }
+    sd_bdf_matrix(bdf);
+    set_scales(bdf);
+    bdf->ready = 0;
+    int failed = sd_linear_factor(bdf->linear, bdf->g, bdf->scale);
+    if (failed) {
+        bdf->bad_row = bdf->linear->bad_row;
+        bdf->bad_column = bdf->linear->bad_column;
+        return failed == 2 ? SD_MEMORY : SD_SINGULAR;
+    }
+    bdf->cj_factored = bdf->cj;
+    bdf->contraction = 20.0;
+    bdf->ready = 1;
+    return SD_FINE;
+}
+
+/* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an
+ * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
+static int rows_hold(sd_bdf *bdf, double t)
+{
+    for (int32_t i = 0; i < bdf->n; i++)
+        bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->magnitude[i]);
+    double limit = fmin(1.0, fmax(FINEST_ROW, LAX * bdf->rtol));
+    int all = bdf->linear->rank < bdf->n;
+    return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, all, bdf->terms) < 0;
+}
+
+/* Newton's iteration from the prediction with the present factors */
+static int iterate(sd_bdf *bdf, double t)
+{
+    int32_t n = bdf->n;
+    double first = 0.0;
+    int converged = 0, judged = bdf->system->scales > 0;
+    for (int m = 0; m < ITERATIONS + judged; m++) {
+        double *d = bdf->delta;
+        sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
+        bdf->newton_iterations++;
+        if (*bdf->system->stop)
+            return SD_STOPPED;
+        int32_t bad = sd_first_bad(n, d);
+        if (bad >= 0) {
+            bdf->bad_row = bad;
+            return SD_NONFINITE;
+        }
+        if (converged && rows_hold(bdf, t))
+            return SD_FINE;
+        if (m == ITERATIONS)
+            break;
+        converged = 0;
+        sd_linear_solve(bdf->linear, d);
+        double size = sd_bdf_move(bdf);
+        if (!isfinite(size))
+            return SD_NEWTON;
+        if (m == 0) {
+            first = size;
+            converged = size <= 100.0 * DBL_EPSILON;
+        } else {
+            double rate = m == 1 ? size / first : pow(size / first, 1.0 / m);
+            if (rate > SLOW && size > STAGNANT)
+                return SD_NEWTON;
+            converged = rate > SLOW;
+            if (!converged)
+                bdf->contraction = rate / (1.0 - rate);
+            if (rate > SLUGGISH)
+                bdf->jacobian_age = OLD_JACOBIAN;
+        }
+        /* a first correction is not believed beyond this, however fast earlier steps converged */
+        double contraction = m == 0 ? fmax(bdf->contraction, TRUST) : bdf->contraction;
+        converged = converged || contraction * size <= NEWTON_TOLERANCE;
+        if (converged && !judged)
+            return SD_FINE;
+    }
+    return SD_NEWTON;
+}
+
+/* Corrects the prediction; factors are renewed when cj changed, the Jacobian when it is old or fails. */
+static int correct(sd_bdf *bdf)
+{
+    double t = bdf->t + bdf->h;
+    bdf->fresh_jacobian = 0;
+    sd_bdf_step_weights(bdf);
+    for (;;) {
+        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->taken == 0 || bdf->fresh_jacobian < 0;
+        if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {
+            int cause = factorise(bdf, t, fresh);
+            if (cause == SD_SINGULAR && bdf->fresh_jacobian == 0) {
+                bdf->fresh_jacobian = -1;
+                continue;
+            }
+            if (cause)
+                return cause;
+        }
+        int cause = iterate(bdf, t);
+        if (cause == SD_FINE || cause == SD_STOPPED || bdf->fresh_jacobian)
+            return cause;
+        bdf->fresh_jacobian = -1; /* once more with a fresh Jacobian */
+        sd_bdf_begin(bdf);
+    }
+}
+
+/* a smaller step after a failure; on the first step the difference phi[1] = h yd follows */
+static void reduce(sd_bdf *bdf, double ratio)
+{
+    bdf->h *= ratio;
+    if (bdf->taken == 0) {
+        bdf->psi[0] = bdf->h;
+        for (int32_t i = 0; i < bdf->n; i++)
+            bdf->phi[1][i] *= ratio;
+    }
+}
+
+/* the step ends at t_end exactly, and never leaves less than its half for the last one */
+static void fit_end(sd_bdf *bdf)
+{
+    double left = bdf->t_end - bdf->t, h = bdf->h;
+    /* what a sum of fixed steps leaves is round-off: a step of that length would divide multipliers by it */
+    double slack = bdf->fixed_h > 0.0 ? 1e-3 : 1e-12;
+    if (h >= left * (1.0 - slack))
+        h = left;
+    else if (2.0 * h > left && bdf->taken > 0 && !(bdf->fixed_h > 0.0))
+        h = 0.5 * left;
+    if (h != bdf->h)
+        reduce(bdf, h / bdf->h);
+    if (bdf->h != h)
+        bdf->h = h;
+}
+
+/* t + h is t, or nearly (the last bit of the span is a step nonetheless) */
+static int too_small(const sd_bdf *bdf)
+{
+    double left = bdf->t_end - bdf->t;
+    return bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), SD_SHORT * left) && bdf->h < left;
+}
+
+/* The new point moved onto every constraint; the correction moves with it, and so do the differences made of it. */
+static void project(sd_bdf *bdf)
+{
+    size_t size = (size_t)bdf->n * sizeof(double);
+    memcpy(bdf->predicted, bdf->y, size);
+    memcpy(bdf->predicted_d, bdf->yd, size);
+    if (sd_settle_point(bdf->project, bdf->t, bdf->predicted, bdf->predicted_d))
+        return;
+    for (int32_t i = 0; i < bdf->n; i++) {
+        bdf->ee[i] += bdf->predicted[i] - bdf->y[i];
+        bdf->y[i] = bdf->predicted[i];
+    }
+}
+
+int sd_bdf_step(sd_bdf *bdf)
+{
+    int32_t error_failures = 0, order_next = 1;
+    double ck, error;
+    sd_bdf_weights(bdf);
+    bdf->cause = SD_FINE;
+    bdf->jacobian_age++;
+    for (;;) {
+        fit_end(bdf);
+        if (too_small(bdf)) {
+            bdf->cause = bdf->cause ? bdf->cause : SD_STEP;
+            return bdf->cause;
+        }
+        sd_bdf_coefficients(bdf, &ck);
+        sd_bdf_predict(bdf);
+        int cause = correct(bdf);
+        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, &error, &order_next) || bdf->fixed_h > 0.0))
+            break;
+        sd_bdf_restore(bdf);
+        bdf->cause = cause ? cause : SD_ERROR_TEST;
+        if (cause == SD_STOPPED || cause == SD_MEMORY || bdf->fixed_h > 0.0)
+            return bdf->cause;
+        if (cause) {
+            /* Newton, a singular matrix, a number that is not finite: much smaller */
+            bdf->newton_failures++;
+            bdf->jacobian_age = OLD_JACOBIAN; /* taken at a point that proved far off: its slopes mislead */
+            reduce(bdf, 0.25);
+        } else {
+            bdf->rejected_steps++;
+            bdf->rising = 0;
+            error_failures++;
+            double ratio = 0.25;
+            if (error_failures == 1)
+                ratio = fmax(0.25, fmin(0.9, 0.9 * pow(2.0 * bdf->error_next + 1e-4, -1.0 / (order_next + 1))));
+            bdf->order = error_failures > 2 ? 1 : order_next;
+            reduce(bdf, ratio);
+        }
+    }
+    bdf->cause = SD_FINE;
+    double t = bdf->t + bdf->h;
+    bdf->t = fabs(bdf->t_end - t) <= 1e-12 * bdf->h ? bdf->t_end : t;
+    if (bdf->project)
+        project(bdf);
+    sd_bdf_accept(bdf, order_next);
+    return SD_FINE;
+}
+
+/* Polynomial through the last order + 1 points, in divided differences. */
+void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
+{
+    int32_t k = bdf->taken == 0 ? 0 : bdf->order_used > 0 ? bdf->order_used : 1;
+    double delta = t - bdf->t, c = 1.0, d = 0.0, gamma = bdf->psi[0] != 0.0 ? delta / bdf->psi[0] : 0.0;
+    double value[SD_MAX_ORDER + 2], rate[SD_MAX_ORDER + 2];
+    for (int32_t j = 1; j <= k; j++) {
+        rate[j] = d = d * gamma + c / bdf->psi[j - 1];
+        value[j] = c *= gamma;
+        gamma = (delta + bdf->psi[j - 1]) / bdf->psi[j];
+    }
+    for (int32_t first = 0; first < bdf->n; first += SD_PIECE) {
+        int32_t n = bdf->n - first < SD_PIECE ? bdf->n - first : SD_PIECE;
+        double *restrict out = y + first, *restrict out_d = yd + first;
+        memcpy(out, bdf->phi[0] + first, (size_t)n * sizeof *y);
+        memset(out_d, 0, (size_t)n * sizeof *yd);
+        for (int32_t j = 1; j <= k; j++) {
+            const double *restrict phi = bdf->phi[j] + first;
+            for (int32_t i = 0; i < n; i++) {
+                out[i] += value[j] * phi[i];
+                out_d[i] += rate[j] * phi[i];
+            }
+        }
+    }
+    if (bdf->taken == 0)
+        memcpy(yd, bdf->yd, (size_t)bdf->n * sizeof *yd);
+}

@@ -1,0 +1,80 @@
+/* Variable-step, variable-order BDF for F(t, y, yd) = 0 with fixed leading coefficient.
+ *
+ * Source: K. E. Brenan, S. L. Campbell, L. R. Petzold, Numerical Solution of Initial-Value Problems in
+ * Differential-Algebraic Equations, SIAM 1996, chapter 5.  Names of that chapter, declared once:
+ *   phi[i]    modified divided differences of the solution (phi[0] = y), [unknowns] each
+ *   psi[i]    t_n - t_(n-i-1);  alpha, beta, sigma, gamma: coefficients of the prediction and the error
+ *   cj        yd = (predicted yd) + cj (y - predicted y);   G = dF/dy + cj dF/dyd
+ *   ee        correction y - predicted y
+ *   ns        steps taken with the present step size and order
+ * Error test: weights w_i = atol_i + rtol |y_i|, atol_i = rtol * magnitude_i; unknowns with test_i < 0 (multipliers,
+ * implicit efforts, flows of massless coordinates) are left out, those with test_i = k count with h^k.
+ * Newton's convergence test takes all of them, with h^power_i (1: index-2 unknowns, 2: index-3 multipliers).
+ */
+#ifndef SYSDYN_BDF_H
+#define SYSDYN_BDF_H
+
+#include "system/assembly.h"
+#include "linear/linear.h"
+#include "steppers/stepper.h"
+
+#define SD_MAX_ORDER 5
+#define SD_PIECE 512 /* unknowns of which all differences fit the nearest cache */
+
+typedef struct sd_bdf {
+    sd_system *system;
+    sd_linear *linear;
+    int32_t n, max_order, tested;
+    double rtol, t_end, h_max, fixed_h;
+    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
+    const int32_t *test, *power;
+    /* state of the integration */
+    double t, h, h_used, cj, cj_factored, contraction;
+    int32_t order, order_used, ns, rising, fresh_jacobian, jacobian_age, ready;
+    double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
+        gamma[SD_MAX_ORDER + 2];
+    double *phi[SD_MAX_ORDER + 2];
+    double *y, *yd, *ee, *weight, *newton_weight, *test_weight, *delta, *predicted, *predicted_d, *scale;
+    double *terms, *rate, *jy, *jyd, *g, *memory;
+    double *newton_power, *test_power, h_weighed; /* powers of h by which unknowns count, and of which h */
+    double error_next;        /* estimate of the local error at the order chosen next */
+    /* what happened */
+    int64_t steps, rejected_steps, newton_failures, newton_iterations;
+    int64_t taken;            /* steps since the last start */
+    int32_t cause, bad_row, bad_column;
+    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
+    sd_stepper stepper;
+} sd_bdf;
+
+/* A stepper without its problem set; the caller fills the public fields, then calls sd_bdf_start. */
+sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear);
+void sd_bdf_free(sd_bdf *bdf);
+sd_stepper *sd_bdf_stepper(sd_bdf *bdf);
+void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h);
+/* one accepted step, or the cause of failure */
+int sd_bdf_step(sd_bdf *bdf);
+/* y, yd [n] at any t within the last step */
+void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd);
+
+/* coefficients.c */
+void sd_bdf_coefficients(sd_bdf *bdf, double *ck);
+void sd_bdf_restore(sd_bdf *bdf);
+/* bdf_passes.c */
+void sd_bdf_weights(sd_bdf *bdf);
+void sd_bdf_step_weights(sd_bdf *bdf);
+void sd_bdf_predict(sd_bdf *bdf);
+void sd_bdf_begin(sd_bdf *bdf);
+void sd_bdf_matrix(sd_bdf *bdf);
+double sd_bdf_move(sd_bdf *bdf);
+void sd_bdf_orders(const sd_bdf *bdf, double *norm);
+double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus);
+void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const double *beta);
+void sd_bdf_shift(sd_bdf *bdf);
+/* controller.c */
+int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next);
+void sd_bdf_accept(sd_bdf *bdf, int32_t order_next);
+double sd_bdf_first_step(const sd_bdf *bdf, double span);
+
+#endif

@@ -1,0 +1,54 @@
+/* The explicit Runge-Kutta method DOP853 of order 8 on the underlying equation, projected onto every constraint.
+ *
+ * Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, Springer 1993, sections II.5
+ * (coefficients by Prince & Dormand), II.6 (dense output of order 7 by three more stages), II.10 (error from embedded
+ * formulas of orders 5 and 3), IV.2 of volume II (step control with a memory, detection of stiffness).
+ * Error test: as in bdf.h, over the state; multipliers and implicit efforts follow from it.
+ * Between the ends of a step z = (slopes; kappa, mu, e) is the derivative of the interpolant of its integral.
+ */
+#ifndef SYSDYN_DOPRI_H
+#define SYSDYN_DOPRI_H
+
+#include "steppers/stepper.h"
+#include "steppers/underlying.h"
+
+#define SD_DOPRI_STAGES 12
+#define SD_DOPRI_ALL 16  /* with the slopes at the new point and the stages of the dense output */
+#define SD_DOPRI_DENSE 7
+
+extern const double sd_dopri_c[SD_DOPRI_ALL], sd_dopri_a[SD_DOPRI_ALL][SD_DOPRI_ALL];
+extern const double sd_dopri_e3[SD_DOPRI_STAGES], sd_dopri_e5[SD_DOPRI_STAGES];
+extern const double sd_dopri_d[SD_DOPRI_DENSE - 3][SD_DOPRI_ALL];
+
+typedef struct sd_dopri {
+    sd_system *system;        /* form 0 */
+    sd_underlying *underlying;
+    int32_t n, tested;
+    double rtol, t_end, h_max, fixed_h;
+    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
+    const int32_t *test, *power; /* [n] as in bdf.h */
+    double patience;          /* steps still to be taken above which a stiff run is given up */
+    /* state of the integration */
+    double t, h, h_used, error_accepted;
+    int32_t rejected, dense, stiff, smooth; /* dense: the interpolant of the last step is there */
+    double *phi, *yd;         /* [n] the last accepted point */
+    double *y[SD_DOPRI_ALL], *rate[SD_DOPRI_ALL]; /* [n] stages of the last step: point, slopes; y[0]: its start */
+    double *f[SD_DOPRI_DENSE]; /* [n] the interpolant */
+    double *ee, *weight, *memory;
+    /* what happened */
+    int64_t steps, rejected_steps, newton_failures, taken;
+    int32_t cause, bad_row, bad_column;
+    sd_stepper stepper;
+} sd_dopri;
+
+sd_dopri *sd_dopri_new(sd_system *system, sd_underlying *underlying);
+void sd_dopri_free(sd_dopri *dopri);
+sd_stepper *sd_dopri_stepper(sd_dopri *dopri);
+void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd, double h);
+int sd_dopri_step(sd_dopri *dopri);
+/* dopri_dense.c: y, yd [n] at any t within the last step */
+void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd);
+
+#endif

@@ -1,0 +1,116 @@
+/* Radau IIA of 3, 5 or 7 stages (order 5, 9, 13, stiffly accurate) for F(t, y, yd) = 0.
+ *
+ * Sources: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Springer 1996, sections IV.8 and VI.4; the
+ * error estimate (8.19)-(8.20), Gustafsson's controller (8.25); the same authors, Stiff differential equations solved by
+ * Radau methods, J. Comput. Appl. Math. 111 (1999).  Names of that book, declared once:
+ *   c[i], A      nodes and coefficients; A^-1 has the eigenvalues gamma and lambda_k, conj(lambda_k)
+ *   z[i]         Y_i - y_n of the stages; the derivatives there are K = A^-1 z / h
+ *   theta        contraction of Newton's iteration
+ * Unknowns that occur undifferentiated are stage values like the others: their K enters no row.  With simplified
+ * Jacobians J = dF/dy, E = dF/dyd a Newton step is the real system (J + gamma/h E) w = r and, one for each pair, the
+ * complex ones (J + lambda_k/h E) w = r on one pattern.
+ * Error test, weights and Newton's norm: as in bdf.h, with the tolerance 0.1 rtol^(2/3) that fits an estimate of order 3;
+ * it stands for more stages too, whose estimate has the order of the values within the step.
+ * Values within a step: the polynomial of the stages.  For unknowns with derivatives, of three stages the quintic through
+ * values and derivatives at the last three points, whose error is that of the method; of more the polynomial of the
+ * stages with the derivative at the step's start besides, an order more.  Where an unknown is pulled back faster than
+ * the step follows, its derivative is its error times that rate, and the polynomial of the stages serves.  The stage's K
+ * at the end of a step has the multipliers' order only: where rows are asked for, derivatives come from the settled point.
+ */
+#ifndef SYSDYN_RADAU_H
+#define SYSDYN_RADAU_H
+
+#include "system/assembly.h"
+#include "linear/complex_linear.h"
+#include "linear/linear.h"
+#include "steppers/stepper.h"
+
+#define SD_METHODS 3
+#define SD_STAGES 7 /* at most */
+#define SD_PAIRS 3
+#define SD_POINTS 3
+#define SD_UNPULLED 2
+
+/* Coefficients of one method (numerics/radau_coefficients.py); rows and columns of S of A^-1 = S diag(...) S^-1 */
+typedef struct sd_radau_method {
+    int32_t stages, pairs;
+    double c[SD_STAGES], b[SD_STAGES], inverse[SD_STAGES][SD_STAGES], gamma;
+    double complex lambda[SD_PAIRS];
+    double column[SD_STAGES], row[SD_STAGES];
+    double complex columns[SD_PAIRS][SD_STAGES], rows[SD_PAIRS][SD_STAGES];
+    double estimate[SD_STAGES];
+    double lift[SD_STAGES + 1]; /* of x, x^2, ...: zero at 0 and 1, slope 1 at 0 and none at any node */
+    double taylor[2][SD_STAGES]; /* by z: Taylor coefficients s-1 and s of the stages' polynomial in the middle */
+    double constant;             /* the estimate over Taylor coefficient s+1 */
+} sd_radau_method;
+
+extern const sd_radau_method sd_radau_methods[SD_METHODS];
+
+typedef struct sd_radau {
+    sd_system *system;
+    sd_linear *linear;
+    sd_linear_z *complex_linear[SD_PAIRS]; /* NULL for those that no method needs */
+    int32_t n, tested;
+    int32_t stages, most_stages; /* of the first step; at most */
+    double rtol, t_end, h_max, fixed_h;
+    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
+    const int32_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative,
+                                               * SD_UNPULLED: and is interpolated whatever pulls */
+    /* state of the integration */
+    double tolerance;         /* 0.1 rtol^(2/3) */
+    double strict[SD_METHODS]; /* what the estimate of each method counts beside the first one's */
+    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
+    double growth;            /* of the next step at most where laws are steep */
+    double longest;           /* step accepted */
+    int32_t balances;         /* balances are steep: in rates, whose round-off grows as steps shrink */
+    int32_t pressed;          /* a steep law lets no length of step do: corrections are shortened at once */
+    int32_t ready, old_jacobian, rejected;
+    const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */
+    int32_t since;                                  /* steps accepted since the method changed */
+    int32_t hold;                                   /* steps that still take three stages */
+    int32_t creeping;                               /* steps in a row for which Newton failed at first */
+    double *phi, *yd;         /* [n] the last accepted point */
+    double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */
+    double *slope[SD_POINTS]; /* [n] derivatives at phi, last, before, for values within the step */
+    int32_t refined[SD_POINTS];                     /* they are settled */
+    double *z[SD_STAGES], *kept[SD_STAGES];         /* of this step, of the last accepted one */
+    double *stage[SD_STAGES], *stage_d[SD_STAGES];  /* y, yd of the last accepted step, before it was projected */
+    double *d[SD_STAGES];                           /* right sides and corrections */
+    double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it */
+    double *point, *point_d;  /* [written and more] */
+    double *first;            /* [n] d[0] while a correction is tried */
+    double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
+    double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
+    double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
+    double complex *w[SD_PAIRS], *gz;
+    struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
+    sd_system *other;             /* its system */
+    double *point_y, *point_rate; /* [n] */
+    /* what happened */
+    int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;
+    int32_t cause, bad_row, bad_column;
+    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
+    sd_stepper stepper;
+} sd_radau;
+
+/* stages: at most; complex_linear [(stages - 1) / 2] */
+sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const *complex_linear, int32_t stages);
+void sd_radau_free(sd_radau *radau);
+sd_stepper *sd_radau_stepper(sd_radau *radau);
+void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd, double h);
+int sd_radau_step(sd_radau *radau);
+/* radau_dense.c: y, yd [n] at any t within the last step */
+void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd);
+/* settled derivatives at the points that sd_radau_dense uses */
+void sd_radau_refine(sd_radau *radau, sd_settle *settle);
+/* 1: between the nodes of the step at hand, whose stages are z, a steep law is beyond all magnitudes: the step passes
+ * over something that happens.  Works in y, rate, d[0] and terms. */
+int sd_radau_astray(sd_radau *radau);
+/* 1 / (node i - node j) of 0, c_1, ..., c_s */
+void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1]);
+/* z [stages] of a step of size h from the last step's polynomial */
+void sd_radau_extrapolate(sd_radau *radau, double h);
+
+#endif

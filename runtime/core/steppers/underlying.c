@@ -1,0 +1,207 @@
+/* Slopes and projection of the underlying equation: see underlying.h. */
+#include "steppers/underlying.h"
+
+#include "steppers/stepper.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ITERATIONS 12   /* of Newton for implicit efforts */
+#define SLOW 0.1        /* contraction above which the factors are taken anew */
+#define MOVES 6         /* of a projection */
+#define EXACT 1e-16     /* next move, in magnitudes, that is not worth making */
+#define CLOSE 1e-12     /* move with which a projection that stagnates is content */
+#define STAGNANT 0.3
+
+sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
+{
+    sd_underlying *u = calloc(1, sizeof *u);
+    if (!u)
+        return NULL;
+    size_t nnz = (size_t)system->entries + 1;
+    size_t n = (size_t)(system->rows > system->unknowns ? system->rows : system->unknowns) + 1;
+    u->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * n, sizeof(double));
+    if (!u->memory) {
+        free(u);
+        return NULL;
+    }
+    u->system = system;
+    u->linear = linear;
+    sd_linear_replayed(linear);
+    u->n = system->unknowns;
+    u->first = system->kinematics;
+    u->solved = linear->n;
+    u->jy = u->memory;
+    u->jyd = u->jy + nnz;
+    u->r = u->jyd + nnz;
+    u->step = u->r + n;
+    u->rest = u->step + n;
+    u->values = u->rest + n;
+    return u;
+}
+
+void sd_underlying_free(sd_underlying *underlying)
+{
+    if (!underlying)
+        return;
+    free(underlying->memory);
+    free(underlying);
+}
+
+static int factorise(sd_underlying *u, double t, const double *y, const double *yd)
+{
+    u->ready = 0;
+    sd_jacobian(u->matrix, t, y, yd, u->jy, u->jyd);
+    if (*u->system->stop)
+        return SD_STOPPED;
+    for (int32_t e = 0; e < u->linear->entries; e++)
+        u->values[e] = u->from_rate[e] ? u->jyd[u->source[e]] : u->jy[u->source[e]];
+    int32_t bad = sd_first_bad(u->linear->entries, u->values);
+    if (bad >= 0) {
+        u->bad_row = u->first + u->linear->row[bad];
+        return SD_NONFINITE;
+    }
+    int failed = sd_linear_factor(u->linear, u->values, NULL);
+    if (failed) {
+        u->bad_row = u->first + u->linear->bad_row;
+        u->bad_column = u->linear->bad_column >= 0 ? u->unknown[u->linear->bad_column] : 0;
+        return failed == 2 ? SD_MEMORY : SD_SINGULAR;
+    }
+    u->ready = 1;
+    return SD_FINE;
+}
+
+/* z moved by the solution; the largest move of what is undifferentiated, in magnitudes */
+static double correct(sd_underlying *u, double *y, double *yd)
+{
+    double size = 0.0;
+    for (int32_t j = 0; j < u->solved; j++)
+        u->step[j] = -u->r[u->first + j];
+    sd_linear_solve(u->linear, u->step);
+    for (int32_t j = 0; j < u->solved; j++) {
+        int32_t k = u->unknown[j];
+        if (u->rate[j]) {
+            yd[k] += u->step[j];
+        } else {
+            y[k] += u->step[j];
+            size = fmax(size, fabs(u->step[j]) / (u->magnitude[k] + fabs(y[k])));
+        }
+    }
+    return sd_first_bad(u->solved, u->step) < 0 ? size : INFINITY;
+}
+
+/* q' = f: f may be among what is solved for */
+static int kinematics(const sd_underlying *u, const double *y, double *yd)
+{
+    for (int32_t i = 0; i < u->system->kinematics; i++)
+        yd[u->system->k_q[i]] = y[u->system->k_f[i]];
+    return SD_FINE;
+}
+
+int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
+{
+    const sd_system *system = u->system;
+    double before = 0.0;
+    for (int32_t j = 0; u->direct && j < u->solved; j++)
+        *(u->rate[j] ? &yd[u->unknown[j]] : &y[u->unknown[j]]) = 0.0;
+    kinematics(u, y, yd);
+    u->ready = 0;
+    for (int m = 0; m < ITERATIONS; m++) {
+        sd_residual(u->direct ? u->applied : u->system, t, y, yd, u->r);
+        if (*system->stop)
+            return SD_STOPPED;
+        int32_t bad = sd_first_bad(system->rows, u->r);
+        if (bad >= 0) {
+            u->bad_row = bad;
+            return SD_NONFINITE;
+        }
+        int cause = u->ready ? SD_FINE : factorise(u, t, y, yd);
+        if (cause)
+            return cause;
+        double size = correct(u, y, yd);
+        if (!isfinite(size))
+            return SD_NONFINITE;
+        if (u->direct || size <= DBL_EPSILON)
+            return kinematics(u, y, yd);
+        double ratio = m > 0 ? size / before : 1.0;
+        if (m > 0 && ratio < 1.0 && size * ratio <= u->tolerance * (1.0 - ratio))
+            return kinematics(u, y, yd);
+        if (m > 0 && ratio > SLOW)
+            u->ready = 0;
+        before = size;
+    }
+    return SD_NEWTON;
+}
+
+/* One kind of state moved onto its constraints (`rows` stand where their derivatives do): displacements, or flows and
+ * momenta. */
+static int onto(sd_underlying *u, sd_system *rows, int displacements, double t, double *y)
+{
+    const sd_system *system = u->system;
+    double before = INFINITY;
+    for (int m = 0; m < MOVES; m++) {
+        double size = 0.0;
+        sd_residual(rows, t, y, u->rest, u->r);
+        if (*system->stop)
+            return SD_STOPPED;
+        for (int32_t i = 0; i < system->held; i++) /* of a redundant constraint: it holds with the others */
+            u->r[system->held_row[i]] = 0.0;
+        const double *goal = displacements ? u->goal_position : u->goal_velocity;
+        for (int32_t j = 0; j < u->solved; j++)
+            u->step[j] = (goal ? goal[u->first + j] : 0.0) - u->r[u->first + j];
+        sd_linear_solve(u->linear, u->step);
+        if (sd_first_bad(u->solved, u->step) >= 0)
+            return SD_NONFINITE;
+        for (int32_t i = 0; displacements && i < system->kinematics; i++) {
+            int32_t k = system->k_q[i];
+            double move = u->step[u->column[system->k_f[i]]];
+            y[k] += move;
+            size = fmax(size, fabs(move) / (u->magnitude[k] + fabs(y[k])));
+        }
+        for (int32_t j = 0; !displacements && j < u->solved; j++)
+            if (u->rate[j] == 2) {
+                int32_t k = u->unknown[j];
+                y[k] += u->step[j];
+                size = fmax(size, fabs(u->step[j]) / (u->magnitude[k] + fabs(y[k])));
+            }
+        if (m == 0)
+            u->drift = fmax(u->drift, size);
+        if (size <= EXACT || (m > 0 && size * size <= EXACT * before))
+            return SD_FINE;
+        if (m > 0 && size > STAGNANT * before)
+            return size <= CLOSE ? SD_FINE : SD_NEWTON;
+        before = size;
+    }
+    return before <= CLOSE ? SD_FINE : SD_NEWTON;
+}
+
+void sd_underlying_constraints(sd_underlying *u, double t, const double *y, double *position, double *velocity)
+{
+    memset(position, 0, (size_t)u->system->rows * sizeof *position);
+    memset(velocity, 0, (size_t)u->system->rows * sizeof *velocity);
+    if (u->position)
+        sd_residual(u->position, t, y, u->rest, position);
+    if (u->velocity)
+        sd_residual(u->velocity, t, y, u->rest, velocity);
+    for (int32_t i = 0; i < u->system->held; i++)
+        position[u->system->held_row[i]] = velocity[u->system->held_row[i]] = 0.0;
+}
+
+int sd_underlying_project(sd_underlying *u, double t, double *y, const double *yd)
+{
+    int cause = SD_FINE;
+    for (int fresh = 0; fresh < 2; fresh++) {
+        u->drift = 0.0;
+        if (!u->ready && (cause = factorise(u, t, y, yd)))
+            return cause;
+        cause = u->position ? onto(u, u->position, 1, t, y) : SD_FINE;
+        if (cause == SD_FINE && u->velocity)
+            cause = onto(u, u->velocity, 0, t, y);
+        if (cause != SD_NEWTON)
+            return cause;
+        u->ready = 0;
+    }
+    return cause;
+}

@@ -1,0 +1,131 @@
+/* Residual and Jacobian of a system: see assembly.h. */
+#include "system/assembly.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define FAINT 1e-9 /* of the magnitude of an unknown that happens to be zero */
+/* of the terms of a row, as the magnitudes of its unknowns make them: round-off of round-off.  A law that is zero (a
+ * transistor that is off) leaves a row whose only term is its residual */
+#define NOTHING (DBL_EPSILON * DBL_EPSILON)
+
+void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r)
+{
+    system->residual_evaluations++;
+    if (system->left) {
+        system->left->residual(system->left, t, y, yd, r);
+        return;
+    }
+    memset(r, 0, (size_t)system->rows * sizeof *r);
+    for (int32_t i = 0; i < system->kinematics; i++)
+        r[system->k_row[i]] = system->k_scale[i] * (yd[system->k_q[i]] - y[system->k_f[i]]);
+    for (int32_t c = 0; c < system->calls; c++)
+        system->call[c].rows(&system->call[c].frame, t, y, yd, r);
+    for (int32_t i = 0; i < system->held; i++)
+        r[system->held_row[i]] = (system->held_rate[i] ? yd : y)[system->held_unknown[i]];
+}
+
+/* adds one block's entries into their places; entries of one place add up */
+static void add_entries(sd_entries *block, const sd_frame *frame, int32_t n, const int32_t *slot, double t,
+                        const double *y, const double *yd, double *v, double *values)
+{
+    if (n == 0)
+        return;
+    block(frame, t, y, yd, v);
+    for (int32_t e = 0; e < n; e++)
+        values[slot[e]] += v[e];
+}
+
+void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
+{
+    memset(jy, 0, (size_t)system->entries * sizeof *jy);
+    memset(jyd, 0, (size_t)system->entries * sizeof *jyd);
+    system->jacobian_evaluations++;
+    if (system->left) {
+        system->left->jacobian(system->left, t, y, yd, jy, jyd);
+        return;
+    }
+    for (int32_t i = 0; i < system->kinematics; i++) {
+        jyd[system->k_slot_q[i]] += system->k_scale[i];
+        jy[system->k_slot_f[i]] -= system->k_scale[i];
+    }
+    for (int32_t c = 0; c < system->calls; c++) {
+        const sd_call *call = &system->call[c];
+        add_entries(call->dy, &call->frame, call->n_dy, call->slot_dy, t, y, yd, system->v, jy);
+        add_entries(call->dyd, &call->frame, call->n_dyd, call->slot_dyd, t, y, yd, system->v, jyd);
+    }
+    for (int32_t i = 0; i < system->clear; i++)
+        jy[system->cleared[i]] = jyd[system->cleared[i]] = 0.0;
+    for (int32_t i = 0; i < system->held; i++) {
+        jy[system->held_slot[i]] = system->held_rate[i] ? 0.0 : 1.0;
+        jyd[system->held_slot[i]] = system->held_rate[i] ? 1.0 : 0.0;
+    }
+}
+
+/* s := magnitudes of the terms of steep rows, zero in others */
+static void steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s)
+{
+    if (system->left) {
+        system->left->steep(system->left, t, y, rate, s, steep_terms);
+        return;
+    }
+    memset(s, 0, (size_t)system->rows * sizeof *s);
+    for (int32_t c = 0; c < system->scales; c++)
+        system->scale[c].rows(&system->scale[c].frame, t, y, rate, s);
+    for (int32_t i = 0; i < system->held; i++)
+        s[system->held_row[i]] = 0.0;
+}
+
+int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
+                       const double *g, const double *scale, int all, double *s)
+{
+    steep_terms(system, t, y, rate, s);
+    for (int32_t i = 0; i < system->rows; i++)
+        s[i] = -s[i]; /* what is known already is not added to, but for what is nothing */
+    for (int32_t j = 0; j < system->unknowns; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            if (s[system->row[e]] < 0.0)
+                s[system->row[e]] -= NOTHING * fabs(g[e]) * scale[j];
+            else if (all)
+                s[system->row[e]] += fabs(g[e]) * (fabs(y[j]) + FAINT * scale[j]);
+    for (int32_t i = 0; i < system->rows; i++)
+        s[i] = fabs(s[i]);
+    for (int32_t i = 0; i < system->rows; i++)
+        if (s[i] != 0.0 && !(fabs(r[i]) <= limit * s[i])) /* 0: not steep, or every term is zero */
+            return i;
+    return -1;
+}
+
+int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r,
+                        const double *jy, const double *jyd, double h, const double *magnitude, double *s)
+{
+    steep_terms(system, t, y, rate, s);
+    for (int32_t i = 0; i < system->rows; i++)
+        s[i] = s[i] != 0.0 ? fabs(r[i]) : 0.0;
+    for (int32_t j = 0; j < system->unknowns; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            s[system->row[e]] -= (fabs(jy[e]) + fabs(jyd[e]) / h) * magnitude[j];
+    for (int32_t i = 0; i < system->rows; i++)
+        if (!(s[i] <= 0.0))
+            return i;
+    return -1;
+}
+
+int32_t sd_first_bad(int32_t n, const double *x)
+{
+    double sums[4] = {0.0, 0.0, 0.0, 0.0}; /* x - x is 0 for a finite number and not a number otherwise */
+    int32_t whole = n - n % 4;
+    for (int32_t i = 0; i < whole; i += 4)
+        for (int32_t k = 0; k < 4; k++)
+            sums[k] += x[i + k] - x[i + k];
+    double sum = sums[0] + sums[1] + sums[2] + sums[3];
+    for (int32_t i = whole; i < n; i++)
+        sum += x[i] - x[i];
+    if (sum == 0.0)
+        return -1;
+    for (int32_t i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return i;
+    return -1;
+}

@@ -1,0 +1,79 @@
+/* A system: residual and Jacobian assembled from the blocks of a compiled model.
+ *
+ * F(t, y, yd) = sum over calls of block(t, y, yd)  +  rows q' - f.
+ * The index form is nothing but the choice of calls and of their tables `at` (where unknown families begin) and
+ * `to` (where row families begin).  dF/dy and dF/dyd are kept apart on one pattern (compressed columns), so that
+ * G = dF/dy + cj dF/dyd needs no new evaluation when cj changes.
+ *
+ * Shapes
+ *   y, yd [unknowns]   r [rows]   column [unknowns + 1]   row, jy, jyd [entries]   v [largest list of entries]
+ *   slot_dy [n_dy], slot_dyd [n_dyd]      place in jy / jyd of each entry of the block's list
+ *   k_row, k_q, k_f, k_slot_q, k_slot_f [kinematics]      the rows q' - f and their two entries
+ *   k_scale [kinematics]               factors of these rows: beside Phi_q^T nu they are the inverse metric of q
+ *   held_row, held_unknown, held_slot [held]   rows that read "unknown = 0" in the place of their equation (the
+ *                                      multiplier of a redundant constraint), with their entry
+ *   held_rate [held]                   1: the row reads "derivative of the unknown = 0"
+ *   cleared [clear]                    the other entries of these rows
+ *   scale [scales]                     calls of the scale blocks of steep rows (none: no row is steep)
+ * All arrays belong to the caller.
+ */
+#ifndef SYSDYN_ASSEMBLY_H
+#define SYSDYN_ASSEMBLY_H
+
+#include "system/contract.h"
+
+typedef struct sd_call {
+    sd_rows *rows;
+    sd_entries *dy;
+    sd_entries *dyd;
+    sd_frame frame;
+    int32_t n_dy, n_dyd;
+    const int32_t *slot_dy, *slot_dyd;
+} sd_call;
+
+typedef struct sd_system sd_system;
+
+/* What is left of a system when unknowns are eliminated (condensed.h): the functions below for its kept unknowns.
+ * jacobian adds to jy, jyd; steep: s := magnitudes of the terms of steep rows, by `terms` of the whole system. */
+typedef void sd_terms(sd_system *system, double t, const double *y, const double *rate, double *s);
+typedef struct sd_left {
+    void (*residual)(const struct sd_left *left, double t, const double *y, const double *yd, double *r);
+    void (*jacobian)(const struct sd_left *left, double t, const double *y, const double *yd, double *jy, double *jyd);
+    void (*steep)(const struct sd_left *left, double t, const double *y, const double *rate, double *s, sd_terms *terms);
+} sd_left;
+
+struct sd_system {
+    int32_t unknowns, rows, entries, calls, kinematics;
+    const int32_t *column, *row;
+    const sd_call *call;
+    const int32_t *k_row, *k_q, *k_f, *k_slot_q, *k_slot_f;
+    const double *k_scale;
+    int32_t held, clear;
+    const int32_t *held_row, *held_unknown, *held_slot, *held_rate, *cleared;
+    int32_t scales;
+    const sd_call *scale;
+    double *v;
+    const int32_t *stop; /* nonzero: a callback of the caller failed, give up */
+    int64_t residual_evaluations, jacobian_evaluations;
+    const sd_left *left; /* the unknowns and rows are those that are left of another system; NULL: all are */
+    int32_t together;    /* 1: its blocks may be called by several threads at once */
+};
+
+/* r := F(t, y, yd) */
+void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r);
+/* jy := dF/dy, jyd := dF/dyd */
+void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd);
+/* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one
+ * holds.  rate [unknowns]: magnitudes of the derivatives, as the method makes them of values; s [rows]: work.
+ * g [entries], scale [unknowns]: slopes, magnitudes of y; all: the other rows are judged too, by the terms |g y| of the
+ * linear model. */
+int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
+                       const double *g, const double *scale, int all, double *s);
+/* The first steep row whose residual r at (t, y) is more than the magnitudes of the unknowns, and their changes in a step
+ * h, make of it, the entries jy and jyd being those of a point nearby; -1 where there is none.  rate, s: as above. */
+int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r,
+                        const double *jy, const double *jyd, double h, const double *magnitude, double *s);
+/* position of the first number that is not finite, -1 where all are */
+int32_t sd_first_bad(int32_t n, const double *x);
+
+#endif

@@ -1,0 +1,149 @@
+/* Elimination of unknowns that are constant sums of others: see condensed.h. */
+#include "system/condensed.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* x := factors * sources + constant, up to three terms in one pass over memory */
+static void evaluate(const sd_straight *straight, double *x, int rate)
+{
+    int32_t n = straight->number, terms = straight->terms;
+    double *restrict out = x + straight->place;
+    const double *restrict f = straight->factor, *restrict c = rate ? NULL : straight->constant;
+    const double *restrict a = terms > 0 ? x + straight->source[0] : NULL, *restrict fa = f;
+    const double *restrict b = terms > 1 ? x + straight->source[1] : NULL, *restrict fb = f + n;
+    const double *restrict d = terms > 2 ? x + straight->source[2] : NULL, *restrict fd = f + 2 * (size_t)n;
+    if (terms == 0)
+        memset(out, 0, (size_t)n * sizeof *out);
+    else if (terms == 1)
+        for (int32_t i = 0; i < n; i++)
+            out[i] = fa[i] * a[i];
+    else if (terms == 2)
+        for (int32_t i = 0; i < n; i++)
+            out[i] = fa[i] * a[i] + fb[i] * b[i];
+    else
+        for (int32_t i = 0; i < n; i++)
+            out[i] = fa[i] * a[i] + fb[i] * b[i] + fd[i] * d[i];
+    for (int32_t k = 3; k < terms; k++) {
+        const double *restrict more = x + straight->source[k], *restrict fm = f + (size_t)k * n;
+        for (int32_t i = 0; i < n; i++)
+            out[i] += fm[i] * more[i];
+    }
+    for (int32_t i = 0; c && i < n; i++)
+        out[i] += c[i];
+}
+
+void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
+{
+    for (int32_t s = 0; s < condensed->straights; s++)
+        evaluate(&condensed->straight[s], x, rate);
+}
+
+static void scatter(const sd_condensed *condensed, const double *z, double *x)
+{
+    for (int32_t s = 0; s < condensed->unknown_spans; s++) {
+        const sd_span *span = &condensed->unknown[s];
+        memcpy(x + span->full, z + span->kept, (size_t)span->number * sizeof *x);
+    }
+}
+
+static void gather(int32_t spans, const sd_span *span, const double *x, double *z)
+{
+    for (int32_t s = 0; s < spans; s++)
+        memcpy(z + span[s].kept, x + span[s].full, (size_t)span[s].number * sizeof *x);
+}
+
+void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate)
+{
+    scatter(condensed, z, x);
+    sd_condensed_complete(condensed, x, rate);
+}
+
+void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd)
+{
+    sd_condensed_expand(condensed, z, y, 0);
+    scatter(condensed, zd, yd);
+    if (condensed->observed_rates)
+        sd_condensed_complete(condensed, yd, 1);
+}
+
+void sd_condensed_gather(const sd_condensed *condensed, const double *x, double *z)
+{
+    gather(condensed->unknown_spans, condensed->unknown, x, z);
+}
+
+/* the point (z, zd) in y, yd; rates of eliminated unknowns are read by no row */
+static void place(const sd_condensed *condensed, const double *z, const double *zd)
+{
+    sd_condensed_expand(condensed, z, condensed->y, 0);
+    scatter(condensed, zd, condensed->yd);
+}
+
+static void residual(const sd_left *left, double t, const double *z, const double *zd, double *r)
+{
+    const sd_condensed *condensed = (const sd_condensed *)left;
+    place(condensed, z, zd);
+    sd_residual(condensed->full, t, condensed->y, condensed->yd, condensed->r);
+    gather(condensed->row_spans, condensed->row, condensed->r, r);
+}
+
+static void jacobian(const sd_left *left, double t, const double *z, const double *zd, double *jz, double *jzd)
+{
+    const sd_condensed *condensed = (const sd_condensed *)left;
+    place(condensed, z, zd);
+    sd_jacobian(condensed->full, t, condensed->y, condensed->yd, condensed->jy, condensed->jyd);
+    for (int64_t p = 0; p < condensed->products; p++) {
+        jz[condensed->to[p]] += condensed->share[p] * condensed->jy[condensed->from[p]];
+        jzd[condensed->to[p]] += condensed->share[p] * condensed->jyd[condensed->from[p]];
+    }
+}
+
+static void steep(const sd_left *left, double t, const double *z, const double *rate, double *s, sd_terms *terms)
+{
+    const sd_condensed *condensed = (const sd_condensed *)left;
+    place(condensed, z, rate);
+    terms(condensed->full, t, condensed->y, condensed->yd, condensed->r);
+    gather(condensed->row_spans, condensed->row, condensed->r, s);
+}
+
+void sd_condensed_bind(sd_condensed *condensed, sd_system *system)
+{
+    condensed->left = (sd_left){residual, jacobian, steep};
+    system->left = &condensed->left;
+}
+
+struct sd_beside {
+    sd_system system, full;
+    sd_condensed condensed;
+    double *y, *yd, *r;
+    double memory[];
+};
+
+sd_beside *sd_beside_new(const sd_system *system)
+{
+    const sd_system *full = system->left ? ((const sd_condensed *)system->left)->full : NULL;
+    size_t n = full ? (size_t)full->unknowns + 8 : 0, rows = full ? (size_t)full->rows + 1 : 0;
+    sd_beside *beside = calloc(1, sizeof *beside + (2 * n + rows) * sizeof(double));
+    if (!beside)
+        return NULL;
+    beside->y = beside->memory;
+    beside->yd = beside->y + n;
+    beside->r = beside->yd + n;
+    return beside;
+}
+
+sd_system *sd_beside_as(sd_beside *beside, const sd_system *system)
+{
+    beside->system = *system;
+    if (system->left) {
+        beside->condensed = *(const sd_condensed *)system->left;
+        beside->full = *beside->condensed.full;
+        beside->condensed.full = &beside->full;
+        beside->condensed.y = beside->y;
+        beside->condensed.yd = beside->yd;
+        beside->condensed.r = beside->r;
+        beside->condensed.jy = beside->condensed.jyd = NULL;
+        beside->system.left = &beside->condensed.left;
+    }
+    return &beside->system;
+}

@@ -1,0 +1,64 @@
+/* A system seen through the unknowns that are left when others are eliminated, exactly and once for all.
+ *
+ * Eliminated unknowns e are sums of kept ones z with constant factors: e = c + T z, from rows that constants make of
+ * unknowns (a resistor's law, the balance of a node) and whose derivatives no row reads.  Kept rows r(t, (z, e(z)), z')
+ * are a system of its own, with dr/dz = J_z + J_e T.  Steppers see that one; what reads a trace sees every unknown again
+ * (expanded.h).
+ *
+ * Shapes
+ *   unknowns, rows: kept ones; full: the system with all of them
+ *   unknown, row: spans of kept places, one behind the other in both
+ *   straight: eliminated unknowns in an order in which each reads kept ones and those before it
+ *   from, to, share [products]: entry `to` of the kept matrix += share * entry `from` of the full one
+ *   y, yd [room of the full system], r [full rows], jy, jyd [full entries]: work
+ */
+#ifndef SYSDYN_CONDENSED_H
+#define SYSDYN_CONDENSED_H
+
+#include "system/assembly.h"
+
+typedef struct sd_span {
+    int32_t full, kept, number;
+} sd_span;
+
+/* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i] */
+typedef struct sd_straight {
+    int32_t place, number, terms;
+    const int32_t *source;  /* [terms] */
+    const double *factor;   /* [terms][number] */
+    const double *constant; /* [number], NULL: zeros */
+} sd_straight;
+
+typedef struct sd_condensed {
+    sd_left left;
+    sd_system *full;
+    int32_t unknowns, rows, unknown_spans, row_spans, straights;
+    int32_t observed_rates; /* 0: nobody reads rates of eliminated unknowns before a point is settled */
+    const sd_span *unknown, *row;
+    const sd_straight *straight;
+    int64_t products;
+    const int32_t *from, *to;
+    const double *share;
+    double *y, *yd, *r, *jy, *jyd;
+} sd_condensed;
+
+/* the functions of assembly.h read `system` through it */
+void sd_condensed_bind(sd_condensed *condensed, sd_system *system);
+
+/* A system beside `system`, with work arrays of its own: another thread may ask it for residuals at the same time, after
+ * sd_beside_as.  free() lets go of it; NULL: no memory. */
+typedef struct sd_beside sd_beside;
+sd_beside *sd_beside_new(const sd_system *system);
+/* what the system is now (its held rows change) */
+sd_system *sd_beside_as(sd_beside *beside, const sd_system *system);
+
+/* all unknowns x of the full system from kept values z; rate: x and z are derivatives.  What is neither kept nor
+ * eliminated stays as it is */
+void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate);
+/* y, yd of a point that is observed but not settled: rates only as far as they are read */
+void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd);
+/* the eliminated ones of x from its kept ones */
+void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate);
+void sd_condensed_gather(const sd_condensed *condensed, const double *x, double *z);
+
+#endif

@@ -1,0 +1,440 @@
+/* Least change onto the equations and their hidden derivatives: see settle.h. */
+#include "system/settle.h"
+#include "system/condensed.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EPSILON 1e-14   /* of redundant rows */
+#define ITERATIONS 6
+#define PATIENT 40      /* of the last attempt: an exponential is climbed down a step at a time */
+#define EXACT 4e-15     /* scaled residual that counts as round-off */
+#define FINE 1e-13      /* ... and that with which old factors have done what they can */
+#define CLOSE 1e-9      /* scaled residual with which one may live */
+#define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
+#define HELD 1e8        /* weight of the state in a second attempt */
+#define DRAWN 1e-7      /* weight from which an unknown is drawn to where it came from */
+#define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
+#define STILL 1e-12     /* move of the state, in magnitudes, that is none */
+#define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
+#define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
+#define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
+
+enum { NONE, MATRIX, BASIS };
+
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole)
+{
+    sd_settle *settle = calloc(1, sizeof *settle);
+    if (!settle)
+        return NULL;
+    size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
+    size_t all = system->left ? (size_t)whole + 8 : 0;
+    size_t most = linear && (size_t)linear->entries > 2 * m ? (size_t)linear->entries : 2 * m;
+    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 6 * n + 4 * all, sizeof(double));
+    if (!settle->memory) {
+        free(settle);
+        return NULL;
+    }
+    settle->system = system;
+    settle->linear = linear;
+    settle->unknowns = system->unknowns;
+    settle->rates = rates;
+    settle->rows = system->rows;
+    settle->hold = 1.0;
+    settle->jy = settle->memory;
+    settle->jyd = settle->jy + nnz;
+    settle->row_scale = settle->jyd + nnz;
+    settle->r = settle->row_scale + m;
+    settle->x = settle->r + m;
+    settle->x0 = settle->x + n;
+    settle->scale = settle->x0 + n;
+    settle->step = settle->scale + n; /* unknowns, rates and rows */
+    settle->met = settle->step + n + m;
+    settle->matrix = settle->met + n;
+    settle->room = settle->matrix + most + 1;
+    settle->whole = whole;
+    return settle;
+}
+
+int sd_settle_take(sd_settle *settle, sd_linear *linear)
+{
+    settle->taken = calloc((size_t)linear->entries + 1, sizeof(double));
+    if (!settle->taken)
+        return 2;
+    settle->linear = linear;
+    settle->matrix = settle->taken;
+    return 0;
+}
+
+void sd_settle_free(sd_settle *settle)
+{
+    if (!settle)
+        return;
+    free(settle->taken);
+    sd_sparse_free(settle->basis);
+    free(settle->lift);
+    free(settle->memory);
+    free(settle);
+}
+
+int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
+                    const int32_t *place_y, const int32_t *place_yd)
+{
+    int32_t n = settle->unknowns + settle->rates;
+    settle->basis = sd_sparse_new(n, settle->rows, column, row, order);
+    settle->lift = calloc((size_t)n + (size_t)column[settle->rows] + 1, sizeof(double));
+    if (!settle->basis || !settle->lift)
+        return 2;
+    settle->basis->null_pivot = LEAST_PIVOT;
+    settle->basis->most = 1000000 + (int64_t)FILL * column[settle->rows];
+    settle->basis_column = column;
+    settle->basis_row = row;
+    settle->basis_y = place_y;
+    settle->basis_yd = place_yd;
+    settle->basis_value = settle->lift + n;
+    for (int32_t j = 0; j < n; j++)
+        settle->lift[j] = 1.0 / settle->weight[j];
+    return 0;
+}
+
+int *sd_settle_pivoted(sd_settle *settle)
+{
+    return settle->basis ? &settle->basis->pivoted : NULL;
+}
+
+/* largest scaled residual at (t, x) */
+static double measure(sd_settle *settle, double t, const double *y, const double *yd)
+{
+    double worst = 0.0, own = 0.0, sum = 0.0;
+    sd_residual(settle->system, t, y, yd, settle->r);
+    for (int32_t i = 0; i < settle->rows; i++) {
+        double v = fabs(settle->r[i] * settle->row_scale[i]);
+        if (!(v <= worst))
+            worst = v;
+        if (settle->sort[i] == SD_CONSTRAINT)
+            sum += v * v;
+        if (settle->sort[i] != SD_RATE && !(v <= own))
+            own = v;
+    }
+    settle->own = own;
+    settle->residual = worst;
+    settle->constraints = sqrt(sum);
+    return worst;
+}
+
+/* Slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms.  met: the point is one of
+ * the motion, with which magnitudes grow; an iterate may be anywhere. */
+static void slopes(sd_settle *settle, double t, const double *y, const double *yd, int met)
+{
+    sd_system *system = settle->system;
+    int32_t n = settle->unknowns, rates = settle->rates;
+    sd_jacobian(system, t, y, yd, settle->jy, settle->jyd);
+    memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
+    settle->ready = NONE;
+    for (int32_t j = 0; j < n + rates && met; j++) {
+        double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
+        if (size > settle->scale[j] && isfinite(size))
+            settle->scale[j] = size;
+    }
+    for (int32_t j = 0; j < n; j++) /* scale of yd at [step] for the moment */
+        settle->step[j] = 0.0;
+    for (int32_t k = 0; k < rates; k++)
+        settle->step[settle->rate[k]] = settle->scale[n + k];
+    for (int32_t j = 0; j < n; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
+            settle->jy[e] *= settle->scale[j];
+            settle->jyd[e] *= settle->step[j];
+            settle->row_scale[system->row[e]] += fabs(settle->jy[e]) + fabs(settle->jyd[e]);
+        }
+    for (int32_t i = 0; i < settle->rows; i++)
+        settle->row_scale[i] = settle->sort[i] == SD_LEFT_OUT   ? 0.0
+                               : settle->row_scale[i] > 0.0 ? 1.0 / settle->row_scale[i]
+                                                            : 1.0;
+}
+
+/* the saddle-point matrix and its factors at (t, y, yd) */
+static int factorise(sd_settle *settle, double t, const double *y, const double *yd)
+{
+    sd_system *system = settle->system;
+    int32_t n = settle->unknowns, rates = settle->rates;
+    if (!settle->linear && settle->provide())
+        return 1;
+    slopes(settle, t, y, yd, 1);
+    memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
+    for (int32_t e = 0; e < system->entries; e++) {
+        double scale = settle->row_scale[system->row[e]];
+        double a = settle->jy[e] * scale, b = settle->jyd[e] * scale;
+        if (settle->slot_y[e] >= 0) {
+            settle->matrix[settle->slot_y[e]] += a;
+            settle->matrix[settle->slot_y_t[e]] += a;
+        }
+        if (settle->slot_yd[e] >= 0) {
+            settle->matrix[settle->slot_yd[e]] += b;
+            settle->matrix[settle->slot_yd_t[e]] += b;
+        }
+    }
+    for (int32_t j = 0; j < n + rates; j++)
+        settle->matrix[settle->slot_x[j]] += settle->weight[j] * (settle->weight[j] < DRAWN ? 1.0 : settle->hold);
+    for (int32_t i = 0; i < settle->rows; i++)
+        settle->matrix[settle->slot_r[i]] -= EPSILON;
+    if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
+        sd_linear_factor(settle->linear, settle->matrix, NULL))
+        return 1;
+    settle->ready = MATRIX;
+    return 0;
+}
+
+/* the basis at (t, y, yd) */
+static int choose(sd_settle *settle, double t, const double *y, const double *yd, int met)
+{
+    const sd_system *system = settle->system;
+    int32_t entries = settle->basis_column[settle->rows];
+    double *value = settle->basis_value;
+    slopes(settle, t, y, yd, met);
+    memset(value, 0, (size_t)entries * sizeof *value);
+    for (int32_t e = 0; e < system->entries; e++) {
+        double scale = settle->row_scale[system->row[e]];
+        int32_t a = settle->basis_y[e], b = settle->basis_yd[e];
+        if (a >= 0)
+            value[a] += settle->jy[e] * scale * settle->lift[settle->basis_row[a]];
+        if (b >= 0)
+            value[b] += settle->jyd[e] * scale * settle->lift[settle->basis_row[b]];
+    }
+    if (sd_first_bad(entries, value) >= 0)
+        return 1;
+    sd_sparse *lu = settle->basis;
+    if (!lu->pivoted || sd_sparse_refactor(lu, settle->basis_column, settle->basis_row, value)) {
+        int failed = sd_sparse_pivot(lu, settle->basis_column, settle->basis_row, value);
+        if (failed > 1) /* it fills too much */
+            settle->refused = REFUSALS;
+        if (failed)
+            return 1;
+    }
+    settle->ready = BASIS;
+    return 0;
+}
+
+/* One Newton step within the basis; the largest moves of all and of the state, in magnitudes. */
+static double move_basic(sd_settle *settle, double *y, double *yd, double *state)
+{
+    int32_t n = settle->unknowns, moves = n + settle->rates;
+    double largest = 0.0, *b = settle->matrix; /* the matrix is made anew where it is wanted */
+    for (int32_t i = 0; i < settle->rows; i++)
+        b[i] = -settle->r[i] * settle->row_scale[i];
+    sd_sparse_basic(settle->basis, b, settle->step, b + settle->rows);
+    for (int32_t j = 0; j < moves; j++) {
+        double move = settle->step[j] *= settle->lift[j];
+        largest = fmax(largest, fabs(move));
+        if (settle->weight[j] >= DRAWN)
+            *state = fmax(*state, fabs(move));
+    }
+    for (int32_t j = 0; j < n; j++)
+        y[j] += settle->step[j] * settle->scale[j];
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
+    return largest;
+}
+
+/* The iteration within the basis from (y, yd) = x0: 1 where it settled and the state stayed, the residual in `best`;
+ * else the point is as it was. */
+static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
+{
+    double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
+    /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
+    double bound = settle->system->scales > 0 ? FINE : CLOSE;
+    int fresh = settle->ready != BASIS, failed = fresh && choose(settle, t, y, yd, 1);
+    double before = failed ? INFINITY : measure(settle, t, y, yd);
+    settle->drift = settle->constraints;
+    for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
+        if (before <= limit && (m == 0 || moved < SMALL))
+            break;
+        double pulled = 0.0;
+        moved = move_basic(settle, y, yd, &pulled);
+        state += pulled;
+        double now = measure(settle, t, y, yd);
+        failed = !isfinite(now) || state > still;
+        if (!failed && moved < SMALL && now > 0.5 * before && now <= (fresh ? bound : FINE)) {
+            before = now; /* round-off is what is left */
+            break;
+        }
+        if (!failed && now > CONTRACTS * before && now > fmax(FINE, limit)) {
+            failed = choose(settle, t, y, yd, 0);
+            fresh = 1;
+        }
+        before = now;
+    }
+    *best = before;
+    if (!failed && before <= fmax(bound, settle->enough)) {
+        settle->refused = 0;
+        return 1;
+    }
+    settle->basis->pivoted = 0; /* another one may do */
+    settle->refused++;
+    settle->ready = NONE;
+    return 0;
+}
+
+/* One Gauss-Newton step of x = (y, chosen yd); the largest move, in magnitudes.  The state is drawn to where it came
+ * from, what follows from it only held where it is: so in the end it exerts no pull. */
+static double move(sd_settle *settle, double *y, double *yd)
+{
+    int32_t n = settle->unknowns, moves = n + settle->rates;
+    double largest = 0.0;
+    for (int32_t j = 0; j < moves; j++) {
+        double now = j < n ? y[j] : yd[settle->rate[j - n]];
+        if (settle->weight[j] < DRAWN)
+            settle->step[j] = 0.0;
+        else
+            settle->step[j] = -settle->hold * settle->weight[j] * (now - settle->x0[j]) / settle->scale[j];
+    }
+    for (int32_t i = 0; i < settle->rows; i++)
+        settle->step[moves + i] = -settle->r[i] * settle->row_scale[i];
+    sd_linear_solve(settle->linear, settle->step);
+    for (int32_t j = 0; j < n; j++)
+        y[j] += settle->step[j] * settle->scale[j];
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
+    for (int32_t j = 0; j < moves; j++)
+        largest = fmax(largest, fabs(settle->step[j]));
+    return largest;
+}
+
+/* x := (y, chosen yd) */
+static void take(const sd_settle *settle, const double *y, const double *yd, double *x)
+{
+    memcpy(x, y, (size_t)settle->unknowns * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        x[settle->unknowns + k] = yd[settle->rate[k]];
+}
+
+/* (y, chosen yd) := x */
+static void put(const sd_settle *settle, const double *x, double *y, double *yd)
+{
+    memcpy(y, x, (size_t)settle->unknowns * sizeof *y);
+    for (int32_t k = 0; k < settle->rates; k++)
+        yd[settle->rate[k]] = x[settle->unknowns + k];
+}
+
+/* The iteration from (y, yd) towards what is nearest to x0; the best point met, its residual in `best`, is left in x. */
+static void iterate(sd_settle *settle, double t, double *y, double *yd, int most, double *best)
+{
+    int fresh = settle->ready != MATRIX, failed = fresh && factorise(settle, t, y, yd);
+    double moved = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
+    *best = before;
+    settle->drift = settle->constraints;
+    take(settle, y, yd, settle->x);
+    for (int m = 0; m < most && !failed && !*settle->system->stop; m++) {
+        if (moved < SMALL && before <= fmax(EXACT, settle->enough))
+            break;
+        moved = move(settle, y, yd);
+        double now = measure(settle, t, y, yd);
+        if (!(now <= CLOSE))
+            settle->contracted = fmax(settle->contracted, before > 0.0 && isfinite(now) ? now / before : INFINITY);
+        /* between residuals of round-off the later point is the better one: the state is back where it came from */
+        if (now < *best || now <= EXACT || (now <= FINE && drag >= SMALL)) {
+            *best = now;
+            drag = moved;
+            take(settle, y, yd, settle->x);
+        }
+        if (!isfinite(now) || (now > 0.5 * before && now < (fresh && m > 0 ? CLOSE : FINE) && moved < SMALL))
+            break;
+        if (now > CONTRACTS * before && now > fmax(EXACT, settle->enough)) {
+            failed = factorise(settle, t, y, yd);
+            fresh = 1;
+        }
+        before = now;
+    }
+}
+
+/* (y, chosen yd): the state as in x0, what follows from it as at the last point that settled */
+static void put_near(const sd_settle *settle, double *y, double *yd)
+{
+    int32_t n = settle->unknowns;
+    put(settle, settle->x0, y, yd);
+    for (int32_t j = 0; j < n + settle->rates; j++)
+        if (settle->weight[j] < DRAWN)
+            *(j < n ? &y[j] : &yd[settle->rate[j - n]]) = settle->met[j];
+}
+
+/* what the point makes of other unknowns, and its residuals */
+static void finish(sd_settle *settle, double t, double *y, double *yd, int done)
+{
+    for (int32_t i = 0; done && i < settle->system->held; i++)
+        y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
+    for (int32_t i = 0; i < settle->kinematics && !settle->system->left; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    measure(settle, t, y, yd);
+}
+
+/* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
+static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
+{
+    double best;
+    settle->calls++;
+    settle->contracted = 0.0;
+    take(settle, y, yd, settle->x0);
+    if (settle->basis && settle->hold == 1.0 && settle->refused < REFUSALS) {
+        if (follow(settle, t, y, yd, &best)) {
+            take(settle, y, yd, settle->met);
+            finish(settle, t, y, yd, 1);
+            return 0;
+        }
+        put(settle, settle->x0, y, yd);
+    }
+    iterate(settle, t, y, yd, ITERATIONS, &best);
+    if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
+        put(settle, settle->x0, y, yd);
+        settle->hold = HELD;
+        settle->ready = 0;
+        iterate(settle, t, y, yd, ITERATIONS, &best);
+        settle->hold = 1.0;
+        settle->ready = 0;
+    }
+    if (best > CLOSE && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
+        put_near(settle, y, yd);
+        iterate(settle, t, y, yd, PATIENT, &best);
+    }
+    /* the best point met, or the given one; a rate may have no bound */
+    put(settle, settle->x, y, yd);
+    int done = best <= CLOSE || (measure(settle, t, y, yd), settle->own <= CLOSE);
+    if (done)
+        take(settle, y, yd, settle->met);
+    else
+        put(settle, settle->x0, y, yd);
+    settle->failures += !done;
+    finish(settle, t, y, yd, done);
+    return !done;
+}
+
+/* the same for a point with all unknowns of the system that this one is condensed from */
+static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
+{
+    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
+    if (!condensed)
+        return settle_unknowns(settle, t, y, yd);
+    double *z = settle->room + 2 * settle->whole, *zd = z + settle->whole;
+    sd_condensed_gather(condensed, y, z);
+    sd_condensed_gather(condensed, yd, zd);
+    int failed = settle_unknowns(settle, t, z, zd);
+    sd_condensed_expand(condensed, z, y, 0);
+    sd_condensed_expand(condensed, zd, yd, 1);
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    sd_condensed_complete(condensed, yd, 1); /* what follows from displacements follows them in its rate */
+    return failed;
+}
+
+int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
+{
+    if (!settle->seen)
+        return settle_whole(settle, t, y, yd);
+    double *whole = settle->room, *whole_d = whole + settle->whole;
+    sd_condensed_expand(settle->seen, y, whole, 0);
+    sd_condensed_expand(settle->seen, yd, whole_d, 1);
+    int failed = settle_whole(settle, t, whole, whole_d);
+    sd_condensed_gather(settle->seen, whole, y);
+    sd_condensed_gather(settle->seen, whole_d, yd);
+    return failed;
+}

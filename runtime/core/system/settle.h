@@ -1,0 +1,73 @@
+/* Moves a point onto every equation that holds there: the rows as written and their hidden derivatives.
+ *
+ * Unknowns x = (y, chosen yd).  Rows: dynamics, momentum, momentum_rate, phi, phi_rate, phi_acceleration, psi,
+ * psi_rate, gamma, gamma_rate, lambda (a system of assembly.h whose rows may be fewer than its unknowns).
+ * Weighted least change (Gauss-Newton, each step the saddle-point system
+ *      [ D   G^T ] [ z      ]   [ -D (x - x0) ]
+ *      [ G  -eps ] [ lambda ] = [ -r          ]
+ * in scaled unknowns z and rows): unknowns that carry the state have weight 1, those that follow from it almost
+ * none.  eps makes redundant rows harmless.  The factors are kept from point to point while the iteration contracts.
+ * Where the state meets its own rows already, nothing of it has to move, and a basic solution of G z = -r is the same
+ * thing at a fraction of the cost: the unknowns that follow pivot first (`basis`).  One that moves the state by more
+ * than is asked is not taken.
+ */
+#ifndef SYSDYN_SETTLE_H
+#define SYSDYN_SETTLE_H
+
+#include "system/assembly.h"
+#include "linear/linear.h"
+#include "linear/sparse.h"
+
+/* Of a condensed system the kept unknowns are moved; the others follow, and so do their rates. */
+enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
+
+typedef struct sd_settle {
+    sd_system *system;
+    sd_linear *linear;               /* of the saddle-point matrix [unknowns + rates + rows]; NULL: not there yet */
+    int32_t unknowns, rates, rows;
+    const int32_t *rate;             /* [rates] positions in yd */
+    const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
+    const int32_t *slot_yd, *slot_yd_t;   /* [entries] the same of dF/dyd */
+    const int32_t *slot_x, *slot_r;       /* [unknowns + rates], [rows] diagonal */
+    const double *weight;            /* [unknowns + rates]: 1 for the state, less for what has no inertia, almost
+                                        nothing for what follows from it */
+    double *scale;                   /* [unknowns + rates] magnitudes */
+    const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
+    const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
+    int32_t kinematics;
+    double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *met, *memory; /* met: the last point that settled */
+    sd_sparse *basis;                /* of G^T, its rows over the weights: what follows pivots first; or NULL */
+    const int32_t *basis_column, *basis_row;      /* its pattern: [rows + 1], unknowns and rates of each row */
+    const int32_t *basis_y, *basis_yd;            /* [entries] places of dF/dy, dF/dyd in it, -1: none */
+    double *lift, *basis_value;      /* [unknowns + rates] 1 / weight; [entries of the pattern] */
+    double hold;                     /* weight of the state; 1 but in a second attempt */
+    double enough;                   /* scaled residual with which a draft is content; 0: round-off */
+    double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ */
+    int32_t ready;                   /* whose factors stand: 0 none, else of the matrix or the basis */
+    int32_t refused;                 /* attempts by the basis that led nowhere */
+    double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
+                                        rate of another; norm of the constraint rows */
+    int64_t calls, failures;         /* calls - failures > 0: a point has been met */
+    const struct sd_condensed *seen;       /* points are handed over as this system has them; NULL: with all unknowns */
+    double *room;                    /* [2][unknowns of the whole system] for points with all of them, and kept ones */
+    int32_t whole;                   /* unknowns of a point: those of the system, or of the one that it is condensed from */
+    int (*provide)(void);            /* of large ones: makes `linear` and its places when they are wanted first; 0 done */
+    double *taken;                   /* the matrix of such a one */
+    double drift;                    /* norm of the constraint rows before the last call moved the point */
+    double contracted;               /* largest residual beside the one before it, of the steps of the last call */
+} sd_settle;
+
+/* whole: unknowns of a point, more than the system's where that is condensed */
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole);
+/* takes the factors of the saddle-point matrix; 2: no memory */
+int sd_settle_take(sd_settle *settle, sd_linear *linear);
+/* The basis: pattern of G^T, order of its columns, the rows; places as above.  2: no memory. */
+int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
+                    const int32_t *place_y, const int32_t *place_yd);
+/* whether a pattern of the basis exists; NULL without one */
+int *sd_settle_pivoted(sd_settle *settle);
+void sd_settle_free(sd_settle *settle);
+/* y, yd [unknowns] moved in place; 0 done, 1 it did not converge (they are unchanged) */
+int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
+
+#endif
