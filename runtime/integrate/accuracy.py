@@ -99,7 +99,7 @@ class Law:
 LAWS = {
     # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
-    # its error test works with a tenth of the power 2/3 of the tolerance (steppers/radau.h); on stiff models its order is 3
+    # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3
     "radau": Law(5.0, 0.9, 0.65, 1e-17, 1.2, 0.15),
     "dopri": Law(40.0, 1.0, 0.9, 2e-14),
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to

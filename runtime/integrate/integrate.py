@@ -50,7 +50,7 @@ CRAWL = 200_000
 CREPT = 1e-7
 SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change,
-where constraints are constant sums: their unknowns are interpolated differently (steppers/radau_dense.c).  Of curved ones
+where constraints are constant sums: their unknowns are interpolated differently (radau_dense.c).  Of curved ones
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 UNPULLED = 2
 """Kind of a derivative (core/steppers/radau.h): interpolated whatever pulls at its unknown."""
