@@ -54,10 +54,6 @@ where constraints are constant sums: their unknowns are interpolated differently
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 UNPULLED = 2
 """Kind of a derivative (core/steppers/radau.h): interpolated whatever pulls at its unknown."""
-RATED = 400
-"""Unknowns up to which full matrices tell whether flows are open.  Of larger systems a point with the rates of all
-balances is dear to find (a grid of 20 x 20: 2 s for 0.1 s); their loops of stores are left as rows leave them.
-"""
 STAGED = 100_000
 """Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
 ROOM = 4096
@@ -107,11 +103,12 @@ class Integration:
         self.forms = self._condensed()
         self._linear()
         self.settler = self._settler("settled" if self.forms is not None else self._whole_form, self._keeps)
-        # the least change shares what is open: flows between contacts, potentials where all laws at a node are faint
-        if request.events is None and not self._steep_balances:
+        if not self._steep_balances:
             sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
             # steep laws magnify what a basis leaves
-            self.settler.by_basis(SLACK * request.tolerance if sums and not system.form.scales else 0.0)
+            slack = SLACK * request.tolerance if sums and not system.form.scales else 0.0
+            # the least change shares what is open: flows between contacts, potentials where all laws are faint
+            self.settler.by_basis(slack, determined=request.events is not None)
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
         self._stepper()
         self._driver()
@@ -174,17 +171,15 @@ class Integration:
 
     @cached_property
     def _whole_form(self) -> str:
-        """All rows that hold at a point, with every unknown; of large ones those that events do not ask about."""
-        request, system = self.request, self.system
+        """All rows that hold at a point, with every unknown: where events change them any flow may be open."""
+        system = self.system
         if "dynamics_rate" not in system.description.blocks:
             return "settled"
-        if request.events is not None and request.events.contacts:
+        if self.request.events is not None:
             return "rated"
-        if system.unknowns > RATED:
-            return "settled"
         n = system.form.written
         point = self.start.t, self.y[:n], self.yd[:n]
-        return "rated" if request.events or flows_open(system.another("settled"), *point, self._keeps) else "settled"
+        return "rated" if flows_open(system.another("settled"), *point, self._keeps) else "settled"
 
     def _settler(self, name: str, state: NDArray[np.bool_], *, whole: bool = False) -> Settler:
         """Of the rows of a form; whole: with every unknown, whatever leaves the runs."""

@@ -411,6 +411,7 @@ class Settle(c.Structure):
         ("slack", _D),
         ("ready", _I),
         ("refused", _I),
+        ("determined", _I),
         ("residual", _D),
         ("own", _D),
         ("constraints", _D),

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
-from sysdyn.runtime.numerics.ordering import tall_order
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
+from sysdyn.runtime.numerics.tall import determined
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
@@ -38,12 +37,6 @@ NORM = RANK**2 / EPS
 """Weight of the norm there for rows that leave little.  Singular values below the root of NORM EPS pass for redundant,
 as below RANK, and the system is as well conditioned as the rows, not as their squares (Bjorck, BIT 7, 1967); of the
 least norm it knows seven digits."""
-PIVOT = 1e-8
-"""Least pivot, as part of its column, of an unknown that rows determine; with less the least norm has a say."""
-FILLED = 12
-"""Entries of factors for one of the matrix from which those of the saddle point are no worse."""
-MEMORY = 2
-"""What the core answers where it has none."""
 MET = 1e-10
 """Of the aim: what a solution of the linearised rows may miss before another way is tried."""
 FAR = 0.1
@@ -230,36 +223,6 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
         tried.append((missed, found))
     least = min(tried, key=lambda item: item[0])
     return least[1] if least[0] < FAR * tried[0][0] else tried[0][1]
-
-
-def determined(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats | None:
-    """The u that rows of size one determine, unknowns that stand in none of them zero; None where they leave others
-    open.  Rows in excess are not looked at (core/linear/tall.h).
-    """
-    i, j, v = entries
-    here = v != 0.0
-    if not here.all():
-        i, j, v = i[here], j[here], v[here]
-    used = np.zeros(shape[1], dtype=bool)
-    used[j] = True
-    rows, unknowns = shape[0], int(used.sum())
-    if unknowns > rows:
-        return None
-    number = np.cumsum(used, dtype=np.int32) - 1
-    pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
-    values, found = np.bincount(slot, weights=v, minlength=pattern.entries), np.zeros(unknowns)
-    del slot, number, here
-    order = tall_order(pattern)
-    arrays = (lib.pointer(item) for item in (pattern.column, pattern.row, values, order))
-    limits = PIVOT, FILLED * pattern.entries
-    failed = lib.core.sd_determined(rows, unknowns, *arrays, *limits, lib.pointer(aim), lib.pointer(found))
-    if failed == MEMORY:
-        raise MemoryError
-    if failed:
-        return None
-    whole = np.zeros(shape[1])
-    whole[used] = found
-    return whole
 
 
 _Way = Callable[[tuple[int, int], tuple[Any, Any, Floats], Floats], Floats]

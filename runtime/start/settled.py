@@ -17,9 +17,9 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import column_order, tall_order
-from sysdyn.runtime.numerics.rank import NotFiniteError, null_space
+from sysdyn.runtime.numerics.tall import left_open
 
 LARGE = 100_000
 """Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before."""
@@ -80,13 +80,21 @@ def flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[
 
 
 def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_]) -> bool:
-    jy, jyd = (settled.dense(values) for values in settled.jacobian(t, y, yd))
-    flow = (settled.kinds == "f")[~state]
-    try:
-        open_ = null_space(equilibrated(np.hstack([jy[:, ~state], jyd[:, rates_of(settled)]]))[0])
-    except NotFiniteError:
+    (jy, jyd), pattern, rates = settled.jacobian(t, y, yd), settled.pattern, rates_of(settled)
+    n, columns = settled.unknowns, pattern.columns_of()
+    rate_at = np.full(n, -1, dtype=np.int64)
+    rate_at[rates] = n + np.arange(rates.size)
+    free, rated = ~state[columns], rate_at[columns] >= 0
+    i = np.concatenate([pattern.row[free], pattern.row[rated]])
+    j = np.concatenate([columns[free], rate_at[columns[rated]]])
+    v = np.concatenate([jy[free], jyd[rated]])
+    if not np.isfinite(v).all():
         return True
-    return bool((np.abs(open_[: flow.size][flow]) > OPEN).any())
+    shape = settled.rows, n + rates.size
+    row, column = sparse_factors(i, j, np.abs(v), shape)
+    open_ = left_open(shape, (i, j, v * row[i] * column[j]))
+    flow = (settled.kinds == "f") & ~state
+    return open_ is None or bool((np.abs(open_[:n][flow]) > OPEN).any())
 
 
 class Settler:
@@ -231,12 +239,15 @@ class Settler:
         full[with_rate] = slots[1]
         return found, [slots[0], full], tall_order(found)
 
-    def by_basis(self, slack: float) -> None:
-        """Points settle within a basis where the state moves by no more than slack, in magnitudes (settle.h)."""
+    def by_basis(self, slack: float, *, determined: bool) -> None:
+        """Points settle within a basis where the state moves by no more than slack, in magnitudes (settle.h).
+
+        determined: only where it leaves nothing open that follows from the state.
+        """
         self._wide = self.system.once(("basis", *self._key), self._basis)
         pattern, slots, order = self._wide
         arrays = (pattern.column, pattern.row, order, *slots)
-        if lib.core.sd_settle_widen(self.core, *(lib.pointer(item) for item in arrays)):
+        if lib.core.sd_settle_widen(self.core, *(lib.pointer(item) for item in arrays), int(determined)):
             raise MemoryError
         self.core.contents.slack = slack
 
@@ -251,12 +262,9 @@ class Settler:
         hold: times the weight of the state; HELD moves it only where the rows leave nothing else.
         """
         self.core.contents.hold = hold
-        if hold != 1.0:
-            self.core.contents.ready = 0
         a, b = self.system._buffer(y), self.system._buffer(yd)
         failed = lib.core.sd_settle_point(self.core, t, lib.pointer(a), lib.pointer(b))
-        if hold != 1.0:
-            self.core.contents.hold, self.core.contents.ready = 1.0, 0
+        self.core.contents.hold = 1.0
         self.system.failure.check()
         return a[: self._points], b[: self._points], not failed
 

@@ -49,3 +49,64 @@ def test_currents_in_a_loop_of_capacitors(tmp_path, formulation, case):
     rate = np.linalg.solve([[1.3, -1.1], [-1.1, 1.4]], [through, source - through])
     for name, flow in {"Ca.f": 0.2 * rate[0], "Cb.f": 0.3 * rate[1], "Cc.f": 1.1 * (rate[0] - rate[1])}.items():
         assert np.abs(trace[name].values - flow).max() < 1e-7 * np.abs(flow).max(), name
+
+
+WINDING = """
+from std.electrical import resistor, capacitor, inductor
+model winding {{
+  param n = {n}
+  node s, v[0..n]: electrical
+  {source}
+  Rs: resistor(R = 50 ohm) s -> v[0]
+  C: capacitor(C = 10 pF) v[0]
+  for i in 1..n {{
+    L[i]: inductor(L = 10 uH) v[i - 1] -> v[i]
+    K[i]: capacitor(C = 50 pF) v[i - 1] -> v[i]
+    G[i]: capacitor(C = 10 pF) v[i]
+  }}
+  Re: resistor(R = 1 kohm) v[n]
+}}
+scene run of winding {{
+  time 0 s to 3 us
+  trace v[0].e, C.f, K[1].f, G[1].f, L[2].f every 0.05 us
+  accuracy 1e-6
+}}
+"""
+JUMPS = {
+    "the text": "Vs: effort(e = if t < 1 us then 0 V else 1 V) s -> ground",
+    "an event": "discrete u = 0 V\n  Vs: effort(e = u) s -> ground\n  when t > 1 us { u := 1 V }",
+}
+
+
+@pytest.mark.parametrize("jump", JUMPS)
+def test_a_winding_of_many_coils(tmp_path, jump):
+    """Hundreds of unknowns, each coil beside a capacitor: C v' = -D^T i - G v + u/50, L i' = D v, by the
+    eigenvectors.
+    """
+    n, at = 80, 1e-6
+    trace = trace_of(tmp_path, WINDING.format(n=n, source=JUMPS[jump]), scene="run", formulation="lagrangian")
+    difference = np.eye(n, n + 1) - np.eye(n, n + 1, 1)
+    store = 10e-12 * np.eye(n + 1) + 50e-12 * difference.T @ difference
+    leak = np.diag([1 / 50.0, *np.zeros(n - 1), 1 / 1000.0])
+    inverse = np.linalg.inv(store)
+    matrix = np.block([[-inverse @ leak, -inverse @ difference.T], [difference / 10e-6, np.zeros((n, n))]])
+    fed = np.append(inverse[:, 0] / 50.0, np.zeros(n))
+    rest = np.linalg.solve(matrix, -fed)
+    rates, vectors = np.linalg.eig(matrix)
+    parts = np.linalg.solve(vectors, rest.astype(complex))
+    t = trace.time
+    here = np.isclose(t, at, rtol=1e-12)
+    later = (t > at) & ~here
+    later[np.flatnonzero(here)[-1]] = True  # of two rows at the instant the second one
+    since = np.where(later, t - at, 0.0)
+    motion = rest[:, None] - (vectors @ (parts[:, None] * np.exp(np.outer(rates, since)))).real
+    slope = (matrix @ motion + fed[:, None]) * later
+    expected = {
+        "v[0].e": motion[0],
+        "C.f": 10e-12 * slope[0],
+        "K[1].f": 50e-12 * (slope[0] - slope[1]),
+        "G[1].f": 10e-12 * slope[1],
+        "L[2].f": motion[n + 2],
+    }
+    for name, values in expected.items():
+        assert np.abs(trace[name].values - values).max() < 1e-6 * np.abs(values).max(), name

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.numerics import least_change
-from sysdyn.runtime.numerics.least_change import determined, least_norm
+from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.ordering import neighbours, paired_order
+from sysdyn.runtime.numerics.tall import determined, left_open
 
 N = 400
 
@@ -48,6 +49,30 @@ def test_what_is_open_is_not_determined():
     assert determined((shape[0], 2 * N), twice, aim) is None
     both = np.concatenate([i, i + shape[0], i]), np.concatenate([j, j, j + N]), np.concatenate([v, v, v])
     assert determined((2 * shape[0], 2 * N), both, np.concatenate([aim, aim])) is not None
+
+
+def test_rows_that_determine_everything_leave_nothing_open():
+    shape, entries = _chain()
+    assert np.abs(left_open(shape, entries)).max() == 0.0
+    assert left_open((shape[0], N + 1), entries)[N] == 1.0  # it stands in no row
+
+
+def test_what_is_open_moves_together():
+    """Two rings of differences and a chain beside them: each ring moves as one, by an amount of its own."""
+    n = 100
+    k = np.arange(n)
+    ring = np.concatenate([k, k]), np.concatenate([k, (k + 1) % n]), np.concatenate([np.ones(n), -np.ones(n)])
+    shape, chain = _chain(n)
+    parts = [(ring, 0, 0), (ring, n, n), (chain, 2 * n, 2 * n)]
+    entries = tuple(
+        np.concatenate(item)
+        for item in zip(*(((e[0] + i), (e[1] + j), e[2]) for e, i, j in parts), strict=True)
+    )
+    found = left_open((2 * n + shape[0], 3 * n), entries)
+    first, second, third = found[:n], found[n : 2 * n], found[2 * n :]
+    assert max(np.ptp(first), np.ptp(second), np.abs(third).max()) < 1e-12
+    assert min(abs(first[0]), abs(second[0])) > 0.1
+    assert max(abs(first[0]), abs(second[0])) == pytest.approx(1.0)
 
 
 def test_a_difference_alone_leaves_the_mean_open():

@@ -277,7 +277,7 @@ void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double 
     int32_t n = lu->n;
     for (int32_t k = 0; k < n; k++) {
         int32_t r = lu->source[k];
-        work[k] = row_scale ? x[r] * row_scale[r] : x[r];
+        work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];
     }
     for (int32_t k = 0; k < n; k++) {
         sd_number v = work[k];

@@ -41,3 +41,30 @@ int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const in
     sd_sparse_free(lu);
     return failed;
 }
+
+int sd_left_open(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+                 const int32_t *order, double least, int64_t most, double *x)
+{
+    sd_sparse *lu = sd_sparse_new(rows, columns, column, row, order);
+    double *rest = calloc(2 * (size_t)rows + (size_t)columns + 1, sizeof *rest);
+    double *none = rest + rows + columns; /* A x = 0 */
+    int failed = lu && rest ? 0 : 2;
+    if (!failed) {
+        lu->most = most;
+        lu->null_pivot = least;
+        lu->dropped = ROUND_OFF;
+        failed = sd_sparse_pivot(lu, column, row, value);
+        for (int32_t k = 0; k < columns && !failed; k++)
+            if (lu->source[k] >= 0)
+                x[lu->order[k]] = 0.0;
+    }
+    for (int k = 0; k <= REFINEMENTS && !failed; k++) {
+        miss(rows, columns, column, row, value, none, x, rest);
+        sd_sparse_solve(lu, rest, rest + rows, NULL, NULL);
+        for (int32_t j = 0; j < columns; j++)
+            x[j] += rest[j];
+    }
+    free(rest);
+    sd_sparse_free(lu);
+    return failed;
+}

@@ -15,4 +15,9 @@
 int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                   const int32_t *order, double least, int64_t most, const double *b, double *x);
 
+/* A direction that A leaves open: x [columns] with A x = 0, its entries in the columns that follow from the others as
+ * they are on entry; 0 where every column has a pivot.  0 done, 2 no memory, 3 the factors fill too much */
+int sd_left_open(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+                 const int32_t *order, double least, int64_t most, double *x);
+
 #endif

@@ -80,7 +80,7 @@ void sd_settle_free(sd_settle *settle)
 }
 
 int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
-                    const int32_t *place_y, const int32_t *place_yd)
+                    const int32_t *place_y, const int32_t *place_yd, int32_t determined)
 {
     int32_t n = settle->unknowns + settle->rates;
     settle->basis = sd_sparse_new(n, settle->rows, column, row, order);
@@ -95,7 +95,8 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
     settle->basis_yd = place_yd;
     settle->basis_value = settle->lift + n;
     for (int32_t j = 0; j < n; j++)
-        settle->lift[j] = 1.0 / settle->weight[j];
+        settle->lift[j] = determined && settle->weight[j] >= DRAWN ? 0.0 : 1.0 / settle->weight[j];
+    settle->determined = determined;
     return 0;
 }
 
@@ -186,6 +187,15 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
     return 0;
 }
 
+/* whether the basis leaves an unknown open that follows from the state; of rates that no row needs nobody asks */
+static int leaves_open(const sd_settle *settle)
+{
+    for (int32_t j = 0; j < settle->unknowns; j++)
+        if (settle->weight[j] < DRAWN && settle->basis->place[j] == settle->rows)
+            return 1;
+    return 0;
+}
+
 /* the basis at (t, y, yd) */
 static int choose(sd_settle *settle, double t, const double *y, const double *yd, int met)
 {
@@ -209,7 +219,7 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
         int failed = sd_sparse_pivot(lu, settle->basis_column, settle->basis_row, value);
         if (failed > 1) /* it fills too much */
             settle->refused = REFUSALS;
-        if (failed)
+        if (failed || (settle->determined && leaves_open(settle)))
             return 1;
     }
     settle->ready = BASIS;
@@ -375,7 +385,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     settle->calls++;
     settle->contracted = 0.0;
     take(settle, y, yd, settle->x0);
-    if (settle->basis && settle->hold == 1.0 && settle->refused < REFUSALS) {
+    if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
         if (follow(settle, t, y, yd, &best)) {
             take(settle, y, yd, settle->met);
             finish(settle, t, y, yd, 1);
@@ -383,6 +393,8 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
         }
         put(settle, settle->x0, y, yd);
     }
+    int plain = settle->hold == 1.0; /* else factors are of another weight, and serve once */
+    settle->ready = plain ? settle->ready : NONE;
     iterate(settle, t, y, yd, ITERATIONS, &best);
     if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
@@ -392,6 +404,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
         settle->hold = 1.0;
         settle->ready = 0;
     }
+    settle->ready = plain ? settle->ready : NONE;
     if (best > CLOSE && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
         put_near(settle, y, yd);
         iterate(settle, t, y, yd, PATIENT, &best);

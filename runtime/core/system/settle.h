@@ -9,7 +9,7 @@
  * none.  eps makes redundant rows harmless.  The factors are kept from point to point while the iteration contracts.
  * Where the state meets its own rows already, nothing of it has to move, and a basic solution of G z = -r is the same
  * thing at a fraction of the cost: the unknowns that follow pivot first (`basis`).  One that moves the state by more
- * than is asked is not taken.
+ * than is asked is not taken, and where events come and go none that leaves something open: of that the least is wanted.
  */
 #ifndef SYSDYN_SETTLE_H
 #define SYSDYN_SETTLE_H
@@ -45,6 +45,7 @@ typedef struct sd_settle {
     double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ */
     int32_t ready;                   /* whose factors stand: 0 none, else of the matrix or the basis */
     int32_t refused;                 /* attempts by the basis that led nowhere */
+    int32_t determined;              /* the basis serves only where all that follows from the state has a pivot in it */
     double residual, own, constraints; /* after the last call: largest scaled row, and among those that are not the
                                         rate of another; norm of the constraint rows */
     int64_t calls, failures;         /* calls - failures > 0: a point has been met */
@@ -61,9 +62,10 @@ typedef struct sd_settle {
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole);
 /* takes the factors of the saddle-point matrix; 2: no memory */
 int sd_settle_take(sd_settle *settle, sd_linear *linear);
-/* The basis: pattern of G^T, order of its columns, the rows; places as above.  2: no memory. */
+/* The basis: pattern of G^T, order of its columns, the rows; places as above; determined: of what follows from the state
+ * alone, and all of that.  2: no memory. */
 int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
-                    const int32_t *place_y, const int32_t *place_yd);
+                    const int32_t *place_y, const int32_t *place_yd, int32_t determined);
 /* whether a pattern of the basis exists; NULL without one */
 int *sd_settle_pivoted(sd_settle *settle);
 void sd_settle_free(sd_settle *settle);

@@ -1,0 +1,93 @@
+"""Rows of a large sparse matrix, as many as unknowns or more: what they determine, and what they leave open.
+
+By factors of the rows themselves (core/linear/tall.h).  Matrices are shape [rows, unknowns] and entries (i, j, v), the
+rows of size one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.patterns import Pattern, Places, compress
+from sysdyn.runtime.numerics.ordering import tall_order
+from sysdyn.values import dataclass
+
+Entries = tuple[Any, Any, Floats]
+PIVOT = 1e-8
+"""Least pivot, as part of its column, of an unknown that rows determine; with less the least norm has a say."""
+FILLED = 12
+"""Entries of factors for one of the matrix from which those of the saddle point are no worse."""
+MEMORY = 2
+"""What the core answers where it has none."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Columns:
+    """The matrix by those of its columns that are used [unknowns]: pattern, values [entries]."""
+
+    used: NDArray[np.bool_]
+    pattern: Pattern
+    values: Floats
+
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """What the core is told of it, the order of elimination with it; the caller keeps them alive."""
+        return self.pattern.column, self.pattern.row, self.values, tall_order(self.pattern)
+
+
+def _columns(shape: tuple[int, int], entries: Entries) -> _Columns:
+    i, j, v = entries
+    here = v != 0.0
+    if not here.all():
+        i, j, v = i[here], j[here], v[here]
+    used = np.zeros(shape[1], dtype=bool)
+    used[j] = True
+    number = np.cumsum(used, dtype=np.int32) - 1
+    rows, unknowns = max(shape[0], int(used.sum())), int(used.sum())
+    pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
+    values: Floats = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64)
+    return _Columns(used, pattern, values)
+
+
+def determined(shape: tuple[int, int], entries: Entries, aim: Floats) -> Floats | None:
+    """The u that rows determine, unknowns that stand in none of them zero; None where they leave others open.  Rows in
+    excess are not looked at.
+    """
+    if np.unique(entries[1]).size > shape[0]:
+        return None
+    columns = _columns(shape, entries)
+    arrays, found = columns.arrays(), np.zeros(columns.pattern.unknowns)
+    limits = PIVOT, FILLED * columns.pattern.entries
+    failed = lib.core.sd_determined(
+        shape[0], found.size, *(lib.pointer(item) for item in arrays), *limits, lib.pointer(aim), lib.pointer(found)
+    )
+    if failed == MEMORY:
+        raise MemoryError
+    if failed:
+        return None
+    whole = np.zeros(shape[1])
+    whole[columns.used] = found
+    return whole
+
+
+def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
+    """A direction [unknowns] of length one (largest entry) that rows leave open, a random one of them: an unknown that
+    some of them move is moved by it.  Zero where rows determine everything; None where that would cost too much.
+    """
+    columns = _columns(shape, entries)
+    arrays, found = columns.arrays(), np.random.default_rng(5).uniform(0.5, 1.0, columns.pattern.unknowns)
+    limits = PIVOT, FILLED * columns.pattern.entries
+    failed = lib.core.sd_left_open(
+        columns.pattern.rows, found.size, *(lib.pointer(item) for item in arrays), *limits, lib.pointer(found)
+    )
+    if failed == MEMORY:
+        raise MemoryError
+    if failed:
+        return None
+    whole = np.where(columns.used, 0.0, 1.0)
+    whole[columns.used] = found
+    whole /= max(np.abs(whole).max(initial=0.0), 1e-300)
+    return whole
