@@ -20,7 +20,8 @@ NEGATIVE = 1e-9
 
 
 def negative_inertia(system: System, state: ConsistentState) -> tuple[str, float] | None:
-    """The flow along which the inertia is negative, and its eigenvalue (SI); None where there is none.
+    """The flow that moves most along a direction in which the inertia is negative, and the inertia n^T M n there, where
+    this flow is one (SI); None where there is none.
 
     system: the form as written.  Models of more than DENSE flows are judged by their diagonal.
     """
@@ -64,4 +65,6 @@ def _least(
     if found[0] >= -NEGATIVE * max(abs(found[-1]), NEGATIVE):
         return None
     k = int(np.argmax(np.abs(vectors[:, 0])))
-    return system.name(int(flows[k])), float(m[k, k])
+    along = scale * vectors[:, 0]
+    along /= along[k]
+    return system.name(int(flows[k])), float(along @ m @ along)
