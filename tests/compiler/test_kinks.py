@@ -62,6 +62,9 @@ def test_a_side_is_one_branch_everywhere():
     root = x.add(x.mul(f(), x.call("abs", f())), rest)
     for above, sign in ((True, 1.0), (False, -1.0)):
         assert side(root, f(), above) is x.add(x.scale(sign, x.mul(f(), f())), rest)
+    apart = x.sub(f(), q())
+    for name, larger, smaller in (("max", f(), q()), ("min", q(), f())):
+        assert [side(x.call(name, f(), q()), apart, above) for above in (True, False)] == [larger, smaller]
 
 
 POINTS, VALUES = (-1.0, 0.5, 2.0, 4.0), (3.0, -1.0, 0.0, 5.0)
