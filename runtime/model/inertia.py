@@ -54,25 +54,33 @@ def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
 
 
 def inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
-    """M [flows, flows] as a full matrix; no numbers in rows whose momenta do not determine their flows.
+    """M [flows, flows] as a full matrix; no numbers where momenta do not determine their flows.
 
     jy, jyd [entries]: dF/dy, dF/dyd.
     """
     moving = system.are("f")
-    number = np.cumsum(moving) - 1
-    found = np.zeros((int(moving.sum()),) * 2)
-    balance = own_unknown(system, "dynamics", "f")
-    rows = np.flatnonzero(balance >= 0)
-    found[number[balance[rows]]] = system.dense(jyd)[np.ix_(rows, moving)]
-    flow, momentum = (own_unknown(system, "momentum", kind) for kind in ("f", "p"))
-    rows = np.flatnonzero((flow >= 0) & (momentum >= 0))
-    if rows.size:
-        slopes = system.dense(jy)[rows]
-        try:
-            found[number[flow[rows]]] -= np.linalg.solve(slopes[:, momentum[rows]], slopes[:, moving])
-        except np.linalg.LinAlgError:
-            found[number[flow[rows]]] = np.nan
-    return found
+    size, flow = int(moving.sum()), np.where(moving, np.cumsum(moving) - 1, -1)
+    momentum = np.full(system.unknowns, -1, dtype=np.int64)
+    for momenta, flows in with_flows(system):
+        momentum[momenta] = flow[flows]
+
+    def gathered(group: str, unknown: NDArray[np.int64], values: Floats) -> Floats:
+        """Entries of a group's rows at unknowns, both by the flow of their coordinate (unknown: of each, or -1)."""
+        own = own_unknown(system, group, "f")[system.pattern.row]
+        column = unknown[system.pattern.columns_of()]
+        take = (own >= 0) & (column >= 0)
+        found = np.zeros((size, size))
+        np.add.at(found, (flow[own[take]], column[take]), values[take])
+        return found
+
+    slopes = gathered("momentum", momentum, jy)
+    without = ~np.isin(np.arange(size), momentum)
+    slopes[without, without] = 1.0
+    try:
+        carried = np.linalg.solve(slopes, gathered("momentum", flow, jy))
+    except np.linalg.LinAlgError:
+        return np.full((size, size), np.nan)
+    return gathered("dynamics", flow, jyd) - carried
 
 
 def own_places(system: System) -> tuple[NDArray[np.int64], ...]:
