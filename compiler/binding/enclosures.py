@@ -56,6 +56,17 @@ def _power(a: Bounds, exponent: float) -> Bounds:
     return found
 
 
+def _raised(a: Bounds, exponent: Bounds) -> Bounds:
+    """Bounds of a power whose exponent is no number of the text: one number all the same, or a range."""
+    every = np.concatenate([np.ravel(e) for e in exponent])
+    if (every == every[0]).all():
+        return _power(a, float(every[0]))
+    with np.errstate(all="ignore"):
+        low, high = _ordered(*(np.power(np.maximum(x, 0.0), y) for x in a for y in exponent))
+    # a negative base has powers of either sign, at whole exponents alone
+    return np.where(a[0] < 0.0, -np.inf, low), np.where(a[0] < 0.0, np.inf, high)
+
+
 def _wave(a: Bounds, shift: float) -> Bounds:
     """Bounds of cos(x - shift)."""
     low, high = a[0] - shift, a[1] - shift
@@ -133,8 +144,7 @@ def _combined(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -
                 found = _product(found, _power(bounds, e))
             return found
         case "pow":
-            with np.errstate(all="ignore"):
-                return _ordered(*(np.power(np.maximum(x, 0.0), y) for x in args[0] for y in args[1]))
+            return _raised(*args)
         case "call":
             return _called(node.data, args)
         case "cond":

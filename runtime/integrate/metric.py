@@ -18,7 +18,7 @@ from sysdyn.runtime.model.system import System
 def light(system: System, jy: Floats, jyd: Floats) -> NDArray[np.bool_]:
     """Displacements without inertia where others have some [unknowns]."""
     found, form = np.zeros(system.unknowns, dtype=bool), system.form
-    inertia = own_inertia(system, jy, jyd)[form.k_f]
+    inertia = np.abs(own_inertia(system, jy, jyd))[form.k_f]
     found[form.k_q] = (inertia == 0.0) & bool((inertia > 0.0).any())
     return found
 
@@ -26,7 +26,7 @@ def light(system: System, jy: Floats, jyd: Floats) -> NDArray[np.bool_]:
 def kinematic_scale(system: System, magnitude: Floats, jy: Floats, jyd: Floats) -> Floats:
     """Factor of each row q' - f; 1 where all displacements have one unit."""
     form = system.form
-    size = group_maximum(system, own_inertia(system, jy, jyd))[form.k_f]
+    size = group_maximum(system, np.abs(own_inertia(system, jy, jyd)))[form.k_f]
     if not (size > 0.0).all() or not np.isfinite(size).all():
         size = group_maximum(system, magnitude)[form.k_q] ** -2.0
     return np.asarray(size / size.min(initial=np.inf))

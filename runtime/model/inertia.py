@@ -1,4 +1,8 @@
-"""Inertia and stiffness of each coordinate by itself: the diagonals of M = d2T*/df2 and K = d2V/dq2."""
+"""Inertia M = d2T*/df2 by the rows of a form; what each coordinate holds by itself: diagonals of M and K = d2V/dq2.
+
+M stands in the rows of dynamics as the coefficient of f' (Lagrange); rows of momentum r = p - dT*/df, or dT/dp - f,
+give it as -(dr/dp)^-1 dr/df (Hamilton).
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,10 @@ from sysdyn.runtime.model.system import System
 
 
 def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
-    """|entry| of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
+    """The entry of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
     found, columns = np.zeros(system.unknowns), system.pattern.columns_of()
     mine = _own_places(system, group, kind)
-    np.maximum.at(found, columns[mine], np.abs(values[mine]))
+    found[columns[mine]] = values[mine]
     return found
 
 
@@ -37,21 +41,46 @@ def own_unknown(system: System, group: str, kind: str) -> NDArray[np.int64]:
 
 
 def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
-    """Diagonal of M at the places of the flows [unknowns]; 0 where there is none.
+    """Diagonal of M at the places of the flows [unknowns], where no others are joined; 0 where there is none.
 
-    jy, jyd [entries]: dF/dy, dF/dyd.  M stands in the rows of dynamics (Lagrange); those of momentum are p - M f, or
-    p/M - f.
+    jy, jyd [entries]: dF/dy, dF/dyd.
     """
-    found, at = _own(system, jyd, "dynamics", "f"), system.form.at
+    found = _own(system, jyd, "dynamics", "f")
     by_flow, by_momentum = _own(system, jy, "momentum", "f"), _own(system, jy, "momentum", "p")
-    families = system.description.families
-    flow = {family.owner: k for k, family in enumerate(families) if family.kind == "f"}
-    for k, family in enumerate(families[: len(at)]):
-        if family.kind == "p" and family.owner in flow:
-            own = slice(at[flow[family.owner]], at[flow[family.owner]] + family.size)
-            one, other = by_flow[own], by_momentum[at[k] : at[k] + family.size]
-            found[own] = np.maximum(found[own], np.divide(one, other, out=np.zeros_like(one), where=other > 0.0))
+    for momenta, flows in with_flows(system):
+        one, other = by_flow[flows], by_momentum[momenta]
+        found[flows] -= np.divide(one, other, out=np.zeros_like(one), where=other != 0.0)
     return found
+
+
+def inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
+    """M [flows, flows] as a full matrix; no numbers where momenta do not determine their flows.
+
+    jy, jyd [entries]: dF/dy, dF/dyd.
+    """
+    moving = system.are("f")
+    size, flow = int(moving.sum()), np.where(moving, np.cumsum(moving) - 1, -1)
+    momentum = np.full(system.unknowns, -1, dtype=np.int64)
+    for momenta, flows in with_flows(system):
+        momentum[momenta] = flow[flows]
+
+    def gathered(group: str, unknown: NDArray[np.int64], values: Floats) -> Floats:
+        """Entries of a group's rows at unknowns, both by the flow of their coordinate (unknown: of each, or -1)."""
+        own = own_unknown(system, group, "f")[system.pattern.row]
+        column = unknown[system.pattern.columns_of()]
+        take = (own >= 0) & (column >= 0)
+        found = np.zeros((size, size))
+        np.add.at(found, (flow[own[take]], column[take]), values[take])
+        return found
+
+    slopes = gathered("momentum", momentum, jy)
+    without = ~np.isin(np.arange(size), momentum)
+    slopes[without, without] = 1.0
+    try:
+        carried = np.linalg.solve(slopes, gathered("momentum", flow, jy))
+    except np.linalg.LinAlgError:
+        return np.full((size, size), np.nan)
+    return gathered("dynamics", flow, jyd) - carried
 
 
 def own_places(system: System) -> tuple[NDArray[np.int64], ...]:

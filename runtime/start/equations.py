@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints
+from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
@@ -24,12 +25,9 @@ Places = NDArray[np.integer]
 
 def pairs(system: System) -> tuple[Ints, Ints]:
     """Places of momenta, and of the flows of the same coordinates."""
-    families, at = system.description.families, system.form.at
-    flows = {f.owner: k for k, f in enumerate(families) if f.kind == "f"}
-    found = [(at[k] + np.arange(f.size), at[flows[f.owner]]) for k, f in enumerate(families) if f.kind == "p"]
-    nothing = np.zeros(0, dtype=np.int64)
-    momenta = np.concatenate([nothing, *(places for places, _ in found)])
-    return momenta, np.concatenate([nothing, *(places - places[:1] + first for places, first in found)])
+    found = [(np.arange(momenta.start, momenta.stop), flows) for momenta, flows in with_flows(system)]
+    momenta, flows = np.hstack([np.zeros((2, 0), dtype=np.int64), *found])
+    return momenta, flows
 
 
 class Equations:

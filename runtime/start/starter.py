@@ -20,6 +20,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.inertia import inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import group_maximum, largest_of_group
 from sysdyn.runtime.model.system import KEPT, LARGE, System
@@ -309,28 +310,12 @@ class Starter:
         return _Sums(unsettled[: len(weights)], unsettled, weights, entries, number[self.rows[entries]])
 
     def _inertia(self, unsettled: Places, shift: float) -> Floats:
-        """The matrix of inertia beside a state [dynamics_rate rows, flows]: of f' in the balances, of f in momenta."""
-        form, families = self.settled.form, self.settled.description.rows
-        first = {(group, families[k].owner): place for group, k, place in form.groups}
+        """The matrix of inertia beside a state [dynamics_rate rows, flows]; zeros where a row is no flow's balance."""
         y = self.given.guess + shift * (1.0 + np.abs(self.given.guess)) * np.cos(np.arange(self.n))
-        jy, jyd = self.settled.jacobian(0.0, y, np.zeros(self.n))
-        matrix = np.zeros((self.settled.rows, self.n))
-        pattern = self.settled.pattern
-        columns = pattern.columns_of()
-        flows = self.system.are("f")[columns]
-        np.add.at(matrix, (pattern.row[flows], columns[flows]), jyd[flows])
-        carried = flows & self.groups("momentum")[pattern.row]
-        np.add.at(matrix, (pattern.row[carried], columns[carried]), -jy[carried])
-        found = np.zeros((unsettled.size, self.n))
-        for group, k, place in form.groups:
-            if group != "dynamics_rate":
-                continue
-            mine = np.flatnonzero((unsettled >= place) & (unsettled < place + families[k].size))
-            for base in ("dynamics", "momentum"):
-                at = first.get((base, families[k].owner))
-                if at is not None:
-                    found[mine] += matrix[at + unsettled[mine] - place]
-        return found
+        matrix = inertia(self.settled, *self.settled.jacobian(0.0, y, np.zeros(self.n)))
+        number = np.cumsum(self.settled.are("f")) - 1
+        own = own_unknown(self.settled, "dynamics_rate", "f")[unsettled]
+        return np.where((own >= 0)[:, None], matrix[number[own]], 0.0)
 
     @property
     def balanced(self) -> bool:
@@ -344,25 +329,15 @@ class Starter:
         """
         if not self.balanced:
             return self.weights_by(t, x, scale)
-        families, form = self.system.description.families, self.system.form
-        flows = {f.owner: form.at[k] for k, f in enumerate(families) if f.kind == "f"}
-        own = np.full(self.system.rows, -1, dtype=np.int64)
-        effort: dict[str, str] = {}
-        for group, family, first in form.groups:
-            rows = self.system.description.rows[family]
-            if group in ("dynamics", "momentum") and rows.owner in flows:
-                effort |= {rows.owner: rows.unit} if group == "dynamics" else {}
-                own[first : first + rows.size] = flows[rows.owner] + np.arange(rows.size)
+        families, rows = self.system.description.families, self.system.description.rows
+        effort = {rows[k].owner: rows[k].unit for group, k, _ in self.system.form.groups if group == "dynamics"}
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
         own_units = np.array(units)[self.system.family_of[: self.n]]
         names = np.concatenate([own_units, np.full(self.rates.size, ""), self.equations.units])
-        pattern = self.system.pattern
-        columns, inertia = pattern.columns_of(), np.zeros(x.size)
-        jy, jyd = self.system.jacobian(t, *self.expand(x))
-        for values, mine in ((jyd, ~self.system.of_groups("momentum")), (jy, self.system.of_groups("momentum"))):
-            held = (columns == own[pattern.row]) & mine[pattern.row]
-            inertia[columns[held]] += np.abs(values[held])
-        content = np.where(inertia > 0.0, inertia, 1.0)
+        held = np.zeros(x.size)
+        matrix = inertia(self.system, *self.system.jacobian(t, *self.expand(x)))
+        held[np.flatnonzero(self.system.are("f"))] = np.abs(np.diag(matrix))
+        content = np.where(held > 0.0, held, 1.0)
         _, unit = np.unique(names, return_inverse=True)
         largest = np.zeros(int(unit.max()) + 1)
         np.maximum.at(largest, unit, content * scale)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
@@ -68,10 +69,10 @@ def _coupled(
 
 def _inert(system: System) -> NDArray[np.bool_]:
     """Flows of coordinates with a momentum of their own [unknowns]."""
-    families = system.description.families
-    moved = {family.owner for family in families if family.kind == "p"}
-    inert = np.array([family.kind == "f" and family.owner in moved for family in families] + [False])
-    return read_only(np.asarray(inert[system.family_of]))
+    found = np.zeros(system.unknowns, dtype=bool)
+    for _, flows in with_flows(system):
+        found[flows] = True
+    return read_only(found)
 
 
 def _read(system: System) -> NDArray[np.bool_]:

@@ -77,6 +77,7 @@ def test_a_law_is_proven_or_sampled(law, cap, verdict, role, how, tmp_path, caps
 
 ACTIVE = {
     "a negative damper as content": ("content D = -1/2*(0.5 N.s/m)*x'^2", "content of line 6"),
+    "an exponent that is a parameter": ("param n: 1 = 3; content D = 1 W*(x'/(1 m/s))^n", "content of line 6"),
     "van der Pol": ("work 1 N.s/m*x' - 1 N.s^3/m^3*x'^3 on x", "work of line 6"),
     "a follower force": ("work 3 N/m*y on x", "work of line 6"),
     "negative damping as work": ("work 2 N.s/m*x' on x", "work of line 6"),

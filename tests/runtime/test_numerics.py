@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from sysdyn.runtime.numerics.equilibrate import equilibrated, factors, sparse_factors
+from sysdyn.runtime.numerics.points import distinct, normal, uniform
 from sysdyn.runtime.numerics.rank import TOLERANCE, NotFiniteError, count, decomposed, least_squares, null_space, rank
 
 
@@ -101,3 +102,34 @@ def test_where_the_fast_algorithm_gives_up_the_slow_one_answers(monkeypatch):
     matrix = np.array([[2.0, 0.0], [0.0, 1e-12]])
     assert rank(matrix) == 1
     assert least_squares(matrix, np.array([4.0, 1.0])) == pytest.approx([2.0, 0.0])
+
+
+def test_numbers_each_once():
+    random = np.random.default_rng(6)
+    for size in (0, 1, 50):
+        values = random.integers(-9, 9, size)
+        assert np.array_equal(distinct(values), np.unique(values))
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_numbers_without_a_pattern_fill_the_interval_evenly(which):
+    """Every interval holds as many of n numbers as its length tells, but for a few (discrepancy O(log n / n))."""
+    n = 2000
+    found = np.sort(uniform(n, which))
+    assert 0.0 <= found[0] < found[-1] < 1.0
+    assert np.abs(found - (np.arange(n) + 0.5) / n).max() < 6.0 / n
+    assert np.array_equal(uniform(n, which)[500:], uniform(1500, which, 500))
+
+
+def test_both_sequences_together_fill_the_square():
+    """Each of 100 squares holds 20 of 2000 points: random ones would leave it by four and a half."""
+    i, j = ((uniform(2000, which) * 10).astype(int) for which in (0, 1))
+    assert np.abs(np.bincount(10 * i + j, minlength=100) - 20).max() <= 4
+
+
+def test_normal_numbers_have_the_moments_of_the_normal_distribution():
+    found = normal(200, 50)
+    assert found.shape == (200, 50)
+    moments = [np.mean(found**k) for k in range(1, 5)]
+    assert moments == pytest.approx([0.0, 1.0, 0.0, 3.0], abs=0.05)
+    assert np.linalg.cond(found[:, :6]) < 10.0

@@ -40,38 +40,23 @@ from sysdyn.dsl.model.expression import (
 )
 from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Loop, Network, Parameter, State
 
-
-def charge(branch: Branch, effort: Node) -> Node | None:
-    """The displacement of a potential store at an effort; None where the law does not give it."""
-    if branch.kind != "potential" or branch.law is None:
-        return None
-    if branch.side == "q":
-        e = own(branch, "be")
-        return None if variables(branch.law) - {e} else substitute(branch.law, {e: effort})
-    q = own(branch, "bq")
-    straight = None if variables(branch.law) - {q} else line(branch.law, q)
-    return None if straight is None else straight.inverse(effort)
+TELLING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
+"""What tells what a store holds: by its law its effort or flow, and its displacement or momentum itself."""
 
 
 def held_at(branch: Branch, kind: str, value: Node) -> Node | None:
     """What a store over its own loops holds where its content, effort or flow is the value; None where no law tells."""
     if kind in ("bq", "bp"):
         return value
-    if branch.kind == "potential":
-        return charge(branch, value)
-    return momentum(branch, value)
-
-
-def momentum(branch: Branch, flow: Node) -> Node | None:
-    """The momentum of a kinetic store at a flow; None where the law does not give it."""
-    if branch.law is None:
+    given, held = TELLING.get(branch.kind, ("", ""))
+    if kind != given or branch.law is None:
         return None
-    if branch.side == "p":
-        f = own(branch, "bf")
-        return None if variables(branch.law) - {f} else substitute(branch.law, {f: flow})
-    p = own(branch, "bp")
-    straight = None if variables(branch.law) - {p} else line(branch.law, p)
-    return None if straight is None else straight.inverse(flow)
+    if branch.side == held[1]:
+        of = own(branch, given)
+        return None if variables(branch.law) - {of} else substitute(branch.law, {of: value})
+    content = own(branch, held)
+    straight = None if variables(branch.law) - {content} else line(branch.law, content)
+    return None if straight is None else straight.inverse(value)
 
 
 def at_stores(network: Network, incidence: Incidence, reader: Rewriter) -> Iterator[Initial]:
@@ -94,7 +79,7 @@ def _as_content(initial: Initial, reader: Rewriter) -> Iterator[Initial]:
 
     def content(ranges: Ranges) -> Node | None:
         piece = reader.piece(target.data[0], target.args, ranges)
-        found = charge(piece.element.branch, mark)
+        found = held_at(piece.element.branch, "be", mark)
         return None if found is None else substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
 
     for loops, value in reader.cut(initial.loops, initial.place, content):
@@ -128,7 +113,8 @@ def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> 
 
 def _between_ground(touch: Touch) -> bool:
     other = touch.element.ends[1 - touch.end].node
-    return not touch.free and other.startswith("#ground ") and charge(touch.element.branch, const(1.0)) is not None
+    told = held_at(touch.element.branch, "be", const(1.0)) is not None
+    return not touch.free and other.startswith("#ground ") and told
 
 
 class Contents:

@@ -11,14 +11,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes
-from sysdyn.compiler.network.primal.contents import held_at, meet
+from sysdyn.compiler.network.primal.contents import TELLING, held_at, meet
 from sysdyn.compiler.network.primal.overlaps import Ranges, beside, meeting, narrowed, ranges_of
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
 from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
-
-_CONTENT = {"potential": "bq", "kinetic": "bp"}
-_SAYING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 
 
 def measured(
@@ -34,7 +31,7 @@ def measured(
     held: dict[tuple[str, str], list[Box]] = {}
     known = {initial.store for initial in initials}
     for b in network.branches:
-        if b.kind not in _CONTENT or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
+        if b.kind not in TELLING or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
         for loops, content in _contents(b, b.loops, reader):
@@ -84,12 +81,12 @@ def _tells(i: Initial, b: Branch) -> bool:
     """Whether an initial condition is about what a store holds."""
     if i.target.op != "var" or i.target.data[0] != b.name:
         return False
-    return i.target.data[1] in _SAYING[b.kind] and not i.target.data[2]
+    return i.target.data[1] in TELLING[b.kind] and not i.target.data[2]
 
 
 def _contents(b: Branch, loops: tuple[Loop, ...], reader: Rewriter) -> Iterator[tuple[tuple[Loop, ...], Node]]:
     """The contents of the elements of a statement over these loops, in coordinates."""
-    content = var(b.name, _CONTENT[b.kind], *b.at)
+    content = var(b.name, TELLING[b.kind][1], *b.at)
     return reader.cut(loops, b.place, lambda ranges: reader.resolve(content, ranges))
 
 
