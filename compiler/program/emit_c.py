@@ -85,7 +85,7 @@ class _Angles:
 def _routine(k: int, routine: Routine, form: DescriptorForm, angles: _Angles, alone: bool) -> str:
     """The function of a routine; alone: no other is called where it is, and it may become part of its caller."""
     writer = _Writer(routine, angles.of(routine))
-    body = writer.body(routine.body, "    " * (len(routine.loops) + 1))
+    body = writer.body(writer.angles_first(), "    " * (len(routine.loops) + 1))
     lines = [f"/* {_comment(routine, form)} */"]
     out = "r" if routine.part == "rows" else "v"
     kind = ("" if alone else "SD_APART ") + ("void " if out == "r" else "double *")
@@ -156,6 +156,20 @@ class _Writer:
                 case Store():
                     lines.append(indent + self.store(s))
         return lines
+
+    def angles_first(self) -> list[Statement]:
+        """The routine's statements, what angles are made of and their sines and cosines before all others: where those
+        are new a function is called, across which no other value is kept then.
+        """
+        makers = {s.target: s for s in self.routine.body if isinstance(s, Assign)}
+        first: set[int] = set()
+        left: list[Operand] = list(self.angles)
+        while left:
+            target = left.pop()
+            if isinstance(target, int) and target in makers and target not in first:
+                first.add(target)
+                left += makers[target].args
+        return sorted(self.routine.body, key=lambda s: not (isinstance(s, Assign) and s.target in first))
 
     def turned(self, s: Assign) -> list[str]:
         """Sine or cosine of an angle that is kept."""
