@@ -20,7 +20,7 @@ from sysdyn.runtime import core
 
 HERE = Path(__file__).parent
 CORE = Path(core.__path__[0])
-ASSEMBLY = ("system/model.h", "system/assembly.h", "system/assembly.c")
+ASSEMBLY = ("system/model.h", "linear/lanes.h", "system/assembly.h", "system/assembly.c")
 ALGEBRA = (
     "linear/number.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h", "linear/sparse.h",
     "system/settle.h", "steppers/stepper.h", "steppers/underlying.h",

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import shlex
 import shutil
+from functools import cache
 from itertools import takewhile
 from pathlib import Path
 
@@ -19,6 +21,10 @@ from sysdyn.compiler.program import cache as cache_
 
 # -O1: code as fast as -O2 on the benchmarks (Andrews 0.32 us a residual either way), compiled in 2/3 of the time
 FLAGS = ("-O1", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno")
+
+
+FEW = 4096
+"""Bytes of /proc/cpuinfo that hold the first processor."""
 
 
 class BuildError(Exception):
@@ -71,9 +77,21 @@ def _identity(path: str) -> str:
     return f"{real} {found.st_size} {found.st_mtime_ns}"
 
 
+@cache
+def of_this_machine() -> tuple[str, ...]:
+    """-mavx where the processor has it: a fifth fewer instructions (three operands each), and the same results."""
+    try:
+        with Path("/proc/cpuinfo").open("rb") as file:
+            words = file.read(FEW).split()
+    except OSError:
+        return ()
+    return ("-mavx",) if platform.machine() == "x86_64" and b"avx" in words else ()
+
+
 def build(text: str, flags: tuple[str, ...] = FLAGS) -> Path:
     """The shared library of a C text; BuildError where the compiler fails, OSError where the folder is not writable."""
     command, options = compiler()
+    flags = (*flags, *of_this_machine())
     said = (*map(_identity, command), *flags, *options, text)
     key = hashlib.sha256("\0".join(said).encode()).hexdigest()
     entry = cache_.path_of(key)

@@ -7,6 +7,7 @@ same text.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
@@ -32,7 +33,10 @@ _BOOLEAN = ("cmp", "and", "or", "not")
 def emit_c(program: Program, form: DescriptorForm, head: str = HEAD) -> str:
     """The C text of a program; head: what declares the contract's frame."""
     angles = _Angles()
-    bodies = [_routine(k, routine, form, angles) for k, routine in enumerate(program.routines)]
+    number = Counter((routine.block, routine.part) for routine in program.routines)
+    bodies = [
+        _routine(k, r, form, angles, number[r.block, r.part] == 1) for k, r in enumerate(program.routines)
+    ]
     text = "\n".join(bodies)
     used = [code for name, code in SUPPORT if f"{name}(" in text]
     if angles.number:
@@ -78,12 +82,13 @@ class _Angles:
         return found
 
 
-def _routine(k: int, routine: Routine, form: DescriptorForm, angles: _Angles) -> str:
+def _routine(k: int, routine: Routine, form: DescriptorForm, angles: _Angles, alone: bool) -> str:
+    """The function of a routine; alone: no other is called where it is, and it may become part of its caller."""
     writer = _Writer(routine, angles.of(routine))
-    body = writer.body(routine.body, "    " * (len(routine.loops) + 1))
+    body = writer.body(writer.angles_first(), "    " * (len(routine.loops) + 1))
     lines = [f"/* {_comment(routine, form)} */"]
     out = "r" if routine.part == "rows" else "v"
-    kind = "SD_APART void " if out == "r" else "SD_APART double *"
+    kind = ("" if alone else "SD_APART ") + ("void " if out == "r" else "double *")
     kept = ", sd_turn *restrict w" if writer.angles else ""  # one look for the thread's own ones a routine
     lines.append(f"static {kind}f{k}({_ARGUMENTS.format(out=out)}{kept})\n{{")
     unused = [n for n in ("p", "ix", "at", "to", "t", "y", "yd") if n not in writer.used]
@@ -151,6 +156,20 @@ class _Writer:
                 case Store():
                     lines.append(indent + self.store(s))
         return lines
+
+    def angles_first(self) -> list[Statement]:
+        """The routine's statements, what angles are made of and their sines and cosines before all others: where those
+        are new a function is called, across which no other value is kept then.
+        """
+        makers = {s.target: s for s in self.routine.body if isinstance(s, Assign)}
+        first: set[int] = set()
+        left: list[Operand] = list(self.angles)
+        while left:
+            target = left.pop()
+            if isinstance(target, int) and target in makers and target not in first:
+                first.add(target)
+                left += makers[target].args
+        return sorted(self.routine.body, key=lambda s: not (isinstance(s, Assign) and s.target in first))
 
     def turned(self, s: Assign) -> list[str]:
         """Sine or cosine of an angle that is kept."""
@@ -269,7 +288,7 @@ def _block(name: str, part: str, program: Program, angles: _Angles) -> str:
     lines = [head]
     for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
         routine = program.routines[k]
-        kept = ", sd_turns" if angles.of(routine) else ""
+        kept = ", sd_turns()" if angles.of(routine) else ""
         call = f"f{k}(frame->p, frame->ix, frame->at, frame->to, t, y, yd, {out}{kept})"
         if part != "rows":
             call = f"v = {call}" if routine.loops else f"(void){call}"

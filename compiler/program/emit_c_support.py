@@ -88,18 +88,60 @@ static double sd_table2(const double *x, int32_t n, int32_t m, int32_t clamped, 
 }
 """
 
-TURNS = """/* sine and cosine of an angle, kept for the next block or Jacobian that reads them of the same one */
+TURNS = """#include <float.h>
+#include <string.h>
+
+/* 1: numbers are rounded to the nearest double at once, in the order of the text */
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD == 0 && !defined(__FAST_MATH__)
+#define SD_ROUNDS 1
+#else
+#define SD_ROUNDS 0
+#endif
+
+/* sine and cosine of an angle, kept for the next block or Jacobian that reads them of the same one */
 typedef struct sd_turn {
     double angle, sine, cosine;
 } sd_turn;
 
-static _Thread_local sd_turn sd_turns[] = {@};
+static SD_APART sd_turn *sd_turns(void)
+{
+    static _Thread_local sd_turn turns[] = {@};
+    return turns;
+}
+
+/* Both at once: x, the rest beside the nearest multiple of pi/2, and y, what rounding took from it; polynomials of
+ * fdlibm's __kernel_sin, __kernel_cos (Sun Microsystems, 1993), with an error below one unit in the last place.  Large
+ * angles, and rests in which little is left of them, are the library's. */
+static SD_APART void sd_turn_far(sd_turn *kept, double angle)
+{
+    kept->sine = sin(angle);
+    kept->cosine = cos(angle);
+}
 
 static SD_APART void sd_turn_to(sd_turn *kept, double angle)
 {
+    const double round = 0x1.8p52, turns = angle*0.6366197723675814 + round, quarters = turns - round;
+    const double near = angle - quarters*1.5707963267341256, far = quarters*6.077100506506192e-11;
+    const double x = near - far, y = (near - x) - far, z = x*x, v = z*x, h = 0.5*z, w = 1.0 - h;
+    const double p = 8.33333333332248946124e-03 + z*(-1.98412698298579493134e-04
+        + z*(2.75573137070700676789e-06 + z*(-2.50507602534068634195e-08 + z*1.58969099521155010221e-10)));
+    const double q = 4.16666666666666019037e-02 + z*(-1.38888888888741095749e-03 + z*(2.48015872894767294178e-05
+        + z*(-2.75573143513906633035e-07 + z*(2.08757232129817482790e-09 - z*1.13596475577881948265e-11))));
+    const double s = x - ((z*(0.5*y - v*p) - y) + v*1.66666666666666324348e-01);
+    const double c = w + (((1.0 - w) - h) + (z*(z*q) - x*y));
+    int64_t n;
     kept->angle = angle;
-    kept->sine = sin(angle);
-    kept->cosine = cos(angle);
+    if (!SD_ROUNDS || !(fabs(angle) < 1e5) || (!(fabs(x) > 3e-4) && quarters != 0.0)) {
+        sd_turn_far(kept, angle);
+        return;
+    }
+    memcpy(&n, &turns, sizeof n);
+    kept->sine = n & 1 ? c : s;
+    kept->cosine = n & 1 ? s : c;
+    if (n & 2)
+        kept->sine = -kept->sine;
+    if ((n + 1) & 2)
+        kept->cosine = -kept->cosine;
 }
 
 static inline const sd_turn *sd_turned(sd_turn *kept, double angle)

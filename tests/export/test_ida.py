@@ -99,8 +99,8 @@ def disagreement(names, values, expected):
     return max(errors)
 
 
-FINER = 1e-9
-"""At looser tolerances round-off of the start decides whether IDA's corrector gets past the diode's first turn."""
+FINER = 2e-9
+"""Round-off decides whether IDA's corrector gets past the diode's first turn: at one tolerance in two it does."""
 LONG = os.environ.get("SYSDYN_LONG") == "1"
 CASES = [(s, i) for k, s in enumerate(CHANGED) for i in ("3", "2", "1") if LONG or int(i) % 3 != k % 3]
 

@@ -186,6 +186,37 @@ def test_machine_code_and_interpreter_agree_to_the_bit():
     assert (one.solve(b) == other.solve(b)).all()
 
 
+def complex_solutions(matrix, b, *, machine):
+    """Solutions beside a complex matrix and others near it, each with its own values, as a run makes them."""
+    lib.core.sd_code_allow(int(machine))
+    pattern = [np.ascontiguousarray(item, np.int32) for item in (matrix.indptr, matrix.indices)]
+    linear = lib.core.sd_linear_z_new(b.size, *map(lib.pointer, pattern), None)
+    lib.core.sd_linear_z_replayed(linear)
+    rng = np.random.default_rng(1)
+    solutions = []
+    for _ in range(5 + 2 * b.size):
+        values = matrix.data * (rng.uniform(0.9, 1.1, matrix.data.size) + 0.1j * rng.normal(size=matrix.data.size))
+        assert lib.core.sd_linear_z_factor(linear, lib.pointer(values), lib.pointer(np.ones(b.size))) == 0
+        x = b.copy()
+        lib.core.sd_linear_z_solve(linear, lib.pointer(x))
+        full = csc_array((values, matrix.indices, matrix.indptr), shape=matrix.shape).toarray()
+        size = np.abs(full).sum(axis=1).max()
+        assert np.abs(full @ x - b).max() <= 1e-10 * (size * np.abs(x).max() + np.abs(b).max())
+        solutions.append(x)
+    lib.core.sd_code_allow(1)
+    lib.core.sd_linear_z_free(linear)
+    return np.array(solutions)
+
+
+@pytest.mark.parametrize("n", [1, 3, 20, 60])
+def test_machine_code_of_complex_numbers_agrees_to_the_bit(n):
+    matrix = random_matrix(n, 5, min(1.0, 3.0 / n))
+    rng = np.random.default_rng(4)
+    b = rng.normal(size=n) + 1j * rng.normal(size=n)
+    one, other = (complex_solutions(matrix, b, machine=machine) for machine in (True, False))
+    assert one.tobytes() == other.tobytes()
+
+
 @pytest.mark.parametrize("n", [5, 12, 25])
 @pytest.mark.parametrize("small", [0.0, 1e-14, 1e-4])
 def test_an_order_that_makes_entries_grow_gives_way_to_pivoting(n, small):

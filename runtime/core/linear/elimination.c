@@ -1,6 +1,7 @@
 /* Orders and lists of operations for small matrices: see elimination.h. */
 #include "linear/elimination.h"
 
+#include "linear/lanes.h"
 #include "linear/machine_code.h"
 
 #include <math.h>
@@ -11,6 +12,11 @@
 #define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
 #define SHARE 4            /* nor do large ones before this part of n */
+#ifdef SD_COMPLEX
+#define NUMBERS SD_COMPLEX_NUMBERS
+#else
+#define NUMBERS SD_REAL_NUMBERS
+#endif
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
@@ -112,31 +118,33 @@ static int add_sum(sd_list *list, enum sd_sum_kind kind, int32_t target, int32_t
     return 0;
 }
 
-/* the factor at pivot places (i, k): its entry less products of what is left of it and above it */
-static int list_factor(sd_elimination *e, const int32_t *cell, const int32_t *source, int32_t i, int32_t k)
+/* the factor at pivot places (i, k): its entry less products of what is left of it, at places `left`, and above it */
+static int list_factor(sd_elimination *e, const int32_t *cell, const int32_t *source, const int32_t *left, int32_t i, int32_t k)
 {
-    int32_t n = e->n, least = i < k ? i : k, failed = 0;
-    for (int32_t m = 0; m < least; m++)
-        if (cell[i * n + m] >= 0 && cell[m * n + k] >= 0)
-            failed |= add_pair(&e->factor, cell[i * n + m], cell[m * n + k]);
+    int32_t n = e->n, failed = 0;
+    for (; *left < i && *left < k; left++)
+        if (cell[*left * n + k] >= 0)
+            failed |= add_pair(&e->factor, cell[i * n + *left], cell[*left * n + k]);
     enum sd_sum_kind kind = k < i ? SD_SUM_TIMES : k == i ? SD_SUM_INVERSE : SD_SUM_PLAIN;
     return failed | add_sum(&e->factor, kind, cell[i * n + k], source[i * n + k], cell[k * n + k]);
 }
 
-/* row i of the factors, its size before and the growth of its multipliers */
-static int list_row(sd_elimination *e, const int32_t *cell, const int32_t *source, int32_t i)
+/* row i of the factors, its size before and the growth of its multipliers; left [n + 1]: work */
+static int list_row(sd_elimination *e, const int32_t *cell, const int32_t *source, int32_t *left, int32_t i)
 {
-    int32_t n = e->n, failed = 0;
+    int32_t n = e->n, failed = 0, filled = 0;
     for (int32_t k = 0; k < n; k++)
         if (source[i * n + k] >= 0)
             failed |= add_pair(&e->factor, source[i * n + k], magnitude(e, k));
     failed |= add_sum(&e->factor, SD_SUM_LARGEST, size_of(e, i), -1, -1);
     for (int32_t k = 0; k < n; k++)
         if (cell[i * n + k] >= 0)
-            failed |= list_factor(e, cell, source, i, k);
-    for (int32_t k = 0; k < i; k++)
-        if (cell[i * n + k] >= 0)
-            failed |= add_pair(&e->factor, cell[i * n + k], size_of(e, k));
+            left[filled++] = k;
+    left[filled] = n;
+    for (int32_t f = 0; f < filled; f++)
+        failed |= list_factor(e, cell, source, left, i, left[f]);
+    for (int32_t f = 0; left[f] < i; f++)
+        failed |= add_pair(&e->factor, cell[i * n + left[f]], size_of(e, left[f]));
     return failed | add_sum(&e->factor, SD_SUM_LARGEST, growth_of(e, i), -1, -1);
 }
 
@@ -158,8 +166,9 @@ static int list_solution(sd_elimination *e, const int32_t *cell)
     return failed;
 }
 
-/* cell [n][n]: numbers of the factors, source [n][n]: entries of the matrix behind the cells; by pivot places, -1: none */
-static void number_cells(sd_elimination *e, const char *entry, int32_t *cell, int32_t *source)
+/* cell [n][n]: numbers of the factors, source [n][n]: entries of the matrix behind the cells; by pivot places, -1: none;
+ * place [n]: work */
+static void number_cells(sd_elimination *e, const char *entry, int32_t *cell, int32_t *source, int32_t *place)
 {
     int32_t n = e->n;
     e->factors = n; /* inverse pivots first */
@@ -167,14 +176,12 @@ static void number_cells(sd_elimination *e, const char *entry, int32_t *cell, in
         for (int32_t k = 0; k < n; k++)
             cell[i * n + k] = k == i ? k : entry[e->pivot_column[k] * n + e->pivot_row[i]] ? e->factors++ : -1;
     e->inside = constants(e) + 2;
+    memset(source, -1, (size_t)n * (size_t)n * sizeof *source);
     for (int32_t i = 0; i < n; i++)
-        for (int32_t k = 0; k < n; k++) {
-            source[i * n + k] = -1;
-            int32_t c = e->pivot_column[k];
-            for (int32_t p = e->column[c]; p < e->column[c + 1]; p++)
-                if (e->row[p] == e->pivot_row[i])
-                    source[i * n + k] = e->inside + p;
-        }
+        place[e->pivot_row[i]] = i;
+    for (int32_t k = 0; k < n; k++)
+        for (int32_t p = e->column[e->pivot_column[k]]; p < e->column[e->pivot_column[k] + 1]; p++)
+            source[place[e->row[p]] * n + k] = e->inside + p;
 }
 
 /* below what a pivot is weak: by the largest entry of its column in the newest matrix */
@@ -192,16 +199,30 @@ static void measure_columns(sd_elimination *e)
 static int write_lists(sd_elimination *e, const char *entry)
 {
     size_t all = (size_t)e->n * (size_t)e->n;
-    int32_t *cell = malloc((2 * all + 1) * sizeof *cell), failed = 0;
+    int32_t *cell = malloc((2 * all + (size_t)e->n + 1) * sizeof *cell), *source = cell + all, *work = source + all, failed = 0;
     if (!cell)
         return 2;
-    number_cells(e, entry, cell, cell + all);
+    number_cells(e, entry, cell, source, work);
     e->cell = calloc((size_t)e->inside, sizeof(sd_number));
     for (int32_t i = 0; i < e->n && !failed; i++)
-        failed = list_row(e, cell, cell + all, i);
+        failed = list_row(e, cell, source, work, i);
     failed = failed || !e->cell || list_solution(e, cell) || e->factor.pairs + e->solve.pairs > PAIRS;
     free(cell);
     return failed;
+}
+
+/* the two constants of machine_code.h */
+static void write_constants(sd_number *cell)
+{
+    const uint64_t magnitude = UINT64_MAX >> 1, sign = ~magnitude;
+#ifdef SD_COMPLEX
+    const uint64_t bits[4] = {0, sign, magnitude, magnitude};
+#else
+    const double one = 1.0;
+    uint64_t bits[2] = {sign, magnitude};
+    memcpy(bits, &one, sizeof one);
+#endif
+    memcpy(cell, bits, sizeof bits);
 }
 
 /* an order for the newest matrix and as many of those before it as one order fits */
@@ -224,12 +245,8 @@ static void prepare(sd_elimination *e)
     }
     measure_columns(e);
     e->ready = 1;
-#ifndef SD_COMPLEX
-    const uint64_t bits = UINT64_MAX >> 1;
-    e->cell[constants(e)] = 1.0;
-    memcpy(&e->cell[constants(e) + 1], &bits, sizeof bits);
-    e->code = sd_code_new(&e->factor, &e->solve, e->inside, constants(e), constants(e) + 1);
-#endif
+    write_constants(e->cell + constants(e));
+    e->code = sd_code_new(&e->factor, &e->solve, e->inside, NUMBERS);
 }
 
 void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
@@ -277,7 +294,7 @@ static void interpret(sd_elimination *e, const sd_list *list, sd_number *outside
         if (sum->kind == SD_SUM_TIMES)
             value *= e->cell[sum->by];
         if (sum->kind == SD_SUM_INVERSE)
-            value = 1.0 / value;
+            value = sd_inverse(value);
         if (sum->target < e->inside)
             e->cell[sum->target] = value;
         else
@@ -286,17 +303,19 @@ static void interpret(sd_elimination *e, const sd_list *list, sd_number *outside
 }
 
 /* multipliers are moderate, and what is left of each pivot's column is more than round-off */
-static int healthy(const sd_elimination *e)
+static SD_WIDE int healthy(const sd_elimination *e)
 {
     const sd_number *inverse = e->cell, *size = e->cell + size_of(e, 0), *growth = e->cell + growth_of(e, 0);
     const sd_number *scale = e->cell + magnitude(e, 0);
-    int fine = 1;
-    for (int32_t k = 0; k < e->n; k++) {
+    const double *weak = e->weak;
+    const int32_t n = e->n;
+    int64_t fine = 1; /* as wide as a number: the loop runs in lanes */
+    for (int32_t k = 0; k < n; k++) {
         double row = sd_size(size[k]);
         fine &= sd_size(growth[k]) <= GROWTH * row;
-        fine &= sd_size(inverse[k]) * row * e->weak[k] <= sd_size(scale[k]);
+        fine &= sd_size(inverse[k]) * row * weak[k] <= sd_size(scale[k]);
     }
-    return fine;
+    return fine != 0;
 }
 
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
@@ -308,22 +327,17 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
     sd_number *magnitudes = e->cell + magnitude(e, 0);
     for (int32_t k = 0; k < e->n; k++)
         magnitudes[k] = scale ? scale[e->pivot_column[k]] : 1.0;
-#ifndef SD_COMPLEX
     if (e->code)
-        e->code->factor((double *)values, e->cell);
+        e->code->factor((sd_number *)values, e->cell);
     else
-#endif
         interpret(e, &e->factor, (sd_number *)values);
     return healthy(e);
 }
 
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
 {
-#ifndef SD_COMPLEX
-    if (elimination->code) {
+    if (elimination->code)
         elimination->code->solve(x, elimination->cell);
-        return;
-    }
-#endif
-    interpret(elimination, &elimination->solve, x);
+    else
+        interpret(elimination, &elimination->solve, x);
 }

@@ -33,13 +33,11 @@ static void measure_column(const sd_full *full, int32_t c)
     if (full->size[c * SD_SAMPLES] >= 0.0)
         return;
     size_t n = (size_t)full->n;
-    const char *entry = full->entry + (size_t)c * n;
     for (int32_t s = 0; s < full->samples; s++) {
-        const sd_number *column = full->value + ((size_t)s * n + (size_t)c) * n;
+        const sd_number *column = full->value + ((size_t)s * n + (size_t)c) * n; /* zero outside the pattern */
         double most = 0.0;
         for (int32_t i = 0; i < full->open; i++) {
-            int32_t r = full->row[i];
-            double size = entry[r] ? sd_size(column[r]) : 0.0;
+            double size = sd_size(column[full->row[i]]);
             most = size > most ? size : most;
         }
         full->size[c * SD_SAMPLES + s] = most;
@@ -121,8 +119,10 @@ static int choose_pivot(const sd_full *full, int32_t *row, int32_t *column)
         const char *entry = full->entry + (size_t)c * (size_t)full->n;
         for (int32_t i = 0; i < full->open && (int64_t)(fewest - 1) * others <= least; i++) {
             int32_t r = full->row[i];
+            if (!entry[r])
+                continue;
             int64_t fill = (int64_t)(full->row_left[r] - 1) * others;
-            if (!entry[r] || fill > least)
+            if (fill > least)
                 continue;
             double healthy = health(full, r, c);
             if (healthy >= 1.0 && (fill < least || healthy > best)) {
@@ -167,7 +167,9 @@ static void take(sd_full *full, int32_t i, int32_t j)
     full->column[j] = full->column[full->open];
     for (int32_t k = 0; k < full->open; k++) {
         int32_t other = full->row[k];
-        full->row_left[other] -= full->entry[(size_t)p * n + (size_t)other];
+        if (!full->entry[(size_t)p * n + (size_t)other])
+            continue;
+        full->row_left[other]--;
         for (size_t s = 0; s < (size_t)full->samples; s++) {
             sd_number *own = full->value + (s * n + (size_t)p) * n;
             own[other] /= own[r];

@@ -13,7 +13,7 @@
 
 typedef double sd_lanes __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));
 
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(SD_INTERPRETED)
 #define SD_WIDE __attribute__((target_clones("avx2", "default")))
 #else
 #define SD_WIDE

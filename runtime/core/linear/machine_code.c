@@ -14,89 +14,340 @@ void sd_code_allow(int allowed)
     permitted = allowed;
 }
 
-#if defined(__x86_64__) && defined(__linux__) && !defined(SD_INTERPRETED)
+#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(SD_INTERPRETED)
 #include <sys/mman.h>
 
-#define LONGEST 8   /* bytes of an instruction */
-#define OUTSIDE 7   /* rdi */
-#define CELL 6      /* rsi */
+#define LONGEST 10     /* bytes of an instruction */
+#define IN_A_PAIR 8    /* instructions at most */
+#define IN_A_SUM 8
+#define NEVER INT32_MAX
+#define REGISTERS 16
 
-enum operation { LOAD = 0x10, STORE = 0x11, TIMES = 0x59, MINUS = 0x5c, OVER = 0x5e, GREATER = 0x5f };
-enum whole { COPY = 0x28, AND = 0x54, XOR = 0x57 };
-enum place { VALUE = 0, PRODUCT = 1, ONE = 6, MASK = 7 }; /* registers xmm */
+enum place_of { CELL = 6, OUTSIDE = 7 }; /* rsi, rdi */
+/* registers xmm: three to work in, two constants, and those that keep numbers of places */
+enum place { PRODUCT = 0, OTHER = 1, TURNED = 2, CONSTANT = 3, MASK = 4, KEPT = 5 };
+enum prefix { PACKED = 1, SCALAR = 3 };
+enum operation {
+    LOAD = 0x10, STORE = 0x11, TWICE = 0x12, UPPER = 0x15, COPY = 0x28, AND = 0x54, XOR = 0x57, TIMES = 0x59, MINUS = 0x5c, OVER = 0x5e,
+    GREATER = 0x5f, ADD_ACROSS = 0x7c, EXCHANGE = 0xc6, MINUS_PLUS = 0xd0
+};
 
-/* scalar operation of a register and a place in memory */
-static uint8_t *memory(uint8_t *at, enum operation operation, enum place value, int32_t place, int32_t inside)
+/* A list while it is written.  Which numbers stay in registers: those that are used soonest again (Belady).  after: the
+ * next sum that uses a place, for each use: of the pairs, then of sources, factors `by` and targets. */
+typedef struct writer {
+    uint8_t *at;
+    const sd_list *list;
+    int32_t inside, size;                     /* bytes of a number */
+    enum sd_numbers numbers;
+    int32_t held[REGISTERS], next[REGISTERS]; /* place that a register keeps, -1: none; the sum that uses it next */
+    int32_t *where;                           /* of a place: its register, 0: none */
+    int32_t *after;
+} writer;
+
+static enum prefix whole(const writer *w)
 {
-    int32_t distance = 8 * (place < inside ? place : place - inside);
-    const uint8_t head[4] = {0xf2, 0x0f, (uint8_t)operation, (uint8_t)(0x80 | value << 3 | (place < inside ? CELL : OUTSIDE))};
-    memcpy(at, head, sizeof head);
-    memcpy(at + sizeof head, &distance, sizeof distance);
-    return at + sizeof head + sizeof distance;
+    return w->numbers == SD_COMPLEX_NUMBERS ? PACKED : SCALAR;
 }
 
-/* operation of two registers; prefix 0xf2: scalar, 0x66: of all bits */
-static uint8_t *registers(uint8_t *at, uint8_t prefix, int operation, enum place value, enum place other)
+/* the operation and what stands before it (VEX): target, other: registers, of which the upper eight have a bit here */
+static inline void begin(writer *w, enum prefix prefix, enum operation operation, unsigned target, unsigned first, unsigned other)
 {
-    const uint8_t code[4] = {prefix, 0x0f, (uint8_t)operation, (uint8_t)(0xc0 | value << 3 | other)};
-    memcpy(at, code, sizeof code);
-    return at + sizeof code;
+    const uint32_t head = 0x41c4 | (target < 8) << 15 | (other < 8) << 13 | (~first & 15) << 19
+        | (uint32_t)prefix << 16 | (uint32_t)operation << 24;
+    memcpy(w->at, &head, sizeof head);
 }
 
-static uint8_t *emit(uint8_t *at, const sd_sum *sum, const int32_t *pair, int32_t inside)
+/* target := first operation other */
+static inline void registers(writer *w, enum prefix prefix, enum operation operation, int target, int first, int other)
 {
-    enum place result = VALUE;
-    at = sum->source < 0 ? registers(at, 0x66, XOR, VALUE, VALUE) : memory(at, LOAD, VALUE, sum->source, inside);
+    begin(w, prefix, operation, (unsigned)target, (unsigned)first, (unsigned)other);
+    w->at[4] = (uint8_t)(0xc0 | (target & 7) << 3 | (other & 7));
+    w->at += 5;
+}
+
+/* target := first operation what is at a place, or its imaginary part; first 0 where there is none */
+static inline void memory(writer *w, enum prefix prefix, enum operation operation, int target, int first, int32_t place, int imaginary)
+{
+    int inside = place < w->inside;
+    int32_t distance = (inside ? place : place - w->inside) * w->size + 8 * imaginary;
+    begin(w, prefix, operation, (unsigned)target, (unsigned)first, 0);
+    w->at[4] = (uint8_t)(0x80 | (target & 7) << 3 | (inside ? CELL : OUTSIDE));
+    memcpy(w->at + 5, &distance, sizeof distance);
+    w->at += 9;
+}
+
+/* --- which numbers stay in registers ------------------------------------------------------------------------------ */
+
+static int32_t *after_source(const writer *w, int32_t s) { return w->after + 2 * w->list->pairs + s; }
+static int32_t *after_by(const writer *w, int32_t s) { return w->after + 2 * w->list->pairs + w->list->sums + s; }
+static int32_t *after_target(const writer *w, int32_t s) { return w->after + 2 * w->list->pairs + 2 * w->list->sums + s; }
+
+/* the next use behind each use; works in `where` */
+static void look_ahead(writer *w, int32_t places)
+{
+    const sd_list *list = w->list;
+    int32_t *soonest = w->where;
+    for (int32_t i = 0; i < places; i++)
+        soonest[i] = NEVER;
+    for (int32_t s = list->sums - 1; s >= 0; s--) {
+        const sd_sum *sum = &list->sum[s];
+        *after_target(w, s) = soonest[sum->target];
+        *after_source(w, s) = sum->source < 0 ? NEVER : soonest[sum->source];
+        *after_by(w, s) = sum->kind == SD_SUM_TIMES ? soonest[sum->by] : NEVER;
+        for (int32_t p = 2 * sum->first; p < 2 * sum->last; p++)
+            w->after[p] = soonest[list->pair[p]];
+        for (int32_t p = 2 * sum->first; p < 2 * sum->last; p++)
+            soonest[list->pair[p]] = s;
+        if (sum->source >= 0)
+            soonest[sum->source] = s;
+        if (sum->kind == SD_SUM_TIMES)
+            soonest[sum->by] = s;
+    }
+    memset(w->where, 0, (size_t)places * sizeof *w->where);
+}
+
+static void let_go(writer *w, int place)
+{
+    if (w->held[place] >= 0)
+        w->where[w->held[place]] = 0;
+    w->held[place] = -1;
+    w->next[place] = NEVER;
+}
+
+/* the register whose number is used last */
+static int last_used(const writer *w)
+{
+    int found = KEPT;
+    for (int r = KEPT + 1; r < REGISTERS; r++)
+        if (w->next[r] > w->next[found])
+            found = r;
+    return found;
+}
+
+/* a register for the sum at hand, which stays its own until it is kept or let go */
+static int take(writer *w)
+{
+    int r = last_used(w);
+    let_go(w, r);
+    w->next[r] = -1;
+    return r;
+}
+
+/* the register has the number of a place from now on, which the sum `next` uses */
+static void keep(writer *w, int r, int32_t place, int32_t next)
+{
+    if (w->where[place])
+        let_go(w, w->where[place]);
+    if (next == NEVER) {
+        let_go(w, r);
+        return;
+    }
+    w->held[r] = place;
+    w->next[r] = next;
+    w->where[place] = r;
+}
+
+/* a register that has the number of a place: one that keeps it from now on, where that is worth it, or `scratch` */
+static int fetch(writer *w, int32_t place, int32_t next, int scratch)
+{
+    int r = w->where[place];
+    if (r) {
+        w->next[r] = next;
+        return r;
+    }
+    r = last_used(w);
+    if (w->next[r] <= next)
+        r = scratch;
+    else
+        let_go(w, r);
+    memory(w, whole(w), LOAD, r, 0, place, 0);
+    if (r != scratch)
+        keep(w, r, place, next);
+    return r;
+}
+
+/* --- operations of numbers ---------------------------------------------------------------------------------------- */
+
+/* target := a register's number times that of a place */
+static void multiply(writer *w, int target, int a, int32_t place)
+{
+    int b = w->where[place];
+    if (w->numbers == SD_REAL_NUMBERS) {
+        if (b)
+            registers(w, SCALAR, TIMES, target, a, b);
+        else
+            memory(w, SCALAR, TIMES, target, a, place, 0);
+        return;
+    }
+    if (b) {
+        registers(w, SCALAR, TWICE, OTHER, 0, b);
+        registers(w, PACKED, UPPER, TURNED, b, b);
+    } else {
+        memory(w, SCALAR, TWICE, OTHER, 0, place, 0);
+        memory(w, SCALAR, TWICE, TURNED, 0, place, 1);
+    }
+    registers(w, PACKED, TIMES, OTHER, a, OTHER); /* (a.re b.re, a.im b.re) */
+    registers(w, PACKED, EXCHANGE, PRODUCT, a, a);
+    *w->at++ = 1;
+    registers(w, PACKED, TIMES, TURNED, PRODUCT, TURNED); /* (a.im b.im, a.re b.im) */
+    registers(w, PACKED, MINUS_PLUS, target, OTHER, TURNED);
+}
+
+/* PRODUCT := the product of pair p */
+static void pair_product(writer *w, int32_t p)
+{
+    const int32_t *pair = w->list->pair + 2 * p, *after = w->after + 2 * p;
+    /* the one that is used sooner again is worth a register */
+    int first = w->where[pair[0]] ? 0 : w->where[pair[1]] ? 1 : after[0] <= after[1] ? 0 : 1;
+    int a = fetch(w, pair[first], after[first], PRODUCT);
+    multiply(w, PRODUCT, a, pair[1 - first]);
+    if (w->where[pair[1 - first]])
+        w->next[w->where[pair[1 - first]]] = after[1 - first];
+}
+
+/* value := the larger of it, zero before the first, and the size of PRODUCT */
+static void enlarge(writer *w, int value, int first)
+{
+    int size = first && w->numbers == SD_REAL_NUMBERS ? value : PRODUCT;
+    registers(w, PACKED, AND, size, PRODUCT, MASK);
+    if (w->numbers == SD_COMPLEX_NUMBERS)
+        registers(w, PACKED, ADD_ACROSS, PRODUCT, PRODUCT, PRODUCT);
+    if (size != value)
+        registers(w, SCALAR, GREATER, value, value, PRODUCT);
+}
+
+static void invert(writer *w, int target, int value)
+{
+    if (w->numbers == SD_REAL_NUMBERS) {
+        registers(w, SCALAR, OVER, target, CONSTANT, value);
+        return;
+    }
+    registers(w, PACKED, TIMES, PRODUCT, value, value);
+    registers(w, PACKED, ADD_ACROSS, PRODUCT, PRODUCT, PRODUCT);
+    registers(w, PACKED, XOR, OTHER, value, CONSTANT);
+    registers(w, PACKED, OVER, target, OTHER, PRODUCT);
+}
+
+/* a register with the source of a sum: that which keeps it, not to be taken before it is read, or `value` */
+static int begin_sum(writer *w, int32_t s, int value)
+{
+    const sd_sum *sum = &w->list->sum[s];
+    int32_t source = sum->source;
+    if (source < 0) {
+        if (sum->kind != SD_SUM_LARGEST || sum->first == sum->last || w->numbers == SD_COMPLEX_NUMBERS)
+            registers(w, PACKED, XOR, value, value, value);
+    } else if (w->where[source]) {
+        w->next[w->where[source]] = -1;
+        return w->where[source];
+    } else {
+        memory(w, whole(w), LOAD, value, 0, source, 0);
+    }
+    return value;
+}
+
+/* value := what the sum's kind makes of the sum in `from` */
+static void end_sum(writer *w, int32_t s, int value, int from)
+{
+    const sd_sum *sum = &w->list->sum[s];
+    if (sum->kind == SD_SUM_TIMES) {
+        multiply(w, value, from, sum->by);
+        if (w->where[sum->by])
+            w->next[w->where[sum->by]] = *after_by(w, s);
+    } else if (sum->kind == SD_SUM_INVERSE) {
+        invert(w, value, from);
+    } else if (from != value) {
+        registers(w, PACKED, COPY, value, 0, from);
+    }
+}
+
+static void write_sum(writer *w, int32_t s)
+{
+    const sd_sum *sum = &w->list->sum[s];
+    int value = take(w), source = begin_sum(w, s, value), from = source;
     for (int32_t p = sum->first; p < sum->last; p++) {
-        at = memory(at, LOAD, PRODUCT, pair[2 * p], inside);
-        at = memory(at, TIMES, PRODUCT, pair[2 * p + 1], inside);
-        if (sum->kind == SD_SUM_LARGEST) {
-            at = registers(at, 0x66, AND, PRODUCT, MASK);
-            at = registers(at, 0xf2, GREATER, VALUE, PRODUCT);
-        } else {
-            at = registers(at, 0xf2, MINUS, VALUE, PRODUCT);
-        }
+        pair_product(w, p);
+        if (sum->kind == SD_SUM_LARGEST)
+            enlarge(w, value, p == sum->first);
+        else
+            registers(w, whole(w), MINUS, value, from, PRODUCT);
+        from = value;
     }
-    if (sum->kind == SD_SUM_TIMES)
-        at = memory(at, TIMES, VALUE, sum->by, inside);
-    if (sum->kind == SD_SUM_INVERSE) {
-        at = registers(at, 0x66, COPY, PRODUCT, ONE);
-        at = registers(at, 0xf2, OVER, PRODUCT, VALUE);
-        result = PRODUCT;
-    }
-    return memory(at, STORE, result, sum->target, inside);
+    end_sum(w, s, value, from);
+    if (source != value)
+        w->next[source] = *after_source(w, s);
+    memory(w, whole(w), STORE, value, 0, sum->target, 0);
+    keep(w, value, sum->target, *after_target(w, s));
 }
 
-static uint8_t *emit_list(uint8_t *at, const sd_list *list, int32_t inside, int32_t one, int32_t mask)
+/* --- code of two lists ---------------------------------------------------------------------------------------------- */
+
+static void write_list(writer *w, const sd_list *list, int32_t places, int32_t constant)
 {
-    at = memory(at, LOAD, ONE, one, inside);
-    at = memory(at, LOAD, MASK, mask, inside);
+    w->list = list;
+    look_ahead(w, places);
+    for (int r = 0; r < REGISTERS; r++) {
+        w->held[r] = -1;
+        w->next[r] = NEVER;
+    }
+    memory(w, whole(w), LOAD, CONSTANT, 0, constant, 0);
+    memory(w, whole(w), LOAD, MASK, 0, constant + 1, 0);
     for (int32_t s = 0; s < list->sums; s++)
-        at = emit(at, &list->sum[s], list->pair, inside);
-    *at++ = 0xc3; /* ret */
-    return at;
+        write_sum(w, s);
+    *w->at++ = 0xc3; /* ret */
 }
 
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, int32_t one, int32_t mask)
+/* the number of places that a list names */
+static int32_t places_of(const sd_list *list, int32_t least)
 {
-    size_t operations = 4 * (size_t)(factor->sums + solve->sums) + 4 * (size_t)(factor->pairs + solve->pairs) + 8;
-    sd_code *code = permitted ? calloc(1, sizeof *code) : NULL;
+    for (int32_t s = 0; s < list->sums; s++) {
+        least = list->sum[s].target < least ? least : list->sum[s].target + 1;
+        least = list->sum[s].source < least ? least : list->sum[s].source + 1;
+    }
+    for (int32_t p = 0; p < 2 * list->pairs; p++)
+        least = list->pair[p] < least ? least : list->pair[p] + 1;
+    return least;
+}
+
+static size_t room_of(const sd_list *list)
+{
+    return LONGEST * (IN_A_SUM * (size_t)list->sums + IN_A_PAIR * (size_t)list->pairs + 3);
+}
+
+/* 0: both lists are written from `page` on */
+static int write_lists(sd_code *code, const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
+{
+    int32_t places = places_of(factor, places_of(solve, inside)), pairs = factor->pairs > solve->pairs ? factor->pairs : solve->pairs;
+    int32_t sums = factor->sums > solve->sums ? factor->sums : solve->sums;
+    int32_t *work = malloc((size_t)(places + 2 * pairs + 3 * sums) * sizeof *work + 1);
+    if (!work)
+        return 1;
+    writer w = {.at = code->page, .inside = inside, .size = numbers == SD_COMPLEX_NUMBERS ? 16 : 8, .numbers = numbers,
+                .where = work, .after = work + places};
+    const uint8_t *start = w.at;
+    write_list(&w, factor, places, inside - 2);
+    const uint8_t *next = w.at;
+    write_list(&w, solve, places, inside - 2);
+    free(work);
+    memcpy(&code->factor, &start, sizeof start); /* a function's address is no object's in C */
+    memcpy(&code->solve, &next, sizeof next);
+    return mprotect(code->page, code->size, PROT_READ | PROT_EXEC) != 0;
+}
+
+sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
+{
+    sd_code *code = permitted && __builtin_cpu_supports("avx") ? calloc(1, sizeof *code) : NULL;
     if (!code)
         return NULL;
-    code->size = (operations * LONGEST + 4095) / 4096 * 4096;
+    code->size = (room_of(factor) + room_of(solve) + 4095) / 4096 * 4096;
     code->page = mmap(NULL, code->size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (code->page == MAP_FAILED) {
         free(code);
         return NULL;
     }
-    uint8_t *start = code->page, *next = emit_list(start, factor, inside, one, mask);
-    emit_list(next, solve, inside, one, mask);
-    if (mprotect(code->page, code->size, PROT_READ | PROT_EXEC)) {
+    if (write_lists(code, factor, solve, inside, numbers)) {
         sd_code_free(code);
         return NULL;
     }
-    memcpy(&code->factor, &start, sizeof start); /* a function's address is no object's in C */
-    memcpy(&code->solve, &next, sizeof next);
     return code;
 }
 
@@ -108,9 +359,9 @@ void sd_code_free(sd_code *code)
     free(code);
 }
 #else
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, int32_t one, int32_t mask)
+sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
 {
-    (void)factor, (void)solve, (void)inside, (void)one, (void)mask, (void)permitted;
+    (void)factor, (void)solve, (void)inside, (void)numbers, (void)permitted;
     return NULL;
 }
 

@@ -1,7 +1,10 @@
-/* A list of sums (elimination.h) as straight machine code: x86-64, the calling convention of Linux; elsewhere there is none.
+/* A list of sums (elimination.h) as straight machine code: x86-64 with AVX, the calling convention of Linux; elsewhere
+ * there is none.
  *
  * What is written are moves, products, differences and quotients of doubles at fixed distances from two pointers, and the
- * return: no branch, no call, nothing of the user's.  Pages are written, then made executable, never both.
+ * return: no branch, no call, nothing of the user's.  Numbers that are used again soon stay in registers.  A complex
+ * number is the two halves of one; its products are those of plain formulae, as the compiler makes them.  Pages are
+ * written, then made executable, never both.
  */
 #ifndef SYSDYN_MACHINE_CODE_H
 #define SYSDYN_MACHINE_CODE_H
@@ -10,7 +13,10 @@
 
 #include <stddef.h>
 
-typedef void sd_run_code(double *outside, double *cell);
+enum sd_numbers { SD_REAL_NUMBERS, SD_COMPLEX_NUMBERS };
+
+/* of the numbers outside and those of the cells */
+typedef void sd_run_code(void *outside, void *cell);
 
 struct sd_code {
     sd_run_code *factor, *solve;
@@ -18,8 +24,9 @@ struct sd_code {
     size_t size;
 };
 
-/* one, mask: cells of 1.0 and of the bits of a magnitude; inside: as in elimination.h.  NULL where there is none. */
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, int32_t one, int32_t mask);
+/* inside: as in elimination.h; the last two cells are a constant (real: 1; complex: the sign of an imaginary part) and the
+ * bits of magnitudes.  NULL where there is none. */
+sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers);
 void sd_code_free(sd_code *code);
 /* 0: from now on lists are interpreted (tests) */
 void sd_code_allow(int allowed);

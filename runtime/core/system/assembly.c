@@ -1,5 +1,6 @@
 /* Residual and Jacobian of a system: see assembly.h. */
 #include "system/assembly.h"
+#include "linear/lanes.h"
 
 #include <float.h>
 #include <math.h>
@@ -112,19 +113,18 @@ int32_t sd_first_astray(sd_system *system, double t, const double *y, const doub
     return -1;
 }
 
-int32_t sd_first_bad(int32_t n, const double *x)
+SD_WIDE int32_t sd_first_bad(int32_t n, const double *x)
 {
-    double sums[4] = {0.0, 0.0, 0.0, 0.0}; /* x - x is 0 for a finite number and not a number otherwise */
-    int32_t whole = n - n % 4;
-    for (int32_t i = 0; i < whole; i += 4)
-        for (int32_t k = 0; k < 4; k++)
-            sums[k] += x[i + k] - x[i + k];
-    double sum = sums[0] + sums[1] + sums[2] + sums[3];
+    sd_lanes sums = {0.0}; /* x - x is 0 for a finite number and not a number otherwise */
+    int32_t whole = n - n % SD_LANES;
+    for (int32_t i = 0; i < whole; i += SD_LANES) {
+        sd_lanes v = SD_FROM(x, i);
+        sums += v - v;
+    }
+    double sum = SD_TOTAL(sums);
     for (int32_t i = whole; i < n; i++)
         sum += x[i] - x[i];
-    if (sum == 0.0)
-        return -1;
-    for (int32_t i = 0; i < n; i++)
+    for (int32_t i = 0; i < n && sum != 0.0; i++)
         if (!isfinite(x[i]))
             return i;
     return -1;

@@ -1,0 +1,211 @@
+/* Newton's iteration for the stages of Radau IIA, and with corrections shortened for steep laws (see radau.h). */
+#include "steppers/radau.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define ITERATIONS 7       /* of Newton a step of three stages */
+#define MORE 1             /* for each stage beyond */
+#define PATIENT 30         /* the same where the step is fixed: nothing is gained by giving up early */
+#define DAMPED 15          /* with corrections shortened */
+#define WALK 45            /* with whole ones: back down an exponential of all digits, one 1/a each, and a few more */
+#define SLOW 0.99          /* contraction above which Newton gives up */
+#define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
+#define LAX 100.0          /* a steep row may be off by as many times Newton's tolerance times the method's */
+#define NULL_PIVOT 1e-10   /* part of its column below which a pivot determines no better than Newton's test asks */
+#define LEAST_PART 1e-7    /* of a correction that is still tried */
+#define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
+#define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
+
+/* the part of its column below which a pivot is none; columns of multipliers and states always have one */
+void sd_radau_leave_below(sd_radau *radau, double null_pivot)
+{
+    radau->linear->null_pivot = null_pivot;
+    for (int k = 0; k < SD_PAIRS && radau->complex_linear[k]; k++)
+        sd_linear_z_allow(radau->complex_linear[k], null_pivot, radau->linear->idle);
+}
+
+/* Of Newton's corrections, in units of the unknowns' */
+static const double round_off[SD_METHODS] = {10.0, 40.0, 160.0};
+
+/* the last factors left a column */
+static int columns_left(const sd_radau *radau)
+{
+    int left = radau->linear->rank < radau->n;
+    for (int k = 0; k < radau->method->pairs; k++)
+        left = left || sd_linear_z_rank(radau->complex_linear[k]) < radau->n;
+    return left;
+}
+
+/* The residuals in d, behind the last correction, are small in every steep row beside the row's own terms: on an
+ * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
+static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
+{
+    double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
+    int left = columns_left(radau), judged = all || left;
+    limit = left ? fmax(limit, FAINT_ROW) : limit;
+    for (int s = 0; s < radau->method->stages; s++) {
+        for (int32_t i = 0; i < radau->n; i++) {
+            radau->y[i] = radau->phi[i] + radau->z[s][i];
+            radau->rate[i] = (fabs(radau->y[i]) + radau->magnitude[i]) / radau->h;
+        }
+        if (sd_first_unmet(radau->system, radau->t + radau->method->c[s] * radau->h, radau->y, radau->rate, radau->d[s], limit,
+                           radau->g, radau->scale, judged, radau->terms) >= 0)
+            return 0;
+    }
+    return 1;
+}
+
+/* of Newton a step */
+int sd_radau_iterations(const sd_radau *radau)
+{
+    return ITERATIONS + MORE * (radau->method->stages - 3);
+}
+
+/* Of Newton's corrections in its weights; stages of more have larger round-off */
+static double newton_tolerance(const sd_radau *radau)
+{
+    double least = round_off[radau->method - sd_radau_methods] * DBL_EPSILON / radau->tolerance;
+    return fmax(least, fmin(0.03, sqrt(radau->tolerance)));
+}
+
+/* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
+int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
+{
+    double tolerance = newton_tolerance(radau);
+    double before = 0.0, ratio_before = 0.0, trust = 1.0;
+    int patient = full || radau->fixed_h > 0.0;
+    *retry = 0.5;
+    int usual = sd_radau_iterations(radau), most = patient ? PATIENT : usual, converged = 0;
+    for (int m = 1; m <= most + (radau->system->scales > 0); m++) {
+        int cause = sd_radau_residuals(radau);
+        if (cause)
+            return cause;
+        if (converged && rows_hold(radau, tolerance, 0))
+            return SD_FINE;
+        if (m > most)
+            break;
+        double size = sd_radau_correct(radau);
+        *used = m;
+        if (!isfinite(size))
+            return SD_NEWTON;
+        converged = 0;
+        if (m > 1) {
+            double ratio = size / before;
+            radau->theta = m == 2 ? ratio : sqrt(ratio * ratio_before);
+            ratio_before = ratio;
+            if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2)) {
+                if (size > STAGNANT * tolerance)
+                    return SD_NEWTON;
+                converged = 1;
+            }
+            trust = radau->theta < SLOW ? radau->theta / (1.0 - radau->theta) : 1.0 / DBL_EPSILON;
+            double end = trust * size * pow(radau->theta, usual - 1 - m) / tolerance;
+            if (!converged && !patient && end >= 1.0 && trust * size > tolerance) {
+                double far = fmax(1e-4, fmin(20.0, end));
+                *retry = 0.8 * pow(far, -1.0 / (radau->method->stages + usual - m));
+                return SD_NEWTON;
+            }
+        }
+        before = fmax(size, DBL_MIN);
+        /* far up an exponential every correction is small */
+        converged = converged || (trust * size <= tolerance && !(full && m == 1));
+        if (converged && radau->system->scales == 0)
+            return SD_FINE;
+        if (full) {
+            radau->old_jacobian = 0;
+            if ((cause = sd_radau_factorise(radau, 1)))
+                return cause;
+        }
+    }
+    return SD_NEWTON;
+}
+
+/* z := base + part (z_full - base) */
+static void move(sd_radau *radau, double part)
+{
+    for (int s = 0; s < radau->method->stages; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->z[s][i] = radau->base[s][i] + part * radau->full[s][i];
+}
+
+/* the part of the correction `full` of size `size` that is taken: the next one with the same factors is smaller
+ * (natural monotonicity, Deuflhard 2004); residuals in d.  0: there is none */
+static double damped_part(sd_radau *radau, double size)
+{
+    for (double part = 1.0; part >= LEAST_PART; part *= 0.5) {
+        move(radau, part);
+        int cause = sd_radau_residuals(radau);
+        if (cause == SD_STOPPED)
+            return 0.0;
+        if (cause == SD_FINE) {
+            memcpy(radau->first, radau->d[0], (size_t)radau->n * sizeof(double));
+            double next = sd_radau_correct(radau);
+            move(radau, part);
+            memcpy(radau->d[0], radau->first, (size_t)radau->n * sizeof(double));
+            /* up an exponential every correction is as large as the last */
+            if (next <= size * (part < 1.0 ? 1.0 - 0.25 * part : 1.0)) {
+                radau->theta = next / size;
+                return part;
+            }
+        }
+    }
+    return 0.0;
+}
+
+/* The full correction at the present stages, with fresh slopes: base and full, its size; z has it.  known: d holds the
+ * residuals there. */
+static int full_correction(sd_radau *radau, int known, double *size)
+{
+    radau->old_jacobian = 0;
+    int cause = sd_radau_factorise(radau, 1);
+    if (cause)
+        return cause;
+    for (int s = 0; s < radau->method->stages; s++)
+        memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
+    if (!known && (cause = sd_radau_residuals(radau)))
+        return cause;
+    *size = sd_radau_correct(radau);
+    for (int s = 0; s < radau->method->stages; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->full[s][i] = radau->z[s][i] - radau->base[s][i];
+    return isfinite(*size) ? SD_FINE : SD_NEWTON;
+}
+
+/* Newton's iteration with fresh slopes each time and corrections shortened where they lead astray: for steep laws.  What
+ * follows from the state through slopes near round-off does not converge (on the tail of an exponential every correction
+ * is 1/a, on its underflow it is noise).  So the state is judged by its correction, the rest by the rows, each in the
+ * scale of its terms. */
+int sd_radau_iterate_damped(sd_radau *radau, int *used)
+{
+    double tolerance = newton_tolerance(radau);
+    double size;
+    int cause = sd_radau_residuals(radau), known = cause == SD_FINE;
+    if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
+        for (int s = 0; s < radau->method->stages; s++)
+            memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
+        cause = SD_FINE;
+    }
+    for (int m = 1; m <= WALK && cause == SD_FINE; m++) {
+        *used = m;
+        sd_radau_leave_below(radau, NULL_PIVOT);
+        cause = full_correction(radau, known, &size);
+        sd_radau_leave_below(radau, SD_LEAST_PIVOT);
+        if (cause)
+            break;
+        if (radau->state_size <= tolerance && sd_radau_residuals(radau) == SD_FINE && rows_hold(radau, tolerance, 1))
+            return SD_FINE;
+        if (radau->linear->rank < radau->n) {
+            for (int s = 0; s < radau->method->stages; s++)
+                memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
+            if ((cause = full_correction(radau, 0, &size)))
+                break;
+        }
+        double part = damped_part(radau, fmax(size, DBL_MIN));
+        if (part == 0.0 || (m >= DAMPED && part < 1.0))
+            return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
+        known = 1;
+    }
+    return cause ? cause : SD_NEWTON;
+}

@@ -1,0 +1,265 @@
+/* The systems of a Newton step of Radau IIA: matrices and factors, residuals of the stages, corrections; those of large
+ * models are whole tasks for threads (see radau.h). */
+#include "system/condensed.h"
+#include "steppers/radau.h"
+#include "steppers/threads.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* out [n] := sum_j weight[j] v[j] */
+static inline void sum(int stages, int32_t n, const double *weight, double *const *v, double *out)
+{
+    for (int32_t i = 0; i < n; i++) {
+        double x = weight[0] * v[0][i];
+        for (int j = 1; j < stages; j++)
+            x += weight[j] * v[j][i];
+        out[i] = x;
+    }
+}
+
+void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out)
+{
+    if (stages == 3)
+        sum(3, n, weight, v, out);
+    else if (stages == 5)
+        sum(5, n, weight, v, out);
+    else
+        sum(7, n, weight, v, out);
+}
+
+/* whether the systems of a step are taken at once: a matter of their size, not of the machine */
+static int large(const sd_radau *radau)
+{
+    return radau->n >= SD_LARGE;
+}
+
+typedef struct factoring {
+    sd_radau *radau;
+    int failed[SD_PAIRS + 1];
+} factoring;
+
+/* part 0: J + gamma/h E and its factors; part k: those of J + lambda/h E of pair k - 1 */
+static void factorise_one(void *context, int part)
+{
+    factoring *all = context;
+    sd_radau *radau = all->radau;
+    const sd_radau_method *method = radau->method;
+    int32_t entries = radau->system->entries;
+    if (part == 0) {
+        double real = method->gamma / radau->h;
+        for (int32_t e = 0; e < entries; e++)
+            radau->g[e] = radau->jy[e] + real * radau->jyd[e];
+        all->failed[0] = sd_linear_factor(radau->linear, radau->g, radau->scale);
+        return;
+    }
+    double complex both = method->lambda[part - 1] / radau->h;
+    double complex *gz = radau->gz + (large(radau) ? (size_t)(part - 1) * ((size_t)entries + 1) : 0);
+    for (int32_t e = 0; e < entries; e++)
+        gz[e] = radau->jy[e] + both * radau->jyd[e];
+    all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, radau->scale);
+}
+
+/* The factors of all matrices of a step; the failure of the first that has none.  Large ones are all made in any case: what
+ * they leave behind must not depend on how many threads there are. */
+static int factorise_all(sd_radau *radau)
+{
+    factoring all = {radau, {0}};
+    int failed = 0;
+    if (large(radau))
+        sd_side_by_side(radau->method->pairs + 1, factorise_one, &all);
+    for (int part = 0; part <= radau->method->pairs && !failed; part++) {
+        if (!large(radau))
+            factorise_one(&all, part);
+        failed = all.failed[part];
+        if (part == 0) {
+            radau->bad_row = radau->linear->bad_row;
+            radau->bad_column = radau->linear->bad_column;
+        } else if (failed)
+            sd_linear_z_bad(radau->complex_linear[part - 1], &radau->bad_row, &radau->bad_column);
+    }
+    return failed;
+}
+
+/* J, E where they are not old, and the factors of J + gamma/h E and all J + lambda/h E.  Taken at the last accepted point, or
+ * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
+int sd_radau_factorise(sd_radau *radau, int at_end)
+{
+    sd_system *system = radau->system;
+    const sd_radau_method *method = radau->method;
+    int last = method->stages - 1;
+    if (!radau->old_jacobian) {
+        double h = radau->h;
+        if (at_end) {
+            sd_radau_combine(last + 1, radau->n, method->inverse[last], radau->z, radau->rate);
+            for (int32_t i = 0; i < radau->n; i++) {
+                radau->y[i] = radau->phi[i] + radau->z[last][i];
+                radau->rate[i] /= h;
+            }
+        }
+        sd_jacobian(system, at_end ? radau->t + h : radau->t, at_end ? radau->y : radau->phi,
+                    at_end ? radau->rate : radau->yd, radau->jy, radau->jyd);
+        if (*system->stop)
+            return SD_STOPPED;
+        int32_t a = sd_first_bad(system->entries, radau->jy), b = sd_first_bad(system->entries, radau->jyd);
+        if (a >= 0 || b >= 0) {
+            radau->bad_row = system->row[a >= 0 ? a : b];
+            return SD_NONFINITE;
+        }
+        radau->old_jacobian = 1;
+    }
+    radau->ready = 0;
+    radau->factorisations++;
+    int failed = factorise_all(radau);
+    if (failed)
+        return failed == 2 ? SD_MEMORY : SD_SINGULAR;
+    radau->h_factored = radau->h;
+    radau->ready = 1;
+    return SD_FINE;
+}
+
+/* d of stage s := its residual, of `system`, by way of y and rate */
+static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, double *rate)
+{
+    const sd_radau_method *method = radau->method;
+    double weight[SD_STAGES];
+    for (int j = 0; j < method->stages; j++)
+        weight[j] = method->inverse[s][j] / radau->h;
+    sd_radau_combine(method->stages, radau->n, weight, radau->z, rate);
+    for (int32_t i = 0; i < radau->n; i++)
+        y[i] = radau->phi[i] + radau->z[s][i];
+    sd_residual(system, radau->t + method->c[s] * radau->h, y, rate, radau->d[s]);
+}
+
+/* The later half of the stages, in a system beside the radau's own; the others in that. */
+static void residual_part(void *context, int part)
+{
+    sd_radau *radau = context;
+    int half = (radau->method->stages + 1) / 2;
+    if (part == 0)
+        for (int s = 0; s < half; s++)
+            residual_of(radau, radau->system, s, radau->y, radau->rate);
+    else
+        for (int s = half; s < radau->method->stages; s++)
+            residual_of(radau, radau->other, s, radau->point_y, radau->point_rate);
+}
+
+/* the system and the point that a second thread takes residuals with; 0: there are none */
+static int accompanied(sd_radau *radau)
+{
+    if (!large(radau) || !radau->system->together || sd_threads() < 2)
+        return 0;
+    if (!radau->beside) {
+        radau->beside = sd_beside_new(radau->system);
+        radau->point_y = calloc(2 * ((size_t)radau->n + 1), sizeof(double));
+        radau->point_rate = radau->point_y + radau->n + 1;
+    }
+    if (!radau->beside || !radau->point_y)
+        return 0;
+    radau->other = sd_beside_as(radau->beside, radau->system);
+    return 1;
+}
+
+/* residuals of the stages into d */
+int sd_radau_residuals(sd_radau *radau)
+{
+    int32_t n = radau->n;
+    int64_t before = radau->system->residual_evaluations;
+    int made = accompanied(radau);
+    if (made)
+        sd_side_by_side(2, residual_part, radau);
+    for (int s = 0; s < radau->method->stages; s++) {
+        if (!made)
+            residual_of(radau, radau->system, s, radau->y, radau->rate);
+        radau->system->residual_evaluations = before + s + 1; /* those that are looked at */
+        if (*radau->system->stop)
+            return SD_STOPPED;
+        int32_t bad = sd_first_bad(n, radau->d[s]);
+        if (bad >= 0) {
+            radau->bad_row = bad;
+            return SD_NONFINITE;
+        }
+    }
+    return SD_FINE;
+}
+
+/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d */
+static inline void split(sd_radau *radau, int stages, int pairs)
+{
+    const sd_radau_method *method = radau->method;
+    for (int32_t i = 0; i < radau->n; i++) {
+        double r[SD_STAGES];
+        for (int j = 0; j < stages; j++)
+            r[j] = -radau->d[j][i];
+        for (int k = 0; k < pairs; k++) {
+            double complex w = method->rows[k][0] * r[0];
+            for (int j = 1; j < stages; j++)
+                w += method->rows[k][j] * r[j];
+            radau->w[k][i] = w;
+        }
+        double real = method->row[0] * r[0];
+        for (int j = 1; j < stages; j++)
+            real += method->row[j] * r[j];
+        radau->d[0][i] = real;
+    }
+}
+
+/* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and
+ * over what carries the state */
+static inline void join(sd_radau *radau, int stages, int pairs, double *sum, double *state)
+{
+    const sd_radau_method *method = radau->method;
+    const int32_t *idle = radau->linear->idle;
+    for (int32_t i = 0; i < radau->n; i++) {
+        double real = radau->d[0][i];
+        for (int s = 0; s < stages; s++) {
+            double dz = method->column[s] * real;
+            for (int k = 0; k < pairs; k++)
+                dz += 2.0 * (creal(method->columns[k][s]) * creal(radau->w[k][i]) -
+                             cimag(method->columns[k][s]) * cimag(radau->w[k][i]));
+            double v = dz * radau->newton_weight[i];
+            radau->z[s][i] += dz;
+            *sum += v * v;
+            if (idle && !idle[i])
+                *state += v * v;
+        }
+    }
+}
+
+/* part 0: the real system; part k: that of pair k - 1 */
+static void solve_one(void *context, int part)
+{
+    sd_radau *radau = context;
+    if (part == 0)
+        sd_linear_solve(radau->linear, radau->d[0]);
+    else
+        sd_linear_z_solve(radau->complex_linear[part - 1], radau->w[part - 1]);
+}
+
+/* One Newton step from the residuals in d; the size of the correction in Newton's weights, and that of what carries the
+ * state in state_size. */
+double sd_radau_correct(sd_radau *radau)
+{
+    int stages = radau->method->stages;
+    double all = 0.0, state = 0.0, number = (double)stages * radau->n;
+    if (stages == 3)
+        split(radau, 3, 1);
+    else if (stages == 5)
+        split(radau, 5, 2);
+    else
+        split(radau, 7, 3);
+    if (large(radau))
+        sd_side_by_side(radau->method->pairs + 1, solve_one, radau);
+    else
+        for (int part = 0; part <= radau->method->pairs; part++)
+            solve_one(radau, part);
+    if (stages == 3)
+        join(radau, 3, 1, &all, &state);
+    else if (stages == 5)
+        join(radau, 5, 2, &all, &state);
+    else
+        join(radau, 7, 3, &all, &state);
+    radau->newton_iterations++;
+    radau->state_size = sqrt(state / number);
+    return radau->n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */
+}
