@@ -140,6 +140,9 @@ class SampledRows:
         for (k, c, _), result, large in zip(scaled, found, sizes, strict=True):
             where = rows[k][some]
             for target, array in ((value, c * np.asarray(result, dtype=float)), (size, np.abs(c * np.asarray(large)))):
+                if count == 1:
+                    target[:, where[0]] += array
+                    continue
                 spread = np.broadcast_to(array, number * count).reshape(number, count)
                 for p in range(number):
                     np.add.at(target[p], where, spread[p])

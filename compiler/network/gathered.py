@@ -27,6 +27,10 @@ LEAST = 128
 """Branches and nodes that must become fewer: of less, what is written is lowered as it stands."""
 RUN = 8
 """Branches of a statement in a loop, at least."""
+SHORT = 2
+"""Nodes between two places where the neighbourhood changes, at least on the average."""
+ROUNDS = 8
+"""Times that families are left out before all are: one that goes may tear others."""
 MARK = "#"
 """Behind the first element's name: a family's own."""
 _INDEX = "#g"
@@ -49,8 +53,7 @@ def gathered(network: Network) -> Network:
         return network
     free = _free(network)
     shapes = {b.name: s for b in network.branches if b.name in free and (s := shaped(b.law, b.name)) is not None}
-    sites = _sites(network, shapes)
-    runs = list(_runs(network, shapes, sites))
+    sites, runs = _whole(network, shapes, _sites(network, shapes))
     used = {site[0] for run in runs for site in run.ends if site[1] >= 0}
     fewer = sum(len(run.members) for run in runs) - len(runs)
     if fewer < LEAST:
@@ -94,6 +97,35 @@ def _sites(network: Network, shapes: dict[str, Shaped]) -> dict[str, Site]:
         found[node.name] = family, size.get(family, 0)
         size[family] = size.get(family, 0) + 1
     return {name: site for name, site in found.items() if size[site[0]] >= RUN}
+
+
+def _whole(
+    network: Network, shapes: dict[str, Shaped], sites: dict[str, Site]
+) -> tuple[dict[str, Site], list[_Run]]:
+    """Sites and runs without the families that single branches tear to pieces: these stay as they are written."""
+    for _ in range(ROUNDS):
+        runs = list(_runs(network, shapes, sites))
+        torn = _torn(network, sites, runs)
+        if not torn:
+            return sites, runs
+        sites = {name: site for name, site in sites.items() if site[0] not in torn}
+    return {}, []
+
+
+def _torn(network: Network, sites: dict[str, Site], runs: Sequence[_Run]) -> set[str]:
+    """Families of which alike neighbours are fewer than SHORT on the average."""
+    cuts: dict[str, set[int]] = {}
+    for run in runs:
+        for (family, first), moves in zip(run.ends, run.moves, strict=True):
+            cuts.setdefault(family, set()).update((first, first + (len(run.members) if moves else 1)))
+    held = {b.name for run in runs for b, _ in run.members}
+    for b in network.branches:
+        for end in (b.plus, b.minus) if b.name not in held else ():
+            if end is not None and end.node in sites:
+                family, k = sites[end.node]
+                cuts.setdefault(family, set()).update((k, k + 1))
+    size = Counter(family for family, _ in sites.values())
+    return {family for family, number in size.items() if SHORT * len(cuts.get(family, ())) > number + SHORT}
 
 
 def _runs(network: Network, shapes: dict[str, Shaped], sites: dict[str, Site]) -> Iterator[_Run]:

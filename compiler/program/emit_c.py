@@ -8,11 +8,12 @@ same text.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.integers import Reference
 from sysdyn.compiler.model.mirror import word
+from sysdyn.compiler.program.emit_c_rolled import Rolled
 from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT, TURNS
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
 from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
@@ -23,25 +24,38 @@ _ARGUMENTS = (
     "const double *restrict p, const int32_t *restrict ix, const int32_t *restrict at, const int32_t *restrict to, "
     "double t, const double *restrict y, const double *restrict yd, double *restrict {out}"
 )
+_PASSED = "frame->p, frame->ix, frame->at, frame->to, t, y, yd, {out}"
 _FUNCTIONS = {
     "ln": "log", "abs": "fabs", "min": "sd_min", "max": "sd_max", "sign": "sd_sign", "step": "sd_step", "mod": "sd_mod",
 }  # fmt: skip
 _OF_ANGLES = {"sin": "sine", "cos": "cosine"}
+RARE = 20
+"""Statements to an angle, from which on it is turned anew by each output that reads it."""
 _BOOLEAN = ("cmp", "and", "or", "not")
 
 
 def emit_c(program: Program, form: DescriptorForm, head: str = HEAD) -> str:
     """The C text of a program; head: what declares the contract's frame."""
     angles = _Angles()
+    turned = {k: found for k, routine in enumerate(program.routines) if (found := angles.of(routine))}
+    rolled = Rolled(_ARGUMENTS, _PASSED)
+    kept = {k for k, found in turned.items() if RARE * len(found) > len(program.routines[k].body)}
+    rolled.outputs(program, _printer, kept)
+    left = {k: r for k, r in enumerate(program.routines) if k not in rolled.calls}
+    inside = {k: _inside(r, turned.get(k, {})) for k, r in left.items()}
+    rolled.loops(program, {k: inside[k] for k, r in left.items() if r.loops})
     number = Counter((routine.block, routine.part) for routine in program.routines)
-    bodies = [
-        _routine(k, r, form, angles, number[r.block, r.part] == 1) for k, r in enumerate(program.routines)
-    ]
-    text = "\n".join(bodies)
+    own = (
+        _function(k, r, form, inside[k], k in turned, number[r.block, r.part] == 1)
+        for k, r in left.items()
+        if k not in rolled.calls
+    )
+    text = "\n".join([*rolled.texts, *own])
     used = [code for name, code in SUPPORT if f"{name}(" in text]
     if angles.number:
         used.append(TURNS.replace("@", ", ".join(["{0.0, 0.0, 1.0}"] * angles.number)))
-    blocks = [_block(name, part, program, angles) for name in program.blocks() for part in ("rows", "dy", "dyd")]
+    calls = {k: (_call(k, r, k in turned),) for k, r in left.items()} | rolled.calls
+    blocks = [_block(name, part, program, calls) for name in program.blocks() for part in ("rows", "dy", "dyd")]
     return "\n".join([head, APART, *used, text, *(b for b in blocks if b)])
 
 
@@ -82,15 +96,37 @@ class _Angles:
         return found
 
 
-def _routine(k: int, routine: Routine, form: DescriptorForm, angles: _Angles, alone: bool) -> str:
-    """The function of a routine; alone: no other is called where it is, and it may become part of its caller."""
-    writer = _Writer(routine, angles.of(routine))
-    body = writer.body(writer.angles_first(), "    " * (len(routine.loops) + 1))
-    lines = [f"/* {_comment(routine, form)} */"]
+def _printer(routine: Routine) -> Callable[[Sequence[Statement]], str]:
+    """Lines of statements of a routine that is no loop."""
+    writer = _Writer(routine, {})
+    return lambda statements: "\n".join(writer.body(statements, "        "))
+
+
+def _function(k: int, routine: Routine, form: DescriptorForm, inside: str, turned: bool, alone: bool) -> str:
+    """A routine as a function of its own; turned: it keeps angles; alone: no other is called where it is, and it may
+    become part of its caller.
+    """
     out = "r" if routine.part == "rows" else "v"
     kind = ("" if alone else "SD_APART ") + ("void " if out == "r" else "double *")
-    kept = ", sd_turn *restrict w" if writer.angles else ""  # one look for the thread's own ones a routine
-    lines.append(f"static {kind}f{k}({_ARGUMENTS.format(out=out)}{kept})\n{{")
+    kept = ", sd_turn *restrict w" if turned else ""  # one look for the thread's own ones a routine
+    head = f"static {kind}f{k}({_ARGUMENTS.format(out=out)}{kept})\n{{"
+    return "\n".join([f"/* {_comment(routine, form)} */", head, inside, "}", ""])
+
+
+def _call(k: int, routine: Routine, turned: bool) -> str:
+    """The statement that calls it."""
+    kept = ", sd_turns()" if turned else ""
+    call = f"f{k}({_PASSED.format(out='r' if routine.part == 'rows' else 'v')}{kept});"
+    if routine.part == "rows":
+        return call
+    return f"v = {call}" if routine.loops else f"(void){call}"
+
+
+def _inside(routine: Routine, angles: dict[int, int]) -> str:
+    """What stands between the braces of a routine's function."""
+    writer = _Writer(routine, angles)
+    body = writer.body(writer.angles_first(), "    " * (len(routine.loops) + 1))
+    lines = []
     unused = [n for n in ("p", "ix", "at", "to", "t", "y", "yd") if n not in writer.used]
     lines += [f"    {''.join(f'(void){n}; ' for n in unused).strip()}"] if unused else []
     lines += writer.bases
@@ -100,13 +136,13 @@ def _routine(k: int, routine: Routine, form: DescriptorForm, angles: _Angles, al
         head = f"for (ptrdiff_t {name} = {bound(first, _loop)}; {name} <= {bound(last, _loop)}; ++{name}) {{"
         lines.append("    " * (depth + 1) + head)
     lines += body
-    if out == "v" and routine.loops:
+    if routine.part != "rows" and routine.loops:
         lines.append("    " * (len(routine.loops) + 1) + f"v += {routine.entries};")
     lines += ["    " * (depth + 1) + "}" for depth in reversed(range(len(routine.loops)))]
     lines += [f"    if ({name} != 0.0)\n        {place} += {name};" for place, name in writer.sums.items()]
-    if out == "v":
+    if routine.part != "rows":
         lines.append("    return v;")
-    return "\n".join([*lines, "}", ""])
+    return "\n".join(lines)
 
 
 def _comment(routine: Routine, form: DescriptorForm) -> str:
@@ -276,7 +312,7 @@ class _Writer:
         return f"sd_table2({where}, {args[0]}, {args[1]}, {orders[0]}, {orders[1]})"
 
 
-def _block(name: str, part: str, program: Program, angles: _Angles) -> str:
+def _block(name: str, part: str, program: Program, calls: dict[int, tuple[str, ...]]) -> str:
     """The exported function of a block's part: its routines in order."""
     numbers = [k for k, r in enumerate(program.routines) if r.block == name and r.part == part]
     if not numbers:
@@ -288,11 +324,7 @@ def _block(name: str, part: str, program: Program, angles: _Angles) -> str:
     lines = [head]
     for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
         routine = program.routines[k]
-        kept = ", sd_turns()" if angles.of(routine) else ""
-        call = f"f{k}(frame->p, frame->ix, frame->at, frame->to, t, y, yd, {out}{kept})"
-        if part != "rows":
-            call = f"v = {call}" if routine.loops else f"(void){call}"
-        lines.append(f"    {call};")
+        lines += [f"    {call}" for call in calls[k]]
         last = later < 0 or program.routines[later].kernel != routine.kernel
         if part != "rows" and not routine.loops and last:
             lines.append(f"    v += {routine.entries};")

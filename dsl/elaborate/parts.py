@@ -82,6 +82,26 @@ class NetworkBuilder:
     given: set[str] = field(default_factory=set)  # states that have a dynamic, sound or not
 
 
+class _Entered:
+    """Inside a space, with its names in sight."""
+
+    __slots__ = ("_before", "_elaboration", "_resolving", "_space")
+
+    def __init__(self, elaboration: ElaborationContext, space: Space) -> None:
+        self._elaboration, self._space = elaboration, space
+
+    def __enter__(self) -> None:
+        it = self._elaboration
+        self._before = it.scope, it.current
+        self._resolving = it.resolver.space(self._space)
+        it.scope, it.current = self._space.scope, self._space
+        self._resolving.__enter__()
+
+    def __exit__(self, *failed: object) -> None:
+        self._resolving.__exit__(*failed)
+        self._elaboration.scope, self._elaboration.current = self._before
+
+
 class ElaborationContext:
     """Shared by the rooms of elaboration: where we are, and how statements are walked through."""
 
@@ -93,16 +113,9 @@ class ElaborationContext:
         self.scope = Scope()
         self.current = Space("", self.scope, self.scope, self.resolver.source)
 
-    @contextmanager
-    def entering(self, space: Space) -> Iterator[None]:
+    def entering(self, space: Space) -> _Entered:
         """Work inside a space."""
-        before = self.scope, self.current
-        self.scope, self.current = space.scope, space
-        try:
-            with self.resolver.space(space):
-                yield
-        finally:
-            self.scope, self.current = before
+        return _Entered(self, space)
 
     def each(self, statements: Sequence[Nested], do: Callable[..., None]) -> None:
         """Carry out statements in their loops; what fails has been reported."""

@@ -390,15 +390,18 @@ def topological(roots: Iterable[Node]) -> list[Node]:
     seen: set[Node] = set()
     order: list[Node] = []
     for root in roots:
-        stack: list[tuple[Node, bool]] = [(root, False)]
+        stack: list[Node | None] = [root]
         while stack:
-            node, done = stack.pop()
-            if done:
-                order.append(node)
+            node = stack.pop()
+            if node is None:  # all below what lies under it is done
+                order.append(stack.pop())  # type: ignore[arg-type]
             elif node not in seen:
                 seen.add(node)
-                stack.append((node, True))
-                stack.extend((a, False) for a in reversed(node.args) if a not in seen)
+                if node.args:
+                    stack += (node, None)
+                    stack += node.args[::-1]
+                else:
+                    order.append(node)
     return order
 
 
@@ -599,16 +602,18 @@ def topological_unbound(roots: Iterable[Node]) -> list[Node]:
     seen: set[Node] = set()
     order: list[Node] = []
     for root in roots:
-        stack: list[tuple[Node, bool]] = [(root, False)]
+        stack: list[Node | None] = [root]
         while stack:
-            node, done = stack.pop()
-            if done:
-                order.append(node)
+            node = stack.pop()
+            if node is None:  # all below what lies under it is done
+                order.append(stack.pop())  # type: ignore[arg-type]
             elif node not in seen:
                 seen.add(node)
-                stack.append((node, True))
-                inner = node.args[:2] if node.op == "reduce" else node.args
-                stack.extend((a, False) for a in reversed(inner) if a not in seen)
+                if node.args:
+                    stack += (node, None)
+                    stack += node.args[1::-1] if node.op == "reduce" else node.args[::-1]
+                else:
+                    order.append(node)
     return order
 
 

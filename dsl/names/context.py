@@ -80,6 +80,25 @@ class SeveralError(Failed):
         self.label, self.key, self.loop, self.parts = label, key, loop, parts
 
 
+class Entered:
+    """Inside a model or an instance: a context by hand, for a netlist enters hundreds of thousands."""
+
+    __slots__ = ("_before", "_context", "_space")
+
+    def __init__(self, context: Context, space: Space) -> None:
+        self._context, self._space = context, space
+
+    def __enter__(self) -> None:
+        it, space = self._context, self._space
+        self._before = it._bound, it._loops, it.file_scope, it.scope, it.source
+        it._bound, it._loops, it.file_scope = dict(space.bound), list(space.loops), space.file_scope
+        it.scope, it.source = space.scope, space.source
+
+    def __exit__(self, *failed: object) -> None:
+        it = self._context
+        it._bound, it._loops, it.file_scope, it.scope, it.source = self._before
+
+
 class Context:
     """What is in sight, and what has been learnt on the way."""
 
@@ -120,16 +139,9 @@ class Context:
         finally:
             self.scope, self.source = before
 
-    @contextmanager
-    def space(self, space: Space) -> Iterator[None]:
+    def space(self, space: Space) -> Entered:
         """Resolve inside a model or an instance: its names, its text, its loops, nothing else bound."""
-        before = self._bound, self._loops, self.file_scope
-        self._bound, self._loops, self.file_scope = dict(space.bound), list(space.loops), space.file_scope
-        try:
-            with self.within(space.scope, space.source):
-                yield
-        finally:
-            self._bound, self._loops, self.file_scope = before
+        return Entered(self, space)
 
     @contextmanager
     def bound(self, names: dict[str, Typed]) -> Iterator[None]:

@@ -29,6 +29,8 @@ HEALTHY = 1e-7
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
 LONGEST = 12
 """Definitions one after the other: through more of them the rest would read everything (a chain of scalars)."""
+FEW = 256
+"""Entries of rows that are looked at one by one: what is written out by hand has tens of thousands of families."""
 SEARCHED = 64
 """Families among which a circle of definitions is looked for."""
 PREFERRED = ("kappa", "mu", "e", "f")
@@ -116,7 +118,7 @@ def _rank(system: System, family: int) -> int:
 
 def _numbers(of: Ints) -> set[int]:
     """Which numbers of families occur."""
-    return set(np.flatnonzero(np.bincount(of + 1)[1:]).tolist())
+    return set(of.tolist()) - {-1} if of.size < FEW else set(np.flatnonzero(np.bincount(of + 1)[1:]).tolist())
 
 
 class _Search:

@@ -97,6 +97,22 @@ def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: i
     return position
 
 
+def _place(reference: Reference, shape: Shape, ix: Ints) -> int:
+    """Row-major position in its family where no loop goes round."""
+    position = 0
+    if len(reference.indices) != len(shape):
+        raise ContractError(
+            f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
+        )
+    for index, (first, last) in zip(reference.indices, shape, strict=True):
+        _, slot, constant = index
+        value = constant + (int(ix[slot]) if slot >= 0 else 0)
+        if not first <= value <= last:
+            raise ContractError(f"an index runs over {value}..{value} outside {first}..{last}")
+        position = position * (last - first + 1) + value - first
+    return position
+
+
 def places(
     kernels: Sequence[Kernel],
     which: str,
@@ -114,8 +130,14 @@ def places(
         entries = kernel.dy if which == "dy" else kernel.dyd
         if not entries:
             continue
+        if not kernel.loops:
+            for side, into in ((0, all_rows), (1, all_columns)):
+                at, boxes = tables[side], shapes[side]
+                own = [int(at[p[side].family]) + _place(p[side], boxes[p[side].family], ix) for p in entries]
+                into.append(np.array(own, dtype=np.int32))
+            continue
         loops = _iterations(kernel, ix)
-        number = loops[0].size if kernel.loops else 1
+        number = loops[0].size
         for side, into in ((0, all_rows), (1, all_columns)):
             found = [
                 int(tables[side][pair[side].family])

@@ -94,5 +94,36 @@ def power_grid(n: int, seed: int = 1) -> str:
     return _file(ELECTRICAL, "power_grid", lines, f"time 0 s to 5 ms; trace bus3.e, Ll5.f, bus{n - 1}.e")
 
 
+def mixed(n: int, seed: int = 2) -> str:
+    """Nodes joined at random to some of the last twenty: resistors, inductors, diodes, all of different numbers."""
+    draw = random.Random(seed)
+    lines = [f"  node a{k}: electrical" for k in range(n)]
+    lines.append("  feed: voltage(v = 5 V*sin(2*pi*1000 s^-1*t)) a0 -> ground")
+    for k in range(n):
+        stray = f"capacitor(C = {draw.uniform(1, 9):.4f} nF)" if k else "resistor(R = 1 kohm)"
+        lines.append(f"  C{k}: {stray} a{k} -> ground")
+        near = range(max(0, k - 20), max(k, 3))
+        before = draw.choice(near[: max(k, 1)])
+        lines.append(f"  R{k + 1}: resistor(R = {draw.uniform(1, 9):.4f} kohm) a{max(k, 1)} -> a{before}")
+        a, b = draw.sample(near, 2)
+        if k % 3 == 0:
+            lines.append(f"  D{k}: diode(Is = {draw.uniform(1, 9):.3f} pA) a{a} -> a{b}")
+        elif k % 3 == 1:
+            lines.append(f"  L{k}: inductor(L = {draw.uniform(1, 9):.4f} mH) a{a} -> a{b}")
+    head = ELECTRICAL.replace("current, ", "current, diode, ")
+    return _file(head, "mixed", lines, f"time 0 s to 1 ms; trace a1.e, L1.f, a{n - 1}.e")
+
+
+def uneven(n: int) -> str:
+    """An RC ladder of which no two numbers are equal."""
+    draw = random.Random(n)
+    lines = ["  node v0: electrical", *(f"  node v{k}: electrical" for k in range(1, n + 1))]
+    lines.append("  Vs: voltage(v = 1 V*sin(2*pi*1000 s^-1*t)) v0 -> ground")
+    for k in range(1, n + 1):
+        lines.append(f"  R{k}: resistor(R = {draw.uniform(100, 200):.6f} ohm) v{k - 1} -> v{k}")
+        lines.append(f"  C{k}: capacitor(C = {draw.uniform(1, 5):.6f} nF) v{k} -> ground")
+    return _file(ELECTRICAL, "uneven", lines, f"time 0 s to 20 us; trace v3.e, R2.f, C{n}.q, v{n}.e")
+
+
 def _file(head: str, name: str, lines: list[str], scene: str) -> str:
     return f"{head}model {name} {{\n" + "\n".join(lines) + f"\n}}\n\nscene s of {name} {{ {scene} }}\n"
