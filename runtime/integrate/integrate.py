@@ -54,6 +54,10 @@ where constraints are constant sums: their unknowns are interpolated differently
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 UNPULLED = 2
 """Kind of a derivative (core/steppers/radau.h): interpolated whatever pulls at its unknown."""
+RATED = 5_000
+"""Unknowns up to which a point behind a jump is asked for flows that are open.  With the rates of all balances the point
+of a larger net is dear to find (a driven grid of 35 x 35: 20 s): its loops of stores are left as rows leave them.
+"""
 STAGED = 100_000
 """Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
 ROOM = 4096
@@ -177,6 +181,8 @@ class Integration:
             return "settled"
         if self.request.events is not None:
             return "rated"
+        if system.unknowns > RATED:
+            return "settled"
         n = system.form.written
         point = self.start.t, self.y[:n], self.yd[:n]
         return "rated" if flows_open(system.another("settled"), *point, self._keeps) else "settled"
@@ -409,7 +415,10 @@ class Integration:
     def restart(self) -> Restart:
         """Finds consistent points behind jumps, with every unknown."""
         if self._restart is None:
-            settler = self.settler if self.forms is None else self._settler(self._whole_form, self._keeps, whole=True)
+            settler = self.settler
+            if self.forms is not None:
+                settler = self._settler(self._whole_form, self._keeps, whole=True)
+                settler.by_basis(0.0, determined=True)
             self._restart = Restart(settler, self._keeps)
         return self._restart
 
