@@ -55,7 +55,7 @@ the least change takes out most of the error between steps (a parallelogram by d
 UNPULLED = 2
 """Kind of a derivative (core/steppers/radau.h): interpolated whatever pulls at its unknown."""
 RATED = 5_000
-"""Unknowns up to which a point behind a jump is asked for flows that are open.  With the rates of all balances the point
+"""Unknowns up to which a point behind a jump is asked for flows that are open.  With the rates of all balances that
 of a larger net is dear to find (a driven grid of 35 x 35: 20 s): its loops of stores are left as rows leave them.
 """
 STAGED = 100_000
