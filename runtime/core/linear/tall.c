@@ -18,6 +18,18 @@ static void miss(int32_t rows, int32_t columns, const int32_t *column, const int
             rest[row[e]] -= value[e] * x[j];
 }
 
+/* x towards A x = b, from where it is; rest [rows + columns] */
+static void refine(sd_sparse *lu, const int32_t *column, const int32_t *row, const double *value, const double *b,
+                   double *x, double *rest)
+{
+    for (int k = 0; k <= REFINEMENTS; k++) {
+        miss(lu->rows, lu->n, column, row, value, b, x, rest);
+        sd_sparse_solve(lu, rest, rest + lu->rows, NULL, NULL);
+        for (int32_t j = 0; j < lu->n; j++)
+            x[j] += rest[j];
+    }
+}
+
 int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                   const int32_t *order, double least, int64_t most, const double *b, double *x)
 {
@@ -31,12 +43,8 @@ int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const in
         failed = failed == 2 ? 2 : failed || !(lu->smallest >= least);
     }
     memset(x, 0, (size_t)columns * sizeof *x);
-    for (int k = 0; k <= REFINEMENTS && !failed; k++) {
-        miss(rows, columns, column, row, value, b, x, rest);
-        sd_sparse_solve(lu, rest, rest + rows, NULL, NULL);
-        for (int32_t j = 0; j < columns; j++)
-            x[j] += rest[j];
-    }
+    if (!failed)
+        refine(lu, column, row, value, b, x, rest);
     free(rest);
     sd_sparse_free(lu);
     return failed;
@@ -58,12 +66,8 @@ int sd_left_open(int32_t rows, int32_t columns, const int32_t *column, const int
             if (lu->source[k] >= 0)
                 x[lu->order[k]] = 0.0;
     }
-    for (int k = 0; k <= REFINEMENTS && !failed; k++) {
-        miss(rows, columns, column, row, value, none, x, rest);
-        sd_sparse_solve(lu, rest, rest + rows, NULL, NULL);
-        for (int32_t j = 0; j < columns; j++)
-            x[j] += rest[j];
-    }
+    if (!failed)
+        refine(lu, column, row, value, none, x, rest);
     free(rest);
     sd_sparse_free(lu);
     return failed;
