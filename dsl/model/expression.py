@@ -387,6 +387,15 @@ def reduction(operator: str, name: str, first: Node, last: Node, body: Node) -> 
 
 def topological(roots: Iterable[Node]) -> list[Node]:
     """All nodes below the roots, arguments before users, in a deterministic order."""
+    return _ordered(roots, bodies=True)
+
+
+def topological_unbound(roots: Iterable[Node]) -> list[Node]:
+    """Like `topological`, but does not enter the bodies of reductions (their loop variable is not bound there)."""
+    return _ordered(roots, bodies=False)
+
+
+def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
     seen: set[Node] = set()
     order: list[Node] = []
     for root in roots:
@@ -397,9 +406,10 @@ def topological(roots: Iterable[Node]) -> list[Node]:
                 order.append(stack.pop())  # type: ignore[arg-type]
             elif node not in seen:
                 seen.add(node)
-                if node.args:
+                args = node.args if bodies or node.op != "reduce" else node.args[:2]
+                if args:
                     stack += (node, None)
-                    stack += node.args[::-1]
+                    stack += args[::-1]
                 else:
                     order.append(node)
     return order
@@ -595,26 +605,6 @@ def evaluate(roots: Sequence[Node], lookup: Callable[[Node], float]) -> list[flo
     for node in topological_unbound(roots):
         values[node] = _value(node, values, lookup)
     return [values[r] for r in roots]
-
-
-def topological_unbound(roots: Iterable[Node]) -> list[Node]:
-    """Like `topological`, but does not enter the bodies of reductions (their loop variable is not bound there)."""
-    seen: set[Node] = set()
-    order: list[Node] = []
-    for root in roots:
-        stack: list[Node | None] = [root]
-        while stack:
-            node = stack.pop()
-            if node is None:  # all below what lies under it is done
-                order.append(stack.pop())  # type: ignore[arg-type]
-            elif node not in seen:
-                seen.add(node)
-                if node.args:
-                    stack += (node, None)
-                    stack += node.args[1::-1] if node.op == "reduce" else node.args[::-1]
-                else:
-                    order.append(node)
-    return order
 
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {

@@ -38,15 +38,20 @@ class _Columns:
         return self.pattern.column, self.pattern.row, self.values, tall_order(self.pattern)
 
 
-def _columns(shape: tuple[int, int], entries: Entries) -> _Columns:
+def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Columns | None:
+    """fewer: rows may be fewer than the columns that are used, and empty ones make up for it; else there is none."""
     i, j, v = entries
     here = v != 0.0
     if not here.all():
         i, j, v = i[here], j[here], v[here]
     used = np.zeros(shape[1], dtype=bool)
     used[j] = True
+    rows, unknowns = shape[0], int(used.sum())
+    if unknowns > rows:
+        if not fewer:
+            return None
+        rows = unknowns
     number = np.cumsum(used, dtype=np.int32) - 1
-    rows, unknowns = max(shape[0], int(used.sum())), int(used.sum())
     pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
     values: Floats = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64)
     return _Columns(used, pattern, values)
@@ -56,9 +61,9 @@ def determined(shape: tuple[int, int], entries: Entries, aim: Floats) -> Floats 
     """The u that rows determine, unknowns that stand in none of them zero; None where they leave others open.  Rows in
     excess are not looked at.
     """
-    if np.unique(entries[1]).size > shape[0]:
+    columns = _columns(shape, entries, fewer=False)
+    if columns is None:
         return None
-    columns = _columns(shape, entries)
     arrays, found = columns.arrays(), np.zeros(columns.pattern.unknowns)
     limits = PIVOT, FILLED * columns.pattern.entries
     failed = lib.core.sd_determined(
@@ -77,7 +82,8 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     """A direction [unknowns] of length one (largest entry) that rows leave open, a random one of them: an unknown that
     some of them move is moved by it.  Zero where rows determine everything; None where that would cost too much.
     """
-    columns = _columns(shape, entries)
+    columns = _columns(shape, entries, fewer=True)
+    assert columns is not None
     arrays, found = columns.arrays(), np.random.default_rng(5).uniform(0.5, 1.0, columns.pattern.unknowns)
     limits = PIVOT, FILLED * columns.pattern.entries
     failed = lib.core.sd_left_open(

@@ -17,7 +17,7 @@ from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.settled import inertial_rates, rates_of
+from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
@@ -71,13 +71,12 @@ class Equations:
         """Those of dF/dy, of dF/dy' where the derivative is an unknown, of what is missed."""
         pattern = settled.pattern
         columns = pattern.columns_of()
-        rate_at = np.full(self.n, -1, dtype=np.int32)
-        rate_at[self.rates] = self.n + np.arange(self.rates.size, dtype=np.int32)
-        self.rated = np.flatnonzero(rate_at[columns] >= 0).astype(np.int32)
+        moved = columns_of_rates(self.n, self.rates, columns)
+        self.rated = np.flatnonzero(moved >= 0).astype(np.int32)
         places = (self.first + np.arange(self.missed.size)).astype(np.int32)
         missed = self.missed.astype(np.int32)
         self.rows = np.concatenate([pattern.row, pattern.row[self.rated], missed])
-        self.columns = np.concatenate([columns, rate_at[columns[self.rated]], places])
+        self.columns = np.concatenate([columns, moved[self.rated], places])
         in_y, in_rate = settled.structural()
         self.structural = np.concatenate([in_y, in_rate[self.rated], np.ones(self.missed.size, dtype=bool)])
 

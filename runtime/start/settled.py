@@ -39,6 +39,13 @@ def rates_of(settled: System) -> Ints:
     return settled.once("rates", lambda: _rates(settled))
 
 
+def columns_of_rates(unknowns: int, rates: Ints, columns: Ints) -> Ints:
+    """Columns of dF/dy' in a matrix with the rates behind the unknowns; -1: not among them."""
+    found = np.full(unknowns, -1, dtype=np.int32)
+    found[rates] = unknowns + np.arange(rates.size, dtype=np.int32)
+    return found[columns]
+
+
 def _rates(settled: System) -> Ints:
     used = np.zeros(settled.unknowns, dtype=bool)
     pattern = settled.pattern
@@ -82,11 +89,10 @@ def flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[
 def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_]) -> bool:
     (jy, jyd), pattern, rates = settled.jacobian(t, y, yd), settled.pattern, rates_of(settled)
     n, columns = settled.unknowns, pattern.columns_of()
-    rate_at = np.full(n, -1, dtype=np.int64)
-    rate_at[rates] = n + np.arange(rates.size)
-    free, rated = ~state[columns], rate_at[columns] >= 0
+    moved = columns_of_rates(n, rates, columns)
+    free, rated = ~state[columns], moved >= 0
     i = np.concatenate([pattern.row[free], pattern.row[rated]])
-    j = np.concatenate([columns[free], rate_at[columns[rated]]])
+    j = np.concatenate([columns[free], moved[rated]])
     v = np.concatenate([jy[free], jyd[rated]])
     if not np.isfinite(v).all():
         return True
@@ -145,11 +151,10 @@ class Settler:
         pattern, n = self._left.pattern, self._n
         number = self._moves + self._left.rows
         columns, rows = pattern.columns_of(), pattern.row
-        rate_at = np.full(n, -1, dtype=np.int64)
-        rate_at[self.rates] = n + np.arange(self.rates.size)
-        with_rate = rate_at[columns] >= 0
+        moved = columns_of_rates(n, self.rates, columns)
+        with_rate = moved >= 0
         x, r = rows + self._moves, columns
-        xd, rd = rows[with_rate] + self._moves, rate_at[columns[with_rate]]
+        xd, rd = rows[with_rate] + self._moves, moved[with_rate]
         diagonal_x, diagonal_r = np.arange(self._moves), self._moves + np.arange(self._left.rows)
         parts = [
             Places(x, r),
@@ -230,10 +235,9 @@ class Settler:
         """Pattern of G^T, the places of dF/dy and dF/dyd in it, the order of its columns."""
         pattern = self._left.pattern
         columns, rows = pattern.columns_of(), pattern.row
-        rate_at = np.full(self._n, -1, dtype=np.int64)
-        rate_at[self.rates] = self._n + np.arange(self.rates.size)
-        with_rate = rate_at[columns] >= 0
-        parts = [Places(columns, rows), Places(rate_at[columns[with_rate]], rows[with_rate])]
+        moved = columns_of_rates(self._n, self.rates, columns)
+        with_rate = moved >= 0
+        parts = [Places(columns, rows), Places(moved[with_rate], rows[with_rate])]
         found, slots = compress(self._moves, self._left.rows, parts)
         full = np.full(pattern.entries, -1, dtype=np.int32)
         full[with_rate] = slots[1]

@@ -45,6 +45,9 @@ def test_what_is_open_is_not_determined():
     assert determined((shape[0], N + 1), (i, j, v), aim)[N] == 0.0  # stands in no row: the least is zero
     pair = np.append(i, [0, 1]), np.append(j, [N, N]), np.append(v, [0.0, 0.0])
     assert determined((shape[0], N + 1), pair, aim)[N] == 0.0
+    square = i < N  # no more rows than unknowns, and a column of zeros beside them
+    zeros = np.append(i[square], 0), np.append(j[square], N), np.append(v[square], 0.0)
+    assert determined((N, N + 1), zeros, np.ones(N))[N] == 0.0
     twice = np.concatenate([i, i]), np.concatenate([j, j + N]), np.concatenate([v, v])
     assert determined((shape[0], 2 * N), twice, aim) is None
     both = np.concatenate([i, i + shape[0], i]), np.concatenate([j, j, j + N]), np.concatenate([v, v, v])
