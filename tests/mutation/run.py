@@ -212,7 +212,7 @@ def verified(model: str) -> tuple[int | str, set[str]]:
     run, said = importlib.import_module("sysdyn.cli.main").run, io.StringIO()
     try:
         with contextlib.redirect_stdout(said):
-            options = ["--json", "--progress", "never", "--max-wall", "30", "--no-prune"]
+            options = ["--json", "--progress", "never", "--max-wall", "30", "--no-prune", "--jobs", "1"]  # traced here
             code = run(["verify", *options, str(MODELS[model])])
     except BaseException as error:  # what a mutant may do
         return type(error).__name__, set()
