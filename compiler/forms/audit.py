@@ -20,6 +20,7 @@ from sysdyn.compiler.forms.descriptor import Equations
 from sysdyn.compiler.forms.efforts import Effort
 from sysdyn.compiler.forms.ledgers import POWERS, STORED, Element, Entry, Ledger, ledgers
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
+from sysdyn.compiler.model.magnitudes import rounding
 from sysdyn.compiler.model.terms import Term, counter, local_variables
 from sysdyn.dsl.model.expression import (
     Node,
@@ -32,6 +33,7 @@ from sysdyn.dsl.model.expression import (
     mul,
     neg,
     rate,
+    scale,
     signals_held,
     sub,
     substitute,
@@ -41,6 +43,8 @@ from sysdyn.dsl.model.expression import (
 )
 from sysdyn.dsl.model.network import Shape
 
+ROUNDED = 1e-15
+"""Of what a rounding error is at most, for one unit of the last place (2.2e-16) of a function from a library."""
 GLOBAL = (("kinetic", "J"), ("potential", "J"), ("dissipated", "W"), ("supplied", "W"))
 LEDGER = ("stored", "dissipated", "supplied", "gross")
 """Rows of block audit that each ledger has behind the global ones; gross: the sum over elements of the magnitudes of
@@ -91,10 +95,12 @@ def _add_ledger(
         shape = tuple((loop.first, loop.last) for loop in found.nest) if apart else ()
         shapes.append((owner, shape))
         label = found.place.element or ledger.label(found)
-        kind = f"{number} inertia" if _of_one_rate(found, model) else str(number)
+        inertia = _of_one_rate(found, model)
+        kind = f"{number} inertia" if inertia else str(number)
         assembly.family(Equations("ledger", label, owner, kind, ledger.unit, found.place))
         at = tuple(counter(k) for k in range(len(shape)))
-        assembly.add("ledger", owner, at, found.nest, found.expression if len(shape) == len(found.nest) else magnitude)
+        stored = _beyond_rounding(found.expression) if inertia else found.expression
+        assembly.add("ledger", owner, at, found.nest, stored if len(shape) == len(found.nest) else magnitude)
 
 
 def _of_one_rate(element: Element, model: EnergyModel) -> bool:
@@ -103,6 +109,14 @@ def _of_one_rate(element: Element, model: EnergyModel) -> bool:
     if element.account != "kinetic" or len(rates) != 1:
         return False
     return is_const(substitute(element.expression, {rates[0]: const(0.0)}), 0.0)
+
+
+def _beyond_rounding(energy: Node) -> Node:
+    """Zero where its rounding error may hide its sign, less by that elsewhere: sqrt(1 + f^2) - 1 of a small f."""
+    if not any(n.op in ("sum", "call") for n in topological([energy])):
+        return energy
+    error = scale(ROUNDED, rounding(energy))
+    return sub(call("max", sub(energy, error), const(0.0)), call("max", neg(add(energy, error)), const(0.0)))
 
 
 def _entries(model: EnergyModel) -> Iterator[Entry]:

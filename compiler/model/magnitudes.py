@@ -2,15 +2,30 @@
 
 A difference that cancels is as uncertain as its terms: |a - b| has the magnitude |a| + |b|; a product, a function or
 a power of it inherits that (first-order propagation of relative errors, with the conditions of the functions).
+`rounding` is the same as an expression, absolute and by derivatives, for what a program has to tell from zero.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from sysdyn.compiler.model.interpret import Lookup, Value, evaluate
-from sysdyn.dsl.model.expression import Node, topological_unbound
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    call,
+    compare,
+    conditional,
+    const,
+    linear,
+    mul,
+    partials,
+    topological_unbound,
+)
+
+EXACT = ("const", "param", "var", "time", "index", "reduce")
+"""What `rounding` takes as it is."""
 
 
 def magnitudes(roots: Sequence[Node], lookup: Lookup) -> list[Value]:
@@ -51,3 +66,30 @@ def _own(node: Node, value: dict[Node, Value], found: dict[Node, Value]) -> Valu
 
 def _ratio(size: Value, value: Value) -> Value:
     return size / np.maximum(np.abs(np.asarray(value, dtype=float)), 1e-300)
+
+
+def rounding(root: Node) -> Node:
+    """Rounding error of an expression in units of the last place, first order (running error analysis: Higham,
+    Accuracy and Stability of Numerical Algorithms, section 3.3); unknowns, parameters and sums over ranges are exact.
+    """
+    found: dict[Node, Node] = {}
+    for node in topological_unbound([root]):
+        exact = node.op in EXACT or any(a not in found for a in node.args)
+        found[node] = const(0.0) if exact else add(_own_rounding(node), *_inherited(node, found))
+    return found[root]
+
+
+def _own_rounding(node: Node) -> Node:
+    """Of the last operation alone: of a sum relative to its terms."""
+    if node.op != "sum":
+        return call("abs", node)
+    return linear(abs(node.data[0]), [(abs(c), call("abs", a)) for c, a in zip(node.data[1], node.args, strict=True)])
+
+
+def _inherited(node: Node, found: dict[Node, Node]) -> Iterator[Node]:
+    """What the errors of the arguments come to; of an exact argument none, also where the derivative is a pole."""
+    for argument, partial in zip(node.args, partials(node), strict=True):
+        error = found[argument]
+        if error is not const(0.0):
+            some = compare(">", error, const(0.0))
+            yield conditional(some, mul(call("abs", partial), error), const(0.0))

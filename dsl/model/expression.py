@@ -562,6 +562,12 @@ def differential(root: Node, seeds: Mapping[Node, Node]) -> Node:
     return dots[root]
 
 
+def partials(node: Node) -> tuple[Node, ...]:
+    """Derivatives of a node by each of its arguments."""
+    one, zero = const(1.0), const(0.0)
+    return tuple(_chain(node, [one if j == k else zero for j in range(len(node.args))]) for k in range(len(node.args)))
+
+
 def derivative(root: Node, by: Node) -> Node:
     """Partial derivative of root by one node, all other unknowns held."""
     if by not in variables(root) and by.op in ("var", "time"):

@@ -212,8 +212,9 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
         return x
     rows = starter.every & ~bent & ~starter.groups("gamma_rate")
     may = free & ~held & starter.following(t, x)
-    found = solve(problem_of(starter, t, x, guess, rows=rows, free=may), x)
-    return found.x if found.residual < EXACT else x
+    problem = problem_of(starter, t, x, guess, rows=rows, free=may)
+    found = solve(problem, x)
+    return starter.without_noise(found.x, problem.scale) if found.residual < EXACT else x
 
 
 def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:

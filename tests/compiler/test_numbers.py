@@ -9,7 +9,7 @@ from chains import blank, coordinate, parameter
 from sysdyn.compiler.binding.sampled import Points, SampledRows
 from sysdyn.compiler.binding.sensitivity import Sensitivity
 from sysdyn.compiler.model.integers import Index, Integers
-from sysdyn.compiler.model.magnitudes import magnitudes
+from sysdyn.compiler.model.magnitudes import magnitudes, rounding
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program.notation import Notation, factors, number, total
 from sysdyn.dsl.model import expression as x
@@ -42,6 +42,21 @@ def test_what_cancels_is_as_uncertain_as_its_terms():
     assert size(x.call("exp", gap), **near) == pytest.approx(math.e * (1.0 + 2e6 - 1.0))
     assert size(x.call("sin", x.const(0.5)), **near) == pytest.approx(math.sin(0.5))
     assert size(x.conditional(x.compare("<", a, b), a, gap), a=1.0, b=3.0) == 4.0
+
+
+@pytest.mark.parametrize("f", [1e-12, 3e-9, 2e-5, 0.7])
+def test_a_rounding_error_is_no_larger_than_it_is_said(f):
+    flow = x.var("f", "f")
+    root = x.sqrt(x.add(x.const(1.0), x.mul(flow, flow)))
+    energies = {
+        x.sub(root, x.const(1.0)): f * f / (math.sqrt(1.0 + f * f) + 1.0),
+        x.call("ln", x.call("cosh", flow)): 0.5 * math.log1p(math.sinh(f) ** 2),
+        x.mul(flow, flow): f * f,
+    }
+    for energy, exact in energies.items():
+        value, said = x.evaluate([energy, rounding(energy)], {flow: f}.__getitem__)
+        assert abs(value - exact) <= 1.2e-16 * said
+        assert said <= 6.0 * max(1.0, exact)  # terms of at most 1.3
 
 
 # -- whole numbers -----------------------------------------------------------------------------------------
