@@ -285,8 +285,10 @@ class _Projected:
                 mixed = mul(_here(column[owner], at), value)
                 mixed = substitute(mixed, self.flows) if name in self.speeds.columns else mixed
                 self.assembly.add(block, name, at, nest, mixed)
-                if name in self.rated and not any(n.op == "var" and n.data[2] for n in variables(mixed)):
-                    self.assembly.add("dynamics_rate", name, at, nest, total_rate(mixed))
+                rates = [n for n in variables(mixed) if n.op == "var" and n.data[2]]
+                if name in self.rated and all(n.data[1] == "f" for n in rates):
+                    acting = substitute(mixed, dict.fromkeys(rates, const(0.0)))
+                    self.assembly.add("dynamics_rate", name, at, nest, total_rate(acting))
         for label in self.read:
             if owner in self.found.rows[label]:
                 self.assembly.add(block, label, at, nest, mul(_here(self.found.rows[label][owner], at), value))

@@ -11,8 +11,10 @@ With u the loop-local unknowns of a term, every gradient is taken once per term 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.audit import add_audit
 from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
@@ -27,6 +29,9 @@ from sysdyn.dsl.model.expression import (
     add,
     derivative,
     differential,
+    evaluate,
+    gradient,
+    is_const,
     neg,
     substitute,
     time_derivative,
@@ -37,6 +42,9 @@ from sysdyn.dsl.model.expression import (
 from sysdyn.dsl.model.expression import rate as rate_of
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
+
+PARALLEL = 1e-9
+"""Sine of the angle between two gradients below which they have one direction."""
 
 
 def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> DescriptorForm:
@@ -90,19 +98,44 @@ def _drift(model: EnergyModel) -> tuple[str, ...]:
 def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     """Coordinates whose balances of efforts are algebraic and have a rate, but for elements that a store moves with.
 
-    Of a family only part of which a store moves with, the start leaves the rows with inertia out.
+    Of a family only part of which a store moves with, the start leaves the rows with inertia out.  A store that moves
+    with one combination of several rates (a capacitor between two nodes) gives none of them an inertia of its own.
     """
     m = model.mirror
     shapes = {c.name: c.shape for c in model.coordinates}
-    moved = {name for name in carriers if not shapes[name]}
+    moved, joined = set[str](), set[str]()
     for function, kind in ((m.coenergy, m.rate), (m.energy, m.conjugate)):
         for term in model.function(function):
             bounds = tuple((loop.first, loop.last) for loop in term.loops)
             at = tuple(counter(k) for k in range(len(bounds)))
-            for n in local_variables(term.expression, kind):
-                if not n.args or (n.args == at and bounds == shapes[n.data[0]]):
-                    moved.add(n.data[0])
-    return frozenset(shapes) - moved
+            rates = local_variables(term.expression, kind)
+            found = joined if _of_one_combination(term.expression, rates) else moved
+            found.update(n.data[0] for n in rates if not n.args or (n.args == at and bounds == shapes[n.data[0]]))
+    carried = {name for name in carriers - joined if not shapes[name]}
+    return frozenset(shapes) - moved - carried
+
+
+def _of_one_combination(energy: Node, rates: Sequence[Node]) -> bool:
+    """Whether it depends on several rates through one combination c1 r1 + c2 r2 + ...: its gradient has one direction
+    wherever they are (asked at two points of random numbers; of what has no value there: no).
+    """
+    if len(rates) < 2:
+        return False
+    slopes = gradient(energy, rates)
+    if len(rates) == 2 and is_const(add(*slopes), 0.0):
+        return True
+    random, values = np.random.default_rng(7), dict[Node, float]()
+
+    def at_random() -> NDArray[np.float64]:
+        values.update((rate, random.uniform(0.5, 1.5)) for rate in rates)
+        return np.array(evaluate(slopes, lambda n: values.setdefault(n, random.uniform(0.5, 1.5))))
+
+    try:
+        one, other = at_random(), at_random()
+    except (ValueError, ArithmeticError, KeyError):
+        return False
+    both = np.outer(one, other)
+    return bool(np.linalg.norm(both - both.T) < PARALLEL * np.linalg.norm(both))
 
 
 def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:
