@@ -147,7 +147,7 @@ class Starter:
         if not known.measuring:
             self.every &= ~self.guessed
         self.rows, self.columns, self._structural = known.rows, known.columns, known.structural
-        self._sums = self._floating(np.flatnonzero(known.unsettled)) if measuring else None
+        self._sums = self._floating(np.flatnonzero(known.unsettled))
         if self._sums is not None:
             self._summed_rows(self._sums)
         self.written = np.concatenate(

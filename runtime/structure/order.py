@@ -32,7 +32,7 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
         return None
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
-    (full,) = equilibrated(full[~starter.groups("initial")])
+    (full,) = equilibrated(full[starter.every & ~starter.groups("initial")])
     tangent = null_space(full)  # [unknowns and rates, freedoms]
     kinds = system.kinds[: starter.n]
     _, jyd = system.jacobian(state.t, state.y, state.yd)
