@@ -17,12 +17,10 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
     FOLDS,
     OutOfTimeError,
-    Problem,
     Solution,
     Work,
     in_order,
@@ -30,14 +28,11 @@ from sysdyn.runtime.numerics.least_change import (
     solve,
 )
 from sysdyn.runtime.numerics.points import distinct
-from sysdyn.runtime.numerics.rank import rank
 from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of, row_scale
 from sysdyn.values import dataclass
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
-UNPERTURBED = 2
-"""Trials of a stage that begin at the guess itself: the restricted problem, the whole one."""
 _FEW = 3
 """Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
@@ -72,7 +67,7 @@ class ConsistentState:
     """y, yd [unknowns as written] at t; residual: largest scaled row.
 
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
-    found it (PERTURBED_STAGE); "" of a state that was not sought from guesses.
+    found it; "" of a state that was not sought from guesses.
     """
 
     t: float
@@ -112,37 +107,23 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return found.x if found.residual < EXACT else guess
 
 
-def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Floats, bool]:
-    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held; whether
-    Newton's iteration from the guess was enough.
+def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
+    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held.
 
     What follows from the state moves alone where that is enough.
     """
-    plain = True
     for groups, moving in STAGES:
         rows, may = starter.groups(*groups), free & starter.moves(moving)
         for use in (rows | starter.between(moving), rows):
             if not use.any() or not may.any():
                 continue
             problem = problem_of(starter, t, x, guess, rows=use, free=may)
-            gentle = problem.within(may & starter.following(t, x))
-            trials = enumerate(_trials(gentle, problem, x))
-            k, found = next(((k, s) for k, s in trials if s.residual < EXACT), (0, None))
-            if found is not None:
+            found = solve(problem.within(may & starter.following(t, x)), x, _FEW)
+            found = found if found.residual < EXACT else solve(problem, x)
+            if found.residual < EXACT:
                 x = starter.without_noise(found.x, problem.scale)
-                plain = plain and k < UNPERTURBED
                 break
-    return x, plain
-
-
-def _trials(gentle: Problem, problem: Problem, x: Floats) -> Iterator[Solution]:
-    """From x in the unknowns of the gentle problem, then in all, then from points around."""
-    yield solve(gentle, x, _FEW)
-    yield solve(problem, x)
-    for z in _shaken(x, problem.free, problem.scale):
-        if problem.work.done:
-            return
-        yield solve(problem, z)
+    return x
 
 
 def _shaken(x: Floats, free: Mask, scale: Floats) -> Iterator[Floats]:
@@ -368,21 +349,19 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("largest_scales", _in_largest_scales),
 )
 """Globalisation: what is tried, in this order, until all rows hold."""
-PERTURBED_STAGE = "perturbed_stage"
-"""The first of them, from a stage that was itself found from a point around its guess."""
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
     """The first strategy that holds from the staged state, and its name; the least residual and "" where none does."""
     starter.plain = True
-    x, plain = _stages(starter, t, guess.copy(), guess, free)
+    x = _stages(starter, t, guess.copy(), guess, free)
     x = _beside_gammas(starter, t, x, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
         starter.plain = name == "newton"
         found, holds = strategy(starter, t, x, guess, free)
         if holds:
-            return found, name if plain or name != "newton" else PERTURBED_STAGE
+            return found, name
         # what follows alone is no point to explain a failure at
         best = found if name == "all_unknowns" or found.residual < best.residual else best
     return best, ""
@@ -463,35 +442,13 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         scale = starter.scale(t, freed.x)
         change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
-        candidates = tuple(dict.fromkeys(starter.given.label[k] for k in places))
+        candidates = tuple(dict.fromkeys(starter.given.label(k) for k in places))
     kind = "fixed"
     if not candidates:
         kind = "gamma" if rows and rows[0].kind.startswith("gamma") else "stuck"
         if contradict and rows and rows[0].kind.startswith(("phi", "psi", "initial")):
             kind = "fixed"
     return InconsistentStart(kind, float((scaled if kind == "stuck" else raw)[order[0]]), rows, candidates)
-
-
-def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...]]:
-    """How many more fixed values a state as found would take, and the names of the free unknowns among which (of small
-    models; else unknown: 0).
-    """
-    starter = Starter(system, remember=True)
-    x, t = np.concatenate([state.y, state.yd[starter.rates]]), state.t
-    if x.size > 400:
-        return 0, ()
-    free = np.append(~starter.given.fixed, np.ones(x.size - starter.n, dtype=bool))
-    scale = starter.scale(t, x)
-    full = np.zeros((starter.settled.rows, x.size))
-    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(t, x) * scale[starter.columns])
-    (full,) = equilibrated(full[starter.every])
-    carries = ~starter.following(t, x) & free
-    follows = free & ~carries
-    if not carries.any():
-        return 0, ()
-    missing = int(carries.sum()) - (rank(full[:, free]) - rank(full[:, follows]))
-    names = tuple(starter.system.name(int(k)) for k in np.flatnonzero(carries)) if missing > 0 else ()
-    return missing, names
 
 
 def consistent_start(
@@ -511,7 +468,7 @@ def consistent_start(
 def _consistent(system: System, t0: float, near: ConsistentState | None, until: float | None) -> ConsistentState:
     """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
-    starter = Starter(system, measuring=True, remember=True)
+    starter = Starter(system)
     starter.work = Work(until=until)
     guess = np.concatenate([starter.given.guess, np.zeros(starter.equations.unknowns - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
@@ -524,9 +481,6 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
         raise _explain(starter, t0, guess, free, best)
     starter.work = Work(EXPLAINED, until)
     best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
-    again = not starter.missed.size and not starter.summed and best.x.size <= DENSE  # of a large one the room counts
-    system.starter = starter if again else None
-    starter.work.until = None  # a restart is limited by the clock of its run
     y, yd = starter.expand(best.x)
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     if best.x.size > LARGE:

@@ -11,19 +11,19 @@ from __future__ import annotations
 
 import ctypes as c
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats, Initial, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import group_maximum, largest_of_group
-from sysdyn.runtime.model.system import KEPT, LARGE, System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.equations import Equations
@@ -34,54 +34,40 @@ Places = NDArray[np.integer]
 STATE = ("q", "f", "p", "s")
 WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
+EQUATIONS = "equations of the start"
 
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """The initial values on y: guess [unknowns], fixed and written masks, label of each written one."""
+    """Initial values on y: guess [unknowns], fixed and written masks; said: statements and where, fixed ones last."""
 
     guess: Floats
     fixed: Mask
     written: Mask
-    label: Mapping[int, RowLabel]
+    said: Sequence[tuple[Initial, Ints]]
+
+    def label(self, place: int) -> RowLabel:
+        """Of the statement that counts."""
+        return next(item.label for item, own in reversed(self.said) if place in own)
 
 
 def _given(system: System) -> _Given:
-    """The initial values of a text; where no two are of one unknown the run before left all but the numbers."""
-    initial, layouts, key = system.description.initial, system.description.layouts, ("given", system.form.name)
-    if key not in layouts or any(i.positions is not p for i, (p, _) in zip(initial, layouts[key][0], strict=False)):
-        found = _stated(system)
-        places = [(item.positions, system.form.at[item.family] + item.positions) for item in initial]
-        number = sum(own.size for _, own in places)
-        if number == np.count_nonzero(found.written) and number <= KEPT:
-            layouts[key] = places, found
-        return found
-    places, same = layouts[key]
-    guess = np.zeros(same.guess.size)
-    for item, (_, own) in zip(initial, places, strict=True):
-        guess[own] = item.values
-    return _Given(guess, same.fixed, same.written, same.label)
-
-
-def _stated(system: System) -> _Given:
-    n = system.form.written
-    guess, fixed, written = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    label: dict[int, RowLabel] = {}
-    for item in sorted(system.description.initial, key=lambda item: item.fixed):
-        places = system.form.at[item.family] + item.positions
-        known = np.where(fixed[places], guess[places], item.values)
-        guess[places] = item.values
-        for held in (known, guess[places]) if item.fixed else ():  # said before, and twice by the statement itself
-            apart = np.abs(held - item.values)
-            wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(held), np.abs(item.values)))
-            if wrong.size:
-                place = int(places[wrong[0]])
-                labels = (label.get(place, item.label), item.label)
-                raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (system.name(place),))
-        fixed[places] |= item.fixed
-        written[places] = True
-        label.update(dict.fromkeys(places.tolist(), item.label))
-    return _Given(guess, read_only(fixed), read_only(written), label)
+    """The initial values of a text.  InconsistentStart where two fixed ones differ."""
+    n, stated = system.form.written, sorted(system.description.initial, key=lambda item: item.fixed)
+    said = [(item, system.form.at[item.family] + item.positions) for item in stated]
+    found = _Given(np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), said)
+    for item, own in said:
+        found.guess[own] = item.values
+        found.fixed[own] |= item.fixed
+        found.written[own] = True
+    for item, own in ((item, own) for item, own in said if item.fixed):
+        apart = np.abs(found.guess[own] - item.values)
+        wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(found.guess[own]), np.abs(item.values)))
+        if wrong.size:
+            place = int(own[wrong[0]])
+            labels = item.label, found.label(place)
+            raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (system.name(place),))
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +89,6 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        if not self.remember:
-            return ask(self, t, x)
         here, known = self.point(t, x), self.known.get(name)
         if known is not None and known[0] is here:
             return known[1].copy()
@@ -120,24 +104,22 @@ def remembered(
 
 
 class Starter:
-    """The equations of the start of one model (t0 apart).
+    """The equations of the start of one model (t0 apart), for one search: nothing but t and x changes.
 
-    measuring: where contents of stores are guessed, guessed expressions hold but for an unknown of their own each,
-    behind those of y and its rates; sums of balances without inertia have their rates.
+    Where contents of stores are guessed, guessed expressions hold but for an unknown of their own each, behind those of
+    y and its rates; sums of balances without inertia have their rates.
     """
 
-    def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
+    def __init__(self, system: System) -> None:
         self.system = system
-        self.remember = remember  # one search for a start: nothing but t and x changes
         self.known: dict[str, tuple[tuple[float, bytes], NDArray[Any]]] = {}
         self.work = Work()  # of one search for a start
         self.plain = True  # small problems are searched in the core, which has one way of least change
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         self.given = _given(system)
-        key = "equations of the start", measuring
-        self.equations = known = system.once(key, lambda: Equations(system, settled, measuring))
-        self.core = settled.own(key, lambda: known.core(system, settled))
+        self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
+        self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
         self.n, self.first = known.n, known.first
         self.rates, self.missed = known.rates, known.missed
         self.guessed, self.unsaid = known.guessed, known.unsaid
@@ -147,7 +129,7 @@ class Starter:
         if not known.measuring:
             self.every &= ~self.guessed
         self.rows, self.columns, self._structural = known.rows, known.columns, known.structural
-        self._sums = self._floating(np.flatnonzero(known.unsettled)) if measuring else None
+        self._sums = self._floating(np.flatnonzero(known.unsettled))
         if self._sums is not None:
             self._summed_rows(self._sums)
         self.written = np.concatenate(
@@ -162,7 +144,7 @@ class Starter:
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
         self.settled.forget()
-        self.system.forget_once(("equations of the start", True))
+        self.system.forget_once(EQUATIONS)
 
     def _summed_rows(self, sums: _Sums) -> None:
         """The entries of sums of rows behind the others."""
@@ -210,6 +192,12 @@ class Starter:
         form = self.system.form
         yd[form.k_q] = y[form.k_f]
         return y, yd
+
+    def unknowns(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """X of y, yd, the inverse of `expand`: guessed expressions miss what they do there."""
+        x = np.concatenate([y, yd[self.rates], np.zeros(self.missed.size)])
+        x[self.first :] = self.residual(t, x)[self.missed]
+        return x
 
     def residual(self, t: float, x: Floats) -> Floats:
         """All rows [rows]."""
@@ -432,16 +420,9 @@ class Starter:
 
 
 def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
-    """The equations `rows` in the unknowns `free`, the others as in x."""
+    """The equations `rows` in the unknowns `free`, the others as in x; magnitudes and weights are those of x."""
     scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
     weight = starter.weights_by(t, x, scale) if starter.generous else starter.weights(t, x)
-    return weighted(starter, t, guess, rows=rows, free=free, scale=scale, weight=weight)
-
-
-def weighted(
-    starter: Starter, t: float, guess: Floats, *, rows: Mask, free: Mask, scale: Floats, weight: Floats
-) -> Problem:
-    """The equations `rows` in the unknowns `free`, which move from the guess by scale and weight [unknowns]."""
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),
