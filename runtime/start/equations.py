@@ -54,8 +54,6 @@ class Equations:
         self.units = self._units(settled)
         self._kinds(system)
         self.measured = self._measured(settled.rows)
-        self.held_between: dict[tuple[str, ...], Mask] = {}
-        """Rows between unknowns of these kinds alone, as they are asked (starter.py)."""
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _rows(self, settled: System) -> None:

@@ -84,6 +84,12 @@ class ConsistentState:
         return y, yd
 
 
+def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Solution | None:
+    """The point nearest to the guess on these rows, from x in these unknowns; None where they do not hold."""
+    found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
+    return found if found.residual < EXACT else None
+
+
 def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
     written = starter.guessed & ~starter.unsaid
@@ -92,19 +98,16 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     free = free & (np.arange(free.size) < starter.n)
     # an expression gives its own unknown where the others are guessed by numbers: of several roots that one is meant
     own = free & ~starter.written
-    given = False
-    if own.any():
-        found = solve(problem_of(starter, t, guess, guess, rows=written, free=own), guess)
-        given = found.residual < EXACT
-        guess = found.x if given else guess
+    given = _onto(starter, t, guess, guess, rows=written, free=own) if own.any() else None
+    guess = guess if given is None else given.x
     rows = written | starter.groups("phi", "psi")
     found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-    if found.residual < EXACT or (np.isfinite(found.residual) and not given):
+    if found.residual < EXACT or (np.isfinite(found.residual) and given is None):
         guess = found.x
     # of a flow that an expression guesses, the momentum is guessed with it
     momenta = free & starter.moves(("p",)) & ~starter.written
-    found = solve(problem_of(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta), guess)
-    return found.x if found.residual < EXACT else guess
+    moved = _onto(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta)
+    return guess if moved is None else moved.x
 
 
 def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
@@ -193,23 +196,8 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
         return x
     rows = starter.every & ~bent & ~starter.groups("gamma_rate")
     may = free & ~held & starter.following(t, x)
-    found = solve(problem_of(starter, t, x, guess, rows=rows, free=may), x)
-    return found.x if found.residual < EXACT else x
-
-
-def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """X on the rows as written and on such derivatives as are linear: far from a solution the derivative of an
-    exponential hides what itself is after.
-    """
-    rows = starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
-    for _ in range(_RESCALINGS):
-        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
-        if not np.isfinite(found.residual) or (found.x == x).all():
-            break
-        x = found.x
-    # what round-off left is no magnitude; rates follow from the rest by linear rows
-    x = starter.without_noise(x, starter.scale(t, x))
-    return np.where(starter.moves(("rate",)), guess, x)
+    found = _onto(starter, t, x, guess, rows=rows, free=may)
+    return x if found is None else found.x
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -286,13 +274,12 @@ def _nearer(
     said, unsaid = change(x)
     for stays in (BACK * np.maximum(size, largest), NOISE * size):
         near = np.where(np.abs(aim - guess) > stays, aim, guess)
-        for held in (state, state & (near == guess)):
-            found = solve(problem.within(free & ~held), np.where(held, near, x))
-            clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
-            now = (np.inf, np.inf) if clean is None else change(clean)
-            less = now[0] < (1.0 - NOISE) * said or (now[0] <= (1.0 + BACK) * said and now[1] <= EVEN * unsaid)
-            if clean is not None and less:
-                return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
+        found = solve(problem.within(free & ~state), np.where(state, near, x))
+        clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
+        now = (np.inf, np.inf) if clean is None else change(clean)
+        less = now[0] < (1.0 - NOISE) * said or (now[0] <= (1.0 + BACK) * said and now[1] <= EVEN * unsaid)
+        if clean is not None and less:
+            return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
     return None, 0.0
 
 
@@ -315,11 +302,20 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
 
 def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """Down steep laws on the rows as written, with a share of work of its own; then everything at once."""
+    """Down steep laws on the rows as written and such derivatives as are linear, with a share of work of its own; then
+    everything at once.  Far from a solution the derivative of an exponential hides what itself is after.
+    """
     own, starter.work = starter.work, Work(WALKED, starter.work.until)
-    down = _as_written(starter, t, x, guess, free)
+    rows = starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
+    for _ in range(_RESCALINGS):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
+        if not np.isfinite(found.residual) or (found.x == x).all():
+            break
+        x = found.x
+    # what round-off left is no magnitude; rates follow from the rest by linear rows
+    x = starter.without_noise(x, starter.scale(t, x))
     starter.work = own
-    return _rescaled(starter, t, down, guess, free)
+    return _rescaled(starter, t, np.where(starter.moves(("rate",)), guess, x), guess, free)
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:

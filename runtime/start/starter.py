@@ -21,7 +21,6 @@ from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import Floats, Initial, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_unknown
-from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import group_maximum, largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
@@ -227,17 +226,8 @@ class Starter:
 
     def sizes(self, t: float, x: Floats, scale: Floats) -> Floats:
         """Size of the terms of each row [rows], by the larger of magnitudes and values."""
-        size = np.zeros(self.settled.rows)
-        if self._sums is not None:
-            values = np.abs(self.jacobian(t, x))
-            np.add.at(size, self.rows, values * np.maximum(scale, np.abs(x))[self.columns])
-            return size
-        x, scale = (np.ascontiguousarray(item, dtype=np.float64) for item in (x, scale))
-        numbers = lib.pointer(x), lib.pointer(scale), lib.pointer(size)
-        if lib.core.sd_start_sizes(c.addressof(self.core), t, *numbers):
-            raise MemoryError
-        self.settled.failure.check()
-        return size
+        terms = np.abs(self.jacobian(t, x)) * np.maximum(scale, np.abs(x))[self.columns]
+        return np.bincount(self.rows, weights=terms, minlength=self.settled.rows).astype(np.float64, copy=False)
 
     def with_sums(self, values: Floats) -> Floats:
         """Values of all rows [rows, k] with the sums of rows in their places."""
@@ -262,19 +252,8 @@ class Starter:
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
-        if self._sums is not None:
-            return self._between(kinds)
-        kept, key = self.equations.held_between, tuple(kinds)
-        if key not in kept:
-            kept[key] = read_only(self._between(kinds))
-        return kept[key]
-
-    def _between(self, kinds: Sequence[str]) -> Mask:
-        outside = ~self.moves(kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
-        if not mask.any():
-            return np.asarray(mask)
-        mask[self.rows[self._structural & outside[self.columns]]] = False
+        mask[self.rows[self._structural & ~self.moves(kinds)[self.columns]]] = False
         return mask
 
     def _floating(self, unsettled: Places) -> _Sums | None:
@@ -392,17 +371,11 @@ class Starter:
     def _scale(self, t: float, x: Floats, *, largest: bool) -> Floats:
         known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
+        values, free = self.jacobian(t, x), self.residual(t, x)
+        told = np.where(self._of_missed & np.isfinite(values), values, 0.0) if self.missed.size else np.zeros(0)
+        sized = values - told if self.missed.size else values
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
-        if self._sums is None and not self.missed.size:
-            point = t, lib.pointer(x), LARGEST * largest, lib.pointer(found)
-            if lib.core.sd_start_scale(c.addressof(self.core), lib.pointer(nominal), *tables, *point):
-                raise MemoryError
-            self.settled.failure.check()
-            return found
-        values, free = self.jacobian(t, x), self.residual(t, x)
-        told = np.where(self._of_missed, values, 0.0)
-        sized = values - np.where(np.isfinite(told), told, 0.0)
         sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
         if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
@@ -410,7 +383,7 @@ class Starter:
 
     def _of_one_unit(self, told: Floats, found: Floats) -> Floats:
         """Magnitudes with those of what guesses miss: guesses of one unit are measured alike."""
-        family, told = self.equations.family, np.where(np.isfinite(told), told, 0.0)
+        family = self.equations.family
         size, most = np.zeros(self.settled.rows), np.zeros(int(family.max(initial=0)) + 1)
         text = self.columns < self.first
         np.add.at(size, self.rows[text], (told * found[self.columns])[text])
