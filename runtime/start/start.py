@@ -28,7 +28,7 @@ from sysdyn.runtime.numerics.least_change import (
     solve,
 )
 from sysdyn.runtime.numerics.points import distinct
-from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of, row_scale
+from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of
 from sysdyn.values import dataclass
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
@@ -170,7 +170,7 @@ def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) 
 
 def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
     """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution."""
-    size = row_scale(starter, t, magnitudes, starter.scale(t, magnitudes))[starter.every]
+    size = starter.row_scale(t, magnitudes, starter.scale(t, magnitudes))[starter.every]
     return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
 
 
@@ -399,7 +399,7 @@ def _missed(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[tu
     if not rows.any():
         return
     misses = starter.settled.residual(t, *starter.expand(x))
-    size = row_scale(starter, t, x, scale)
+    size = starter.row_scale(t, x, scale)
     values = starter.jacobian(t, x)
     for row in np.flatnonzero(rows & (np.abs(misses) * size > 1e-9))[:100]:
         mine = (starter.rows == row) & (starter.columns < starter.n) & (values != 0.0)
@@ -425,7 +425,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     if x.size <= DENSE:
         problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
         x = least_residual(problem, x)
-        scaled = np.abs(starter.residual(t, x)) * row_scale(starter, t, x, problem.scale)
+        scaled = np.abs(starter.residual(t, x)) * starter.row_scale(t, x, problem.scale)
     raw, scaled = (np.where(starter.every, item, 0.0) for item in (np.abs(starter.residual(t, x)), scaled))
     order = np.argsort(-scaled)
     worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]

@@ -167,13 +167,6 @@ class Starter:
         return np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
 
     @functools.cached_property
-    def _of_missed(self) -> Mask:
-        """Entries that stand in rows which may miss something [entries]."""
-        missed = np.zeros(self.settled.rows, dtype=bool)
-        missed[self.missed] = True
-        return np.asarray(missed[self.rows])
-
-    @functools.cached_property
     def idle(self) -> Mask:
         """Displacements that stand in constraints alone and move without inertia: they hold nothing."""
         form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
@@ -202,9 +195,7 @@ class Starter:
         """All rows [rows]."""
         rows = np.zeros(self.settled.rows)
         self._ask(lib.core.sd_start_residual, t, x, rows)
-        if self._sums is not None:
-            rows[self._sums.rows] = self._sums.weights @ rows[self._sums.of]
-        return rows
+        return self.with_sums(rows)
 
     def _ask(self, function: Any, t: float, x: Floats, answer: Floats) -> None:
         """What the core says of the rows at x."""
@@ -224,10 +215,11 @@ class Starter:
         values[self._sums.entries] = 0.0
         return np.concatenate([values, summed.ravel()])
 
-    def sizes(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """Size of the terms of each row [rows], by the larger of magnitudes and values."""
+    def row_scale(self, t: float, x: Floats, scale: Floats) -> Floats:
+        """One over the size of the terms of each row [rows], by the larger of magnitudes and values."""
         terms = np.abs(self.jacobian(t, x)) * np.maximum(scale, np.abs(x))[self.columns]
-        return np.bincount(self.rows, weights=terms, minlength=self.settled.rows).astype(np.float64, copy=False)
+        size = np.bincount(self.rows, weights=terms, minlength=self.settled.rows)
+        return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
 
     def with_sums(self, values: Floats) -> Floats:
         """Values of all rows [rows, k] with the sums of rows in their places."""
@@ -295,7 +287,7 @@ class Starter:
         balances are shared, by magnitudes.
         """
         if not self.balanced:
-            return self.weights_by(t, x, scale)
+            return self.weights(t, x, scale)
         families, rows = self.system.description.families, self.system.description.rows
         effort = {rows[k].owner: rows[k].unit for group, k, _ in self.system.form.groups if group == "dynamics"}
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
@@ -308,8 +300,7 @@ class Starter:
         _, unit = np.unique(names, return_inverse=True)
         largest = np.zeros(int(unit.max()) + 1)
         np.maximum.at(largest, unit, content * scale)
-        guessed = np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
-        return np.asarray(guessed * content * scale / largest[unit])
+        return np.asarray(self.weight * content * scale / largest[unit])
 
     @remembered
     def following(self, t: float, x: Floats) -> Mask:
@@ -333,15 +324,10 @@ class Starter:
         found[self.first :] = False
         return found
 
-    @remembered
-    def weights(self, t: float, x: Floats) -> Floats:
+    def weights(self, t: float, x: Floats, scale: Floats) -> Floats:
         """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
         values.
         """
-        return self.weights_by(t, x, self.scale(t, x))
-
-    def weights_by(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """The same where magnitudes are others."""
         weight = np.where(self.following(t, x), WEIGHT["following"], self.weight)
         weight[: self.n] *= scale[: self.n] / group_maximum(self.system, scale[: self.n])
         return weight
@@ -372,8 +358,8 @@ class Starter:
         known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self.residual(t, x)
-        told = np.where(self._of_missed & np.isfinite(values), values, 0.0) if self.missed.size else np.zeros(0)
-        sized = values - told if self.missed.size else values
+        told = np.where(np.isin(self.rows, self.missed) & np.isfinite(values), values, 0.0) if self.missed.size else 0.0
+        sized = values - told
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
         sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
@@ -395,7 +381,7 @@ class Starter:
 def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
     """The equations `rows` in the unknowns `free`, the others as in x; magnitudes and weights are those of x."""
     scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
-    weight = starter.weights_by(t, x, scale) if starter.generous else starter.weights(t, x)
+    weight = starter.weights(t, x, scale)
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),
@@ -412,8 +398,3 @@ def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Ma
         check=starter.settled.failure.check,
     )
 
-
-def row_scale(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
-    """One over the size of the terms of each row [rows]."""
-    size = starter.sizes(t, x, scale)
-    return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
