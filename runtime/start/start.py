@@ -129,13 +129,6 @@ def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     return x
 
 
-def _shaken(x: Floats, free: Mask, scale: Floats) -> Iterator[Floats]:
-    """Points around x, always the same: where a guess lies on a singular point."""
-    random = np.random.default_rng(20)
-    for amplitude in _AMPLITUDES:
-        yield x + np.where(free, amplitude * scale * random.standard_normal(x.size), 0.0)
-
-
 def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """Everything at once, and whether it holds.
 
@@ -319,11 +312,14 @@ def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """Everything at once from seeded points around, as long as there is work left."""
-    best, holds = Solution(x, np.inf, np.zeros(0)), False
-    for shaken in _shaken(x, free, starter.scale(t, x)):
+    """Everything at once from points around, always the same, as long as there is work left: where a guess lies on a
+    singular point.
+    """
+    best, holds, random = Solution(x, np.inf, np.zeros(0)), False, np.random.default_rng(20)
+    for amplitude in _AMPLITUDES:
         if holds or starter.work.done:
             break
+        shaken = x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
         found, holds = _rescaled(starter, t, shaken, guess, free)
         best = found if holds or found.residual < best.residual else best
     return best, holds
@@ -468,8 +464,8 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     starter.work = Work(until=until)
     guess = np.concatenate([starter.given.guess, np.zeros(starter.equations.unknowns - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
-        guess[: starter.n] = np.where(system.are(*STATE, "e")[: starter.n], near.y, guess[: starter.n])
-        guess[starter.first :] = starter.residual(t0, guess)[starter.missed]
+        y = np.where(system.are(*STATE, "e")[: starter.n], near.y, starter.given.guess)
+        guess = starter.unknowns(t0, y, np.zeros(starter.n))
     free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
     guess = _guess(starter, t0, guess, free)
     best, strategy = _attempt(starter, t0, guess, free)
