@@ -88,16 +88,16 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        here, known = self.point(t, x), self.known.get(name)
-        if known is not None and known[0] is here:
-            return known[1].copy()
-        found, large = ask(self, t, x), x.size > LARGE
-        if large and any(point is not here for point, _ in self.known.values()):
-            self.known.clear()  # the room counts: one point, and nothing longer
-        if large and found.size > x.size:
-            return found
-        self.known[name] = here, found
-        return found.copy()
+        here = t, x.tobytes()
+        if here != self.here:
+            self.here = here
+            self.known.clear()
+        if name not in self.known:
+            found = ask(self, t, x)
+            if x.size > LARGE and found.size > x.size:  # the room counts
+                return found
+            self.known[name] = found
+        return self.known[name].copy()
 
     return answer
 
@@ -111,7 +111,7 @@ class Starter:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.known: dict[str, tuple[tuple[float, bytes], NDArray[Any]]] = {}
+        self.here, self.known = (0.0, b""), dict[str, NDArray[Any]]()
         self.work = Work()  # of one search for a start
         self.plain = True  # small problems are searched in the core, which has one way of least change
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
@@ -134,11 +134,6 @@ class Starter:
         self.written = np.concatenate(
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
-
-    def point(self, t: float, x: Floats) -> tuple[float, bytes]:
-        """The point (t, x): one object for all answers there."""
-        asked = t, x.tobytes()
-        return next((here for here, _ in self.known.values() if here == asked), asked)
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
