@@ -198,9 +198,8 @@ def state_jacobian(tables_: Tables, system: System, t: float, y: Floats, yd: Flo
 
 def _scale(written: System, state: ConsistentState) -> Floats:
     """Magnitudes of the unknowns as written at the start."""
-    starter = Starter(written, measuring=True)
-    x = np.concatenate([state.y, state.yd[starter.rates], np.zeros(starter.missed.size)])
-    return starter.scale(state.t, x)[: starter.n]
+    starter = Starter(written)
+    return starter.scale(state.t, starter.unknowns(state.t, state.y, state.yd))[: starter.n]
 
 
 def _observer(system: System, block: str) -> tuple[Call | None, int]:

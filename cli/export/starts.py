@@ -19,11 +19,10 @@ LARGEST = 1500
 
 def start_tables(system: System, state: ConsistentState) -> Start | None:
     """The problem of a start; None where it is too large, or has rows that only the runtime forms."""
-    starter = Starter(system, measuring=True)
+    starter = Starter(system)
     if starter.summed or max(starter.first + starter.missed.size, starter.settled.rows) > LARGEST:
         return None
-    x = np.concatenate([state.y, state.yd[starter.rates], np.zeros(starter.missed.size)])
-    x[starter.first :] = starter.residual(state.t, x)[starter.missed]
+    x = starter.unknowns(state.t, state.y, state.yd)
     free = np.append(~starter.given.fixed, np.ones(x.size - starter.n, dtype=bool))
     problem = problem_of(starter, state.t, x, x, rows=starter.every, free=free)
     return Start(

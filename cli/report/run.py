@@ -7,7 +7,7 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.starting import described
 from sysdyn.compiler.binding.certificate import certificate
-from sysdyn.runtime.start.start import freedom
+from sysdyn.runtime.structure.order import freedom
 
 SHOWN = 60
 """Rows of a table of values."""

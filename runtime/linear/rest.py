@@ -91,7 +91,7 @@ class Resting:
 
     def _spread(self) -> Floats:
         """How far points lie from the guess."""
-        x = np.concatenate([self.first, np.zeros(self.starter.first - self.n)])
+        x = self.starter.unknowns(self.t, self.first, np.zeros(self.n))
         return 0.3 * self.starter.scale(self.t, x)[: self.n]
 
     def _use(self) -> Mask:
@@ -137,7 +137,7 @@ class Resting:
 
     def problem(self, guess: Floats) -> Problem:
         """Rest nearest to a guess."""
-        x = np.concatenate([guess, np.zeros(self.starter.first - self.n)])
+        x = self.starter.unknowns(self.t, guess, np.zeros(self.n))
         scale = self.starter.scale(self.t, x)[: self.n]
         follows = np.isin(self.system.kinds[: self.n], ("kappa", "mu", "e"))
         pattern = self.rows.pattern

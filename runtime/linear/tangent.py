@@ -127,12 +127,12 @@ class Given:
 
 def rows_at(system: System, state: ConsistentState) -> Rows:
     """Every row that holds at consistent states, linearised; system: the form as written."""
-    starter = Starter(system, measuring=True)
+    starter = Starter(system)
     if max(starter.first, starter.settled.rows) > LARGEST:
         raise NoLinearisation(
             f"{starter.first} unknowns and rates are more than {LARGEST}, up to which full matrices are taken"
         )
-    x = np.concatenate([state.y, state.yd[starter.rates], np.zeros(starter.missed.size)])
+    x = starter.unknowns(state.t, state.y, state.yd)
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
     if not np.isfinite(full).all():

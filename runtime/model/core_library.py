@@ -210,8 +210,6 @@ def _load() -> Any:
         "sd_pencil_index": (c.c_int, [_I, _P, _P, _P, _P, _I]),
         "sd_start_residual": (c.c_int, [_P, _D, _P, _P]),
         "sd_start_jacobian": (c.c_int, [_P, _D, _P, _P]),
-        "sd_start_scale": (c.c_int, [_P, _P, _P, _P, _I, _D, _P, _I, _P]),
-        "sd_start_sizes": (c.c_int, [_P, _D, _P, _P, _P]),
         "sd_search_measure": (c.c_int, [_P]),
         "sd_search_solve": (c.c_int, [_P]),
         "sd_many_runs": (None, [_P, _I, *[_P] * 10]),

@@ -22,11 +22,6 @@ def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
     return found
 
 
-def _places(system: System, group: str, kind: str) -> NDArray[np.int64]:
-    """Places in the pattern of the entries of each unknown of a kind in its coordinate's row of a group."""
-    return np.flatnonzero(own_unknown(system, group, kind)[system.pattern.row] == system.pattern.columns_of())
-
-
 def own_unknown(system: System, group: str, kind: str) -> NDArray[np.int64]:
     """The unknown of a kind in whose coordinate's row of a group each row is [rows]; -1 elsewhere."""
     families = system.description.families
@@ -92,7 +87,12 @@ def own_places(system: System) -> tuple[NDArray[np.int64], ...]:
 
 
 def _own_places(system: System, group: str, kind: str) -> NDArray[np.int64]:
-    return system.once(("own", group, kind), lambda: _places(system, group, kind))
+    """Places in the pattern of the entries of each unknown of a kind in its coordinate's row of a group."""
+
+    def find() -> NDArray[np.int64]:
+        return np.flatnonzero(own_unknown(system, group, kind)[system.pattern.row] == system.pattern.columns_of())
+
+    return system.once(("own", group, kind), find)
 
 
 def with_flows(system: System) -> Iterator[tuple[slice, NDArray[np.int64]]]:

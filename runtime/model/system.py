@@ -74,7 +74,7 @@ class System:
                 made[index_form, left_out] = self
             return self
         self = made[index_form, left_out]
-        self.description, self.starter = description, None
+        self.description = description
         self.kinematic_scale[:] = 1.0
         return self  # type: ignore[no-any-return]
 
@@ -97,8 +97,6 @@ class System:
             description.layouts[key] = plan(description, index_form)
         self.form: Form = description.layouts[key]
         self.failure = Failure()
-        self.starter: Any = None
-        """What the start was sought in (start/starter.py), where it may serve again."""
         self._keep: list[Any] = []
         self._own: dict[Hashable, Any] = {}
         self._assemble()

@@ -31,7 +31,7 @@ def pairs(system: System) -> tuple[Ints, Ints]:
 
 
 class Equations:
-    """system: as written; settled: its form "start"; measuring: guessed expressions may miss something.
+    """system: as written; settled: its form "start"; measuring: guessed expressions hold but for what they miss.
 
     guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: rows of the guesses that have an
     unknown of their own; unsettled [rows]: they need not hold; rows, columns, structural [entries]: of the matrix;
@@ -39,12 +39,12 @@ class Equations:
     the first that is missed.
     """
 
-    def __init__(self, system: System, settled: System, measuring: bool) -> None:
+    def __init__(self, system: System, settled: System) -> None:
         self.n = system.form.written
         self.rates = rates_of(settled)
         self.momenta = system.of_groups("momentum")
         self._rows(settled)
-        self.measuring = measuring and any(r.content for r in settled.description.rows)
+        self.measuring = any(r.content for r in settled.description.rows)
         self.missed = np.flatnonzero(self.guessed & self.measuring)
         self.first = self.n + self.rates.size
         self.unsettled = inertial_rates(settled)
@@ -54,8 +54,6 @@ class Equations:
         self.units = self._units(settled)
         self._kinds(system)
         self.measured = self._measured(settled.rows)
-        self.held_between: dict[tuple[str, ...], Mask] = {}
-        """Rows between unknowns of these kinds alone, as they are asked (starter.py)."""
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _rows(self, settled: System) -> None:

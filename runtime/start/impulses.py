@@ -110,7 +110,8 @@ class Impulses:
         follows[flows] = False
         ways = np.hstack([ways, np.diag(magnitude)[:, follows]])
         others = (self._flows() | self._state_rows | self._balance) & ~np.isin(np.arange(self.system.rows), rows)
-        sums = np.vstack([self._summing(rows, left[:, known:] / size[:, None]), np.eye(self.system.rows)[others]])
+        sums = np.vstack([np.zeros((rows.size - known, self.system.rows)), np.eye(self.system.rows)[others]])
+        sums[: rows.size - known, rows] = (left[:, known:] / size[:, None]).T
         for _ in range(_BALANCED):
             slopes = sums @ self.system.dense(self.system.jacobian(t, y, yd)[0]) @ ways
             most = np.abs(slopes).max(axis=1, initial=0.0)
@@ -118,12 +119,6 @@ class Impulses:
             aim = sums @ self.system.residual(t, y, yd) / most
             y = y - ways @ least_squares(slopes / most[:, None], aim)
         return y
-
-    def _summing(self, rows: NDArray[np.int64], weights: Floats) -> Floats:
-        """Sums of rows by weights [rows, k] as a matrix [k, all rows]."""
-        found = np.zeros((weights.shape[1], self.system.rows))
-        found[:, rows] = weights.T
-        return found
 
     def _sloping(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
         """Y with implicit efforts at their magnitudes where their laws are flat: a flat one decides about the flows."""

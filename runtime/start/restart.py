@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.least_change import Problem, solve
+from sysdyn.runtime.numerics.least_change import solve
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.displacements import Displacements
 from sysdyn.runtime.start.impulses import Impulses
 from sysdyn.runtime.start.settled import HELD, Settler
-from sysdyn.runtime.start.starter import Starter
+from sysdyn.runtime.start.starter import Starter, problem_of
 
 STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
@@ -54,7 +54,6 @@ class Restart:
     def __init__(self, settler: Settler, state: NDArray[np.bool_]) -> None:
         self.settler, self.state = settler, state
         self.impulses = Impulses(settler.system)
-        self._starter: Starter | None = None
         self._displacements: Displacements | None = None
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
@@ -86,7 +85,7 @@ class Restart:
             found, rate, done = self.settler.settle(t, y, yd, hold=hold)
             if done and self._stays(found, y, magnitude):
                 return found, rate, impulse
-        searched = self._search(t, y, yd, magnitude)
+        searched = self._search(t, y, yd)
         return (*searched, impulse) if searched is not None and self._stays(searched[0], y, magnitude) else None
 
     def _stays(self, found: Floats, y: Floats, magnitude: Floats) -> bool:
@@ -113,44 +112,21 @@ class Restart:
         jumps = np.abs(new - y) > ROUND_OFF * magnitude
         return np.where(jumps, new, y) if np.isfinite(new).all() else y
 
-    def _rates(self, magnitude: Floats) -> Floats:
-        """Magnitudes [unknowns] of rates: as met by the settler, and what those of the unknowns suggest."""
-        rates, known = self.settler.rates, self.settler.scale[magnitude.size :]
-        met = lib.reader(self.settler.core.contents.scale, self.settler._moves)[magnitude.size :]
-        quick = (known / self.settler.scale[rates]).max(initial=0.0)
-        found = magnitude * (quick or 1.0)
-        found[rates] = met
-        return np.asarray(found)
-
     def magnitude(self, number: int) -> Floats:
         """Magnitudes [number] of the first unknowns."""
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
-    def _search(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
+    def _search(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """The same by Gauss-Newton with shortened steps: first with the state held, then with everything free."""
-        if self._starter is None:
-            self._starter = Starter(self.settler.system.another("3"))
-        starter = self._starter
-        guess = np.concatenate([y, yd[starter.rates]])
-        rate = self._rates(magnitude)[starter.rates]
-        follows = np.concatenate([~self.state, np.ones(starter.rates.size, dtype=bool)])
-        # a multiplier that is zero because its constraint does not hold stays zero
-        still = np.append(np.zeros(y.size, dtype=bool), np.isin(starter.rates, starter.system.idle_multipliers()))
-        guess[still] = 0.0
-        for free in (follows & ~still, ~still):
-            problem = Problem(
-                residual=lambda z: starter.residual(t, z),
-                jacobian=lambda z: starter.jacobian(t, z),
-                rows=starter.rows,
-                columns=starter.columns,
-                number=starter.settled.rows,
-                use=~starter.groups("initial"),
-                free=free,
-                guess=guess,
-                scale=np.concatenate([magnitude, rate]),
-                weight=np.where(follows, 1e-6, 1.0),
-            )
-            best = solve(problem, guess)
+        starter = Starter(self.settler.system.another("3"))
+        guess = starter.unknowns(t, y, yd)
+        # a rate of a multiplier that is zero because its constraint does not hold stays zero
+        idle, state = np.zeros((2, guess.size), dtype=bool)
+        idle[starter.n : starter.first] = np.isin(starter.rates, starter.system.idle_multipliers())
+        guess[idle], state[: y.size] = 0.0, self.state
+        for held in (state, np.zeros_like(state)):
+            rows, free = starter.every & ~starter.groups("initial"), ~(idle | held)
+            best = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
             if best.residual < EXACT:
                 return starter.expand(best.x)
         return None

@@ -17,12 +17,10 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
     FOLDS,
     OutOfTimeError,
-    Problem,
     Solution,
     Work,
     in_order,
@@ -30,14 +28,11 @@ from sysdyn.runtime.numerics.least_change import (
     solve,
 )
 from sysdyn.runtime.numerics.points import distinct
-from sysdyn.runtime.numerics.rank import rank
-from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of, row_scale
+from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of
 from sysdyn.values import dataclass
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
-UNPERTURBED = 2
-"""Trials of a stage that begin at the guess itself: the restricted problem, the whole one."""
 _FEW = 3
 """Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
 STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
@@ -72,7 +67,7 @@ class ConsistentState:
     """y, yd [unknowns as written] at t; residual: largest scaled row.
 
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
-    found it (PERTURBED_STAGE); "" of a state that was not sought from guesses.
+    found it; "" of a state that was not sought from guesses.
     """
 
     t: float
@@ -89,6 +84,12 @@ class ConsistentState:
         return y, yd
 
 
+def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Solution | None:
+    """The point nearest to the guess on these rows, from x in these unknowns; None where they do not hold."""
+    found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
+    return found if found.residual < EXACT else None
+
+
 def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
     written = starter.guessed & ~starter.unsaid
@@ -97,59 +98,35 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     free = free & (np.arange(free.size) < starter.n)
     # an expression gives its own unknown where the others are guessed by numbers: of several roots that one is meant
     own = free & ~starter.written
-    given = False
-    if own.any():
-        found = solve(problem_of(starter, t, guess, guess, rows=written, free=own), guess)
-        given = found.residual < EXACT
-        guess = found.x if given else guess
+    given = _onto(starter, t, guess, guess, rows=written, free=own) if own.any() else None
+    guess = guess if given is None else given.x
     rows = written | starter.groups("phi", "psi")
     found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-    if found.residual < EXACT or (np.isfinite(found.residual) and not given):
+    if found.residual < EXACT or (np.isfinite(found.residual) and given is None):
         guess = found.x
     # of a flow that an expression guesses, the momentum is guessed with it
     momenta = free & starter.moves(("p",)) & ~starter.written
-    found = solve(problem_of(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta), guess)
-    return found.x if found.residual < EXACT else guess
+    moved = _onto(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta)
+    return guess if moved is None else moved.x
 
 
-def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Floats, bool]:
-    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held; whether
-    Newton's iteration from the guess was enough.
+def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
+    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held.
 
     What follows from the state moves alone where that is enough.
     """
-    plain = True
     for groups, moving in STAGES:
         rows, may = starter.groups(*groups), free & starter.moves(moving)
         for use in (rows | starter.between(moving), rows):
             if not use.any() or not may.any():
                 continue
             problem = problem_of(starter, t, x, guess, rows=use, free=may)
-            gentle = problem.within(may & starter.following(t, x))
-            trials = enumerate(_trials(gentle, problem, x))
-            k, found = next(((k, s) for k, s in trials if s.residual < EXACT), (0, None))
-            if found is not None:
+            found = solve(problem.within(may & starter.following(t, x)), x, _FEW)
+            found = found if found.residual < EXACT else solve(problem, x)
+            if found.residual < EXACT:
                 x = starter.without_noise(found.x, problem.scale)
-                plain = plain and k < UNPERTURBED
                 break
-    return x, plain
-
-
-def _trials(gentle: Problem, problem: Problem, x: Floats) -> Iterator[Solution]:
-    """From x in the unknowns of the gentle problem, then in all, then from points around."""
-    yield solve(gentle, x, _FEW)
-    yield solve(problem, x)
-    for z in _shaken(x, problem.free, problem.scale):
-        if problem.work.done:
-            return
-        yield solve(problem, z)
-
-
-def _shaken(x: Floats, free: Mask, scale: Floats) -> Iterator[Floats]:
-    """Points around x, always the same: where a guess lies on a singular point."""
-    random = np.random.default_rng(20)
-    for amplitude in _AMPLITUDES:
-        yield x + np.where(free, amplitude * scale * random.standard_normal(x.size), 0.0)
+    return x
 
 
 def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -186,7 +163,7 @@ def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) 
 
 def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
     """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution."""
-    size = row_scale(starter, t, magnitudes, starter.scale(t, magnitudes))[starter.every]
+    size = starter.row_scale(t, magnitudes, starter.scale(t, magnitudes))[starter.every]
     return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
 
 
@@ -215,21 +192,6 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     problem = problem_of(starter, t, x, guess, rows=rows, free=may)
     found = solve(problem, x)
     return starter.without_noise(found.x, problem.scale) if found.residual < EXACT else x
-
-
-def _as_written(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """X on the rows as written and on such derivatives as are linear: far from a solution the derivative of an
-    exponential hides what itself is after.
-    """
-    rows = starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
-    for _ in range(_RESCALINGS):
-        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
-        if not np.isfinite(found.residual) or (found.x == x).all():
-            break
-        x = found.x
-    # what round-off left is no magnitude; rates follow from the rest by linear rows
-    x = starter.without_noise(x, starter.scale(t, x))
-    return np.where(starter.moves(("rate",)), guess, x)
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -306,13 +268,12 @@ def _nearer(
     said, unsaid = change(x)
     for stays in (BACK * np.maximum(size, largest), NOISE * size):
         near = np.where(np.abs(aim - guess) > stays, aim, guess)
-        for held in (state, state & (near == guess)):
-            found = solve(problem.within(free & ~held), np.where(held, near, x))
-            clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
-            now = (np.inf, np.inf) if clean is None else change(clean)
-            less = now[0] < (1.0 - NOISE) * said or (now[0] <= (1.0 + BACK) * said and now[1] <= EVEN * unsaid)
-            if clean is not None and less:
-                return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
+        found = solve(problem.within(free & ~state), np.where(state, near, x))
+        clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
+        now = (np.inf, np.inf) if clean is None else change(clean)
+        less = now[0] < (1.0 - NOISE) * said or (now[0] <= (1.0 + BACK) * said and now[1] <= EVEN * unsaid)
+        if clean is not None and less:
+            return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
     return None, 0.0
 
 
@@ -335,19 +296,31 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
 
 
 def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """Down steep laws on the rows as written, with a share of work of its own; then everything at once."""
+    """Down steep laws on the rows as written and such derivatives as are linear, with a share of work of its own; then
+    everything at once.  Far from a solution the derivative of an exponential hides what itself is after.
+    """
     own, starter.work = starter.work, Work(WALKED, starter.work.until)
-    down = _as_written(starter, t, x, guess, free)
+    rows = starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
+    for _ in range(_RESCALINGS):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
+        if not np.isfinite(found.residual) or (found.x == x).all():
+            break
+        x = found.x
+    # what round-off left is no magnitude; rates follow from the rest by linear rows
+    x = starter.without_noise(x, starter.scale(t, x))
     starter.work = own
-    return _rescaled(starter, t, down, guess, free)
+    return _rescaled(starter, t, np.where(starter.moves(("rate",)), guess, x), guess, free)
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """Everything at once from seeded points around, as long as there is work left."""
-    best, holds = Solution(x, np.inf, np.zeros(0)), False
-    for shaken in _shaken(x, free, starter.scale(t, x)):
+    """Everything at once from points around, always the same, as long as there is work left: where a guess lies on a
+    singular point.
+    """
+    best, holds, random = Solution(x, np.inf, np.zeros(0)), False, np.random.default_rng(20)
+    for amplitude in _AMPLITUDES:
         if holds or starter.work.done:
             break
+        shaken = x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
         found, holds = _rescaled(starter, t, shaken, guess, free)
         best = found if holds or found.residual < best.residual else best
     return best, holds
@@ -369,21 +342,19 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("largest_scales", _in_largest_scales),
 )
 """Globalisation: what is tried, in this order, until all rows hold."""
-PERTURBED_STAGE = "perturbed_stage"
-"""The first of them, from a stage that was itself found from a point around its guess."""
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
     """The first strategy that holds from the staged state, and its name; the least residual and "" where none does."""
     starter.plain = True
-    x, plain = _stages(starter, t, guess.copy(), guess, free)
+    x = _stages(starter, t, guess.copy(), guess, free)
     x = _beside_gammas(starter, t, x, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
         starter.plain = name == "newton"
         found, holds = strategy(starter, t, x, guess, free)
         if holds:
-            return found, name if plain or name != "newton" else PERTURBED_STAGE
+            return found, name
         # what follows alone is no point to explain a failure at
         best = found if name == "all_unknowns" or found.residual < best.residual else best
     return best, ""
@@ -425,7 +396,7 @@ def _missed(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[tu
     if not rows.any():
         return
     misses = starter.settled.residual(t, *starter.expand(x))
-    size = row_scale(starter, t, x, scale)
+    size = starter.row_scale(t, x, scale)
     values = starter.jacobian(t, x)
     for row in np.flatnonzero(rows & (np.abs(misses) * size > 1e-9))[:100]:
         mine = (starter.rows == row) & (starter.columns < starter.n) & (values != 0.0)
@@ -451,7 +422,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     if x.size <= DENSE:
         problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
         x = least_residual(problem, x)
-        scaled = np.abs(starter.residual(t, x)) * row_scale(starter, t, x, problem.scale)
+        scaled = np.abs(starter.residual(t, x)) * starter.row_scale(t, x, problem.scale)
     raw, scaled = (np.where(starter.every, item, 0.0) for item in (np.abs(starter.residual(t, x)), scaled))
     order = np.argsort(-scaled)
     worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]
@@ -464,35 +435,13 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         scale = starter.scale(t, freed.x)
         change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
-        candidates = tuple(dict.fromkeys(starter.given.label[k] for k in places))
+        candidates = tuple(dict.fromkeys(starter.given.label(k) for k in places))
     kind = "fixed"
     if not candidates:
         kind = "gamma" if rows and rows[0].kind.startswith("gamma") else "stuck"
         if contradict and rows and rows[0].kind.startswith(("phi", "psi", "initial")):
             kind = "fixed"
     return InconsistentStart(kind, float((scaled if kind == "stuck" else raw)[order[0]]), rows, candidates)
-
-
-def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...]]:
-    """How many more fixed values a state as found would take, and the names of the free unknowns among which (of small
-    models; else unknown: 0).
-    """
-    starter = Starter(system, remember=True)
-    x, t = np.concatenate([state.y, state.yd[starter.rates]]), state.t
-    if x.size > 400:
-        return 0, ()
-    free = np.append(~starter.given.fixed, np.ones(x.size - starter.n, dtype=bool))
-    scale = starter.scale(t, x)
-    full = np.zeros((starter.settled.rows, x.size))
-    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(t, x) * scale[starter.columns])
-    (full,) = equilibrated(full[starter.every])
-    carries = ~starter.following(t, x) & free
-    follows = free & ~carries
-    if not carries.any():
-        return 0, ()
-    missing = int(carries.sum()) - (rank(full[:, free]) - rank(full[:, follows]))
-    names = tuple(starter.system.name(int(k)) for k in np.flatnonzero(carries)) if missing > 0 else ()
-    return missing, names
 
 
 def consistent_start(
@@ -512,12 +461,12 @@ def consistent_start(
 def _consistent(system: System, t0: float, near: ConsistentState | None, until: float | None) -> ConsistentState:
     """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
-    starter = Starter(system, measuring=True, remember=True)
+    starter = Starter(system)
     starter.work = Work(until=until)
     guess = np.concatenate([starter.given.guess, np.zeros(starter.equations.unknowns - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
-        guess[: starter.n] = np.where(system.are(*STATE, "e")[: starter.n], near.y, guess[: starter.n])
-        guess[starter.first :] = starter.residual(t0, guess)[starter.missed]
+        y = np.where(system.are(*STATE, "e")[: starter.n], near.y, starter.given.guess)
+        guess = starter.unknowns(t0, y, np.zeros(starter.n))
     free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
     guess = _guess(starter, t0, guess, free)
     best, strategy = _attempt(starter, t0, guess, free)
@@ -525,9 +474,6 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
         raise _explain(starter, t0, guess, free, best)
     starter.work = Work(EXPLAINED, until)
     best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
-    again = not starter.missed.size and not starter.summed and best.x.size <= DENSE  # of a large one the room counts
-    system.starter = starter if again else None
-    starter.work.until = None  # a restart is limited by the clock of its run
     y, yd = starter.expand(best.x)
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     if best.x.size > LARGE:

@@ -11,19 +11,18 @@ from __future__ import annotations
 
 import ctypes as c
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats, Initial, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_unknown
-from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import group_maximum, largest_of_group
-from sysdyn.runtime.model.system import KEPT, LARGE, System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.equations import Equations
@@ -34,54 +33,40 @@ Places = NDArray[np.integer]
 STATE = ("q", "f", "p", "s")
 WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
+EQUATIONS = "equations of the start"
 
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """The initial values on y: guess [unknowns], fixed and written masks, label of each written one."""
+    """Initial values on y: guess [unknowns], fixed and written masks; said: statements and where, fixed ones last."""
 
     guess: Floats
     fixed: Mask
     written: Mask
-    label: Mapping[int, RowLabel]
+    said: Sequence[tuple[Initial, Ints]]
+
+    def label(self, place: int) -> RowLabel:
+        """Of the statement that counts."""
+        return next(item.label for item, own in reversed(self.said) if place in own)
 
 
 def _given(system: System) -> _Given:
-    """The initial values of a text; where no two are of one unknown the run before left all but the numbers."""
-    initial, layouts, key = system.description.initial, system.description.layouts, ("given", system.form.name)
-    if key not in layouts or any(i.positions is not p for i, (p, _) in zip(initial, layouts[key][0], strict=False)):
-        found = _stated(system)
-        places = [(item.positions, system.form.at[item.family] + item.positions) for item in initial]
-        number = sum(own.size for _, own in places)
-        if number == np.count_nonzero(found.written) and number <= KEPT:
-            layouts[key] = places, found
-        return found
-    places, same = layouts[key]
-    guess = np.zeros(same.guess.size)
-    for item, (_, own) in zip(initial, places, strict=True):
-        guess[own] = item.values
-    return _Given(guess, same.fixed, same.written, same.label)
-
-
-def _stated(system: System) -> _Given:
-    n = system.form.written
-    guess, fixed, written = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    label: dict[int, RowLabel] = {}
-    for item in sorted(system.description.initial, key=lambda item: item.fixed):
-        places = system.form.at[item.family] + item.positions
-        known = np.where(fixed[places], guess[places], item.values)
-        guess[places] = item.values
-        for held in (known, guess[places]) if item.fixed else ():  # said before, and twice by the statement itself
-            apart = np.abs(held - item.values)
-            wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(held), np.abs(item.values)))
-            if wrong.size:
-                place = int(places[wrong[0]])
-                labels = (label.get(place, item.label), item.label)
-                raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (system.name(place),))
-        fixed[places] |= item.fixed
-        written[places] = True
-        label.update(dict.fromkeys(places.tolist(), item.label))
-    return _Given(guess, read_only(fixed), read_only(written), label)
+    """The initial values of a text.  InconsistentStart where two fixed ones differ."""
+    n, stated = system.form.written, sorted(system.description.initial, key=lambda item: item.fixed)
+    said = [(item, system.form.at[item.family] + item.positions) for item in stated]
+    found = _Given(np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), said)
+    for item, own in said:
+        found.guess[own] = item.values
+        found.fixed[own] |= item.fixed
+        found.written[own] = True
+    for item, own in ((item, own) for item, own in said if item.fixed):
+        apart = np.abs(found.guess[own] - item.values)
+        wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(found.guess[own]), np.abs(item.values)))
+        if wrong.size:
+            place = int(own[wrong[0]])
+            labels = item.label, found.label(place)
+            raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (system.name(place),))
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,41 +88,37 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        if not self.remember:
-            return ask(self, t, x)
-        here, known = self.point(t, x), self.known.get(name)
-        if known is not None and known[0] is here:
-            return known[1].copy()
-        found, large = ask(self, t, x), x.size > LARGE
-        if large and any(point is not here for point, _ in self.known.values()):
-            self.known.clear()  # the room counts: one point, and nothing longer
-        if large and found.size > x.size:
-            return found
-        self.known[name] = here, found
-        return found.copy()
+        here = t, x.tobytes()
+        if here != self.here:
+            self.here = here
+            self.known.clear()
+        if name not in self.known:
+            found = ask(self, t, x)
+            if x.size > LARGE and found.size > x.size:  # the room counts
+                return found
+            self.known[name] = found
+        return self.known[name].copy()
 
     return answer
 
 
 class Starter:
-    """The equations of the start of one model (t0 apart).
+    """The equations of the start of one model (t0 apart), for one search: nothing but t and x changes.
 
-    measuring: where contents of stores are guessed, guessed expressions hold but for an unknown of their own each,
-    behind those of y and its rates; sums of balances without inertia have their rates.
+    Where contents of stores are guessed, guessed expressions hold but for an unknown of their own each, behind those of
+    y and its rates; sums of balances without inertia have their rates.
     """
 
-    def __init__(self, system: System, *, measuring: bool = False, remember: bool = False) -> None:
+    def __init__(self, system: System) -> None:
         self.system = system
-        self.remember = remember  # one search for a start: nothing but t and x changes
-        self.known: dict[str, tuple[tuple[float, bytes], NDArray[Any]]] = {}
+        self.here, self.known = (0.0, b""), dict[str, NDArray[Any]]()
         self.work = Work()  # of one search for a start
         self.plain = True  # small problems are searched in the core, which has one way of least change
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         self.given = _given(system)
-        key = "equations of the start", measuring
-        self.equations = known = system.once(key, lambda: Equations(system, settled, measuring))
-        self.core = settled.own(key, lambda: known.core(system, settled))
+        self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
+        self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
         self.n, self.first = known.n, known.first
         self.rates, self.missed = known.rates, known.missed
         self.guessed, self.unsaid = known.guessed, known.unsaid
@@ -154,15 +135,10 @@ class Starter:
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
 
-    def point(self, t: float, x: Floats) -> tuple[float, bytes]:
-        """The point (t, x): one object for all answers there."""
-        asked = t, x.tobytes()
-        return next((here for here, _ in self.known.values() if here == asked), asked)
-
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
         self.settled.forget()
-        self.system.forget_once(("equations of the start", True))
+        self.system.forget_once(EQUATIONS)
 
     def _summed_rows(self, sums: _Sums) -> None:
         """The entries of sums of rows behind the others."""
@@ -186,13 +162,6 @@ class Starter:
         return np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
 
     @functools.cached_property
-    def _of_missed(self) -> Mask:
-        """Entries that stand in rows which may miss something [entries]."""
-        missed = np.zeros(self.settled.rows, dtype=bool)
-        missed[self.missed] = True
-        return np.asarray(missed[self.rows])
-
-    @functools.cached_property
     def idle(self) -> Mask:
         """Displacements that stand in constraints alone and move without inertia: they hold nothing."""
         form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
@@ -211,13 +180,17 @@ class Starter:
         yd[form.k_q] = y[form.k_f]
         return y, yd
 
+    def unknowns(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """X of y, yd, the inverse of `expand`: guessed expressions miss what they do there."""
+        x = np.concatenate([y, yd[self.rates], np.zeros(self.missed.size)])
+        x[self.first :] = self.residual(t, x)[self.missed]
+        return x
+
     def residual(self, t: float, x: Floats) -> Floats:
         """All rows [rows]."""
         rows = np.zeros(self.settled.rows)
         self._ask(lib.core.sd_start_residual, t, x, rows)
-        if self._sums is not None:
-            rows[self._sums.rows] = self._sums.weights @ rows[self._sums.of]
-        return rows
+        return self.with_sums(rows)
 
     def _ask(self, function: Any, t: float, x: Floats, answer: Floats) -> None:
         """What the core says of the rows at x."""
@@ -237,19 +210,11 @@ class Starter:
         values[self._sums.entries] = 0.0
         return np.concatenate([values, summed.ravel()])
 
-    def sizes(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """Size of the terms of each row [rows], by the larger of magnitudes and values."""
-        size = np.zeros(self.settled.rows)
-        if self._sums is not None:
-            values = np.abs(self.jacobian(t, x))
-            np.add.at(size, self.rows, values * np.maximum(scale, np.abs(x))[self.columns])
-            return size
-        x, scale = (np.ascontiguousarray(item, dtype=np.float64) for item in (x, scale))
-        numbers = lib.pointer(x), lib.pointer(scale), lib.pointer(size)
-        if lib.core.sd_start_sizes(c.addressof(self.core), t, *numbers):
-            raise MemoryError
-        self.settled.failure.check()
-        return size
+    def row_scale(self, t: float, x: Floats, scale: Floats) -> Floats:
+        """One over the size of the terms of each row [rows], by the larger of magnitudes and values."""
+        terms = np.abs(self.jacobian(t, x)) * np.maximum(scale, np.abs(x))[self.columns]
+        size = np.bincount(self.rows, weights=terms, minlength=self.settled.rows)
+        return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
 
     def with_sums(self, values: Floats) -> Floats:
         """Values of all rows [rows, k] with the sums of rows in their places."""
@@ -274,19 +239,8 @@ class Starter:
 
     def between(self, kinds: Sequence[str]) -> Mask:
         """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
-        if self._sums is not None:
-            return self._between(kinds)
-        kept, key = self.equations.held_between, tuple(kinds)
-        if key not in kept:
-            kept[key] = read_only(self._between(kinds))
-        return kept[key]
-
-    def _between(self, kinds: Sequence[str]) -> Mask:
-        outside = ~self.moves(kinds)
         mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
-        if not mask.any():
-            return np.asarray(mask)
-        mask[self.rows[self._structural & outside[self.columns]]] = False
+        mask[self.rows[self._structural & ~self.moves(kinds)[self.columns]]] = False
         return mask
 
     def _floating(self, unsettled: Places) -> _Sums | None:
@@ -328,7 +282,7 @@ class Starter:
         balances are shared, by magnitudes.
         """
         if not self.balanced:
-            return self.weights_by(t, x, scale)
+            return self.weights(t, x, scale)
         families, rows = self.system.description.families, self.system.description.rows
         effort = {rows[k].owner: rows[k].unit for group, k, _ in self.system.form.groups if group == "dynamics"}
         units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
@@ -341,8 +295,7 @@ class Starter:
         _, unit = np.unique(names, return_inverse=True)
         largest = np.zeros(int(unit.max()) + 1)
         np.maximum.at(largest, unit, content * scale)
-        guessed = np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
-        return np.asarray(guessed * content * scale / largest[unit])
+        return np.asarray(self.weight * content * scale / largest[unit])
 
     @remembered
     def following(self, t: float, x: Floats) -> Mask:
@@ -366,15 +319,10 @@ class Starter:
         found[self.first :] = False
         return found
 
-    @remembered
-    def weights(self, t: float, x: Floats) -> Floats:
+    def weights(self, t: float, x: Floats, scale: Floats) -> Floats:
         """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
         values.
         """
-        return self.weights_by(t, x, self.scale(t, x))
-
-    def weights_by(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """The same where magnitudes are others."""
         weight = np.where(self.following(t, x), WEIGHT["following"], self.weight)
         weight[: self.n] *= scale[: self.n] / group_maximum(self.system, scale[: self.n])
         return weight
@@ -404,17 +352,11 @@ class Starter:
     def _scale(self, t: float, x: Floats, *, largest: bool) -> Floats:
         known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
+        values, free = self.jacobian(t, x), self.residual(t, x)
+        told = np.where(np.isin(self.rows, self.missed) & np.isfinite(values), values, 0.0) if self.missed.size else 0.0
+        sized = values - told
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
-        if self._sums is None and not self.missed.size:
-            point = t, lib.pointer(x), LARGEST * largest, lib.pointer(found)
-            if lib.core.sd_start_scale(c.addressof(self.core), lib.pointer(nominal), *tables, *point):
-                raise MemoryError
-            self.settled.failure.check()
-            return found
-        values, free = self.jacobian(t, x), self.residual(t, x)
-        told = np.where(self._of_missed, values, 0.0)
-        sized = values - np.where(np.isfinite(told), told, 0.0)
         sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
         if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
@@ -422,7 +364,7 @@ class Starter:
 
     def _of_one_unit(self, told: Floats, found: Floats) -> Floats:
         """Magnitudes with those of what guesses miss: guesses of one unit are measured alike."""
-        family, told = self.equations.family, np.where(np.isfinite(told), told, 0.0)
+        family = self.equations.family
         size, most = np.zeros(self.settled.rows), np.zeros(int(family.max(initial=0)) + 1)
         text = self.columns < self.first
         np.add.at(size, self.rows[text], (told * found[self.columns])[text])
@@ -432,16 +374,9 @@ class Starter:
 
 
 def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
-    """The equations `rows` in the unknowns `free`, the others as in x."""
+    """The equations `rows` in the unknowns `free`, the others as in x; magnitudes and weights are those of x."""
     scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
-    weight = starter.weights_by(t, x, scale) if starter.generous else starter.weights(t, x)
-    return weighted(starter, t, guess, rows=rows, free=free, scale=scale, weight=weight)
-
-
-def weighted(
-    starter: Starter, t: float, guess: Floats, *, rows: Mask, free: Mask, scale: Floats, weight: Floats
-) -> Problem:
-    """The equations `rows` in the unknowns `free`, which move from the guess by scale and weight [unknowns]."""
+    weight = starter.weights(t, x, scale)
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),
@@ -458,8 +393,3 @@ def weighted(
         check=starter.settled.failure.check,
     )
 
-
-def row_scale(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
-    """One over the size of the terms of each row [rows]."""
-    size = starter.sizes(t, x, scale)
-    return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)

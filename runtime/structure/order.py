@@ -1,4 +1,4 @@
-"""How many initial values a model takes (language, section 5, Counting).
+"""How many initial values a model takes, and how many more than the text fixes (language, section 5, Counting).
 
 The consistent states near a point form a manifold; its tangent space is the null space of all rows and their hidden
 derivatives.  `manifold` is its dimension in the differential unknowns; `order` that of its projection onto contents:
@@ -15,7 +15,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
 from sysdyn.runtime.numerics.rank import TOLERANCE, decomposed, null_space
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.start.starter import Starter
+from sysdyn.runtime.start.starter import Mask, Starter
 
 DENSE = 600
 """Unknowns and rates up to which the null space is taken."""
@@ -27,13 +27,9 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     system: the form as written; tangible: coordinates whose displacement something depends on.
     """
     starter = Starter(system)
-    x = np.concatenate([state.y, state.yd[starter.rates]])
-    if x.size > DENSE:
+    tangent = _tangent(starter, state, starter.every & ~starter.groups("initial"))
+    if tangent is None:
         return None
-    full = np.zeros((starter.settled.rows, x.size))
-    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
-    (full,) = equilibrated(full[starter.every & ~starter.groups("initial")])
-    tangent = null_space(full)  # [unknowns and rates, freedoms]
     kinds = system.kinds[: starter.n]
     _, jyd = system.jacobian(state.t, state.y, state.yd)
     moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd)[: starter.n])
@@ -41,6 +37,39 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: starter.n]], dtype=bool)
     content = moving & ((kinds != "q") | owners)
     return _rank(tangent[: starter.n][content]), _rank(tangent[: starter.n][moving])
+
+
+def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...]]:
+    """How many more fixed values a state as found would take, and the names of the free unknowns among which (of models
+    too large unknown: 0).
+    """
+    starter = Starter(system)
+    tangent = _tangent(starter, state, starter.every, starter.given.fixed)
+    if tangent is None:
+        return 0, ()
+    follows = starter.following(state.t, starter.unknowns(state.t, state.y, state.yd))
+    carries = np.flatnonzero(~follows[: starter.n] & ~starter.given.fixed)
+    missing = _rank(tangent[carries])
+    return missing, tuple(system.name(int(k)) for k in carries) if missing else ()
+
+
+def _tangent(starter: Starter, state: ConsistentState, rows: Mask, held: Mask | None = None) -> Floats | None:
+    """Orthonormal directions [unknowns and rates, freedoms] that the rows leave open, without the held unknowns of y;
+    None of models too large.
+    """
+    x = starter.unknowns(state.t, state.y, state.yd)
+    if x.size > DENSE:
+        return None
+    free = np.ones(x.size, dtype=bool)
+    if held is not None:
+        free[: starter.n] = ~held
+    full = np.zeros((starter.settled.rows, x.size))
+    np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
+    (full,) = equilibrated(full[rows][:, free])
+    null = null_space(full)
+    tangent = np.zeros((x.size, null.shape[1]))
+    tangent[free] = null
+    return tangent
 
 
 def _rank(part: Floats) -> int:

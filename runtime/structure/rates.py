@@ -15,73 +15,41 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import TOLERANCE, null_space
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
+from sysdyn.runtime.numerics.tall import left_open
+from sysdyn.runtime.start.settled import OPEN
 from sysdyn.runtime.start.start import ConsistentState
 
-LARGE = 400
-"""Unknowns coupled by their derivatives: of more all count as determined, the null space would cost too much."""
 MOVED = 1e-3
 """Relative move of the start: a coefficient that vanishes there by chance does not vanish beside it."""
 
 
 def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
-    """[unknowns]: derivatives that F = 0 determines: none moves along the null space of dF/dyd."""
-    there = jyd != 0.0
-    found, left = system.once_if_small(("known rates", there.tobytes()), lambda: _single(system, there))
-    if left.any():
-        return _coupled(system, jyd, found.copy(), left)
-    return found
-
-
-def _single(system: System, there: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """[unknowns]: derivatives that occur; [entries that are there]: those that no row with but one left determines."""
-    row, column = system.pattern.row[there], system.pattern.columns_of()[there]
-    found, left = np.zeros(system.unknowns, dtype=bool), np.ones(row.size, dtype=bool)
+    """[unknowns]: derivatives that F = 0 determines: none moves along what dF/dyd leaves open; of matrices for which
+    that would cost too much all that occur.
+    """
+    there, found = jyd != 0.0, np.zeros(system.unknowns, dtype=bool)
+    row, column, value = system.pattern.row[there], system.pattern.columns_of()[there], jyd[there]
     found[column] = True
-    while left.any():  # a row with but one derivative determines it
-        single = np.bincount(row[left], minlength=system.rows) == 1
-        known = np.zeros(system.unknowns, dtype=bool)
-        known[column[left & single[row]]] = True
-        if not known.any():
-            break
-        left &= ~known[column]
-    return read_only(found), left
-
-
-def _coupled(
-    system: System, jyd: Floats, found: NDArray[np.bool_], left: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """`found` without the rates that move along the null space of the rows left."""
-    row, column = system.pattern.row[jyd != 0.0], system.pattern.columns_of()[jyd != 0.0]
-    columns, at = np.unique(column[left], return_inverse=True)
-    if not 0 < columns.size <= LARGE:
+    if (np.bincount(row, minlength=1) <= 1).all():  # each determines its own
         return found
-    rows, where = np.unique(row[left], return_inverse=True)
-    matrix = np.zeros((rows.size, columns.size))
-    matrix[where, at] = jyd[jyd != 0.0][left]
-    by_row, by_column = factors(matrix)
-    null = null_space(by_row[:, None] * matrix * by_column) * by_column[:, None]
-    moves = np.abs(null) > np.sqrt(TOLERANCE) * np.max(np.abs(null), initial=0.0)
-    found[columns[np.any(moves, axis=1)]] = False
-    return found
-
-
-def _inert(system: System) -> NDArray[np.bool_]:
-    """Flows of coordinates with a momentum of their own [unknowns]."""
-    found = np.zeros(system.unknowns, dtype=bool)
-    for _, flows in with_flows(system):
-        found[flows] = True
-    return read_only(found)
+    shape = system.rows, system.unknowns
+    by_row, by_column = sparse_factors(row, column, np.abs(value), shape)
+    free = left_open(shape, (row, column, by_row[row] * value * by_column[column]))
+    return found if free is None else found & (np.abs(free) <= OPEN)
 
 
 def _read(system: System) -> NDArray[np.bool_]:
-    """Unknowns whose rates block observe_rate reads, as far as it is told [unknowns]."""
-    kernels = system.description.blocks.get("observe_rate", ())
-    if any(kernel.rates is None for kernel in kernels):
-        return read_only(np.ones(system.unknowns, dtype=bool))
-    families = frozenset[int]().union(*(kernel.rates for kernel in kernels if kernel.rates is not None))
-    return read_only(np.isin(system.family_of, sorted(families)))
+    """Unknowns whose rates block observe_rate reads, as far as it is told [unknowns], but for flows of coordinates with
+    a momentum of their own.
+    """
+    kernels, found = system.description.blocks.get("observe_rate", ()), np.ones(system.unknowns, dtype=bool)
+    if all(kernel.rates is not None for kernel in kernels):
+        families = frozenset[int]().union(*(kernel.rates or () for kernel in kernels))
+        found = np.isin(system.family_of, sorted(families))
+    for _, flows in with_flows(system):
+        found[flows] = False
+    return read_only(found)
 
 
 def _nudges(number: int) -> list[tuple[Floats, Floats]]:
@@ -94,8 +62,8 @@ def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     """[observed]: elements of block observe whose derivative follows from the equations."""
     y, yd = start.for_form(system)
     _, jyd = system.jacobian(start.t, y, yd)
-    free = ~(unique(system, jyd) | system.once("inert", lambda: _inert(system)))
-    if not (free & system.once("rates observed", lambda: _read(system))).any():
+    free = system.once("rates observed", lambda: _read(system)) & ~unique(system, jyd)
+    if not free.any():
         return np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
     nudges = system.once_if_small("nudges", lambda: _nudges(y.size))
     found: NDArray[np.bool_] | None = None

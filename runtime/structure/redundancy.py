@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.least_change import solve
 from sysdyn.runtime.numerics.points import normal
 from sysdyn.runtime.numerics.rank import TOLERANCE, least_squares
 from sysdyn.runtime.start.start import EXACT, ConsistentState
-from sysdyn.runtime.start.starter import Starter, weighted
+from sysdyn.runtime.start.starter import Starter, problem_of
 from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
@@ -168,30 +169,27 @@ def _left(found: Reactions) -> int:
     return left
 
 
-def _around(system: System, state: ConsistentState) -> tuple[Starter, Floats, Floats]:
-    """What starts at a state are sought in, the state there, and how large its displacements are, 0 for all else."""
-    starter = system.starter or Starter(system, remember=True)
-    x = np.concatenate([state.y, state.yd[starter.rates]])
-    return starter, x, np.where(starter.moves(("q",))[: x.size], starter.scale(state.t, x), 0.0)
+def _moves(system: System, state: ConsistentState) -> tuple[Floats, Floats]:
+    """How large displacements are [unknowns as written], 0 for all else; seeded moves of them [POINTS, unknowns]."""
+    size = balanced(system, state.y, system.jacobian(state.t, state.y, state.yd)[0]) * system.are("q")
+    return size, size * system.once_if_small(("directions", size.size), lambda: normal(POINTS, size.size))
 
 
 def nearby(system: System, state: ConsistentState) -> list[Floats]:
     """Y at up to POINTS seeded points near the state, displacements consistent with phi."""
-    starter, x, size = _around(system, state)
-    q, rows = starter.moves(("q",))[: x.size], starter.groups("phi")
-    found = []
-    for direction in _directions(system, POINTS, 2 * system.form.written)[:, : x.size]:
+    starter, found = Starter(system), []
+    x = starter.unknowns(state.t, state.y, state.yd)
+    size, moves = _moves(system, state)
+    for move in moves:
         for amplitude in AMPLITUDES:
-            shaken = x + amplitude * size * direction
-            if rows.any() and q.any():
-                scale, weight = starter.scale(state.t, shaken), np.ones(shaken.size)
-                problem = weighted(starter, state.t, shaken, rows=rows, free=q, scale=scale, weight=weight)
-                solution = solve(problem, shaken)
-                if not solution.residual < EXACT or np.any(np.abs(solution.x - x) > NEAR * amplitude * size):
-                    continue
-                shaken = solution.x
-            found.append(starter.expand(shaken)[0])
-            break
+            shaken = x + amplitude * np.append(move, np.zeros(x.size - move.size))
+            taken = {"rows": starter.groups("phi"), "free": starter.moves(("q",))}
+            problem = problem_of(starter, state.t, shaken, shaken, **taken)
+            there = solve(problem, shaken)
+            near = np.abs(there.x - x)[: size.size] <= NEAR * amplitude * size
+            if there.residual < EXACT and near.all():
+                found.append(there.x[: starter.n])
+                break
     return found
 
 
@@ -200,38 +198,19 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     configuration is singular.  Beside: at seeded points that are not brought back onto phi, where a row that can be
     zero on phi alone (a circle of radius 0) has its size.
     """
-    y, yd = state.for_form(system)
     reacting = _reacting(system)
     entry, which, number = reacting.entry, reacting.which, reacting.multipliers.size
     if not number:
         return NONE
-
-    def sizes(points: Floats) -> Floats:
-        """The largest entry of each row of J, as written, at points [k, unknowns]: [k, number]."""
-        found = np.zeros((len(points), number))
-        a, b = np.zeros((len(points), system.form.extended)), system._buffer(yd)
-        a[:, : points.shape[1]] = points
-        places = entry.size, lib.pointer(entry), lib.pointer(which), number, lib.pointer(found)
-        at = state.t, *a.shape, lib.pointer(a), lib.pointer(b)
-        if lib.core.sd_row_sizes(c.byref(system.core), *at, *places):
-            raise MemoryError
-        system.failure.check()
-        return found
-
-    anywhere = y + np.maximum(np.abs(y), 1.0) * _directions(system, 1, y.size)[0]
-    here, elsewhere = sizes(np.stack([y, anywhere]))
-    straight = (here > 0.0) & (here == elsewhere)
-    if straight.all():  # rows of J that are the same everywhere vanish nowhere
-        return NONE
-    starter, x, size = _around(system, state)
-    shaken = (x + BESIDE * size * _directions(system, POINTS, 2 * system.form.written)[:, : x.size])[:, : starter.n]
-    there = sizes(shaken).min(axis=0, initial=np.inf)
-    return np.flatnonzero(here <= TOLERANCE * there).astype(np.int32)
-
-
-def _directions(system: System, number: int, size: int) -> Floats:
-    """Directions [number, size] without a pattern, always the same."""
-    return system.once_if_small(("directions", number, size), lambda: normal(number, size))
+    a, found = np.zeros((1 + POINTS, system.form.extended)), np.zeros((1 + POINTS, number))
+    a[:, : state.y.size] = state.y
+    a[1:, : state.y.size] += BESIDE * _moves(system, state)[1]
+    b, places = system._buffer(state.yd), (entry.size, lib.pointer(entry), lib.pointer(which), number)
+    at = state.t, *a.shape, lib.pointer(a), lib.pointer(b)
+    if lib.core.sd_row_sizes(c.byref(system.core), *at, *places, lib.pointer(found)):
+        raise MemoryError
+    system.failure.check()
+    return np.flatnonzero(found[0] <= TOLERANCE * found[1:].min(axis=0)).astype(np.int32)
 
 
 def combination(found: Reactions, left: Ints) -> Floats:

@@ -95,6 +95,14 @@ def test_reference_values_without_multipliers(tmp_path, model):
         assert error <= 1e-5, name
 
 
+def test_a_rolling_rod_is_no_singular_configuration(tmp_path):
+    """Its row of slip has the entry 1 everywhere, in momenta as in flows."""
+    path = tmp_path / "model.sd"
+    path.write_text(HELD)
+    ran, _ = simulated(tmp_path, path, "hamiltonian")
+    assert (ran.outcome.structure.rank, ran.outcome.structure.singular) == (2, 0)
+
+
 @pytest.mark.parametrize("text", [SKATES, DRIVEN], ids=["arrays", "rheonomic"])
 def test_reactions_on_request(tmp_path, text):
     path = tmp_path / "model.sd"

@@ -10,7 +10,7 @@ from reduced import ROOT
 from start_strategies import strategies
 from sysdyn.cli.options import EVERY
 from sysdyn.cli.run.starting import SOUGHT, sought
-from sysdyn.runtime.start.start import PERTURBED_STAGE, STRATEGIES
+from sysdyn.runtime.start.start import STRATEGIES
 from sysdyn.runtime.trace.trace import Trace
 
 GALLERY = ROOT / "models" / "gallery"
@@ -56,7 +56,7 @@ def test_nearly_all_starts_need_the_first_strategy_alone(pattern, formulations):
     found = [strategy for *_, strategy in strategies(pattern, formulations)]
     assert len(found) > 70
     assert found.count("newton") >= 0.95 * len(found)
-    assert set(found) <= {name for name, _ in STRATEGIES} | {PERTURBED_STAGE}
+    assert set(found) <= {name for name, _ in STRATEGIES}
 
 
 def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
@@ -65,7 +65,7 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     assert ran.started.state.strategy == "all_unknowns"
     assert sought(ran.started.state) == "the start was found with all unknowns at once (all_unknowns)"
     assert Trace.open(tmp_path / "trace.h5").attributes["start_strategy"] == "all_unknowns"
-    assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]} | {PERTURBED_STAGE}
+    assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]}
 
 
 HARD = {"scalar": (), "arrays": (52, 174, 233)}

@@ -4,7 +4,8 @@ import small_models as models
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import InconsistentStart
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.start import consistent_start, freedom
+from sysdyn.runtime.start.start import consistent_start
+from sysdyn.runtime.structure.order import freedom
 
 # rows 0 of /work/shared/seed/descriptor_values.json as printed in seed/README.md, section 5
 REFERENCES = {

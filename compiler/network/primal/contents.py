@@ -35,6 +35,7 @@ from sysdyn.dsl.model.expression import (
     scale,
     sub,
     substitute,
+    topological,
     var,
     variables,
 )
@@ -232,7 +233,7 @@ class Contents:
 
     def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
         """The loops that the target still follows."""
-        used = {n.data for a in target.args for n in _leaves(a) if n.op == "index"}
+        used = {n.data for n in topological(target.args) if n.op == "index"}
         return tuple(loop for loop in loops if loop.index in used)
 
     def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
@@ -284,10 +285,3 @@ def _own_indices(element: Element) -> tuple[tuple[Node, ...], overlaps.Ranges]:
 def meet(a: Box, b: Box) -> bool:
     """Whether boxes have elements in common."""
     return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))
-
-
-def _leaves(node: Node) -> Iterator[Node]:
-    if not node.args:
-        yield node
-    for a in node.args:
-        yield from _leaves(a)

@@ -58,36 +58,6 @@ int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, doub
     return 0;
 }
 
-int sd_start_scale(const sd_rows_of_start *s, const double *nominal, const int32_t *rated, const int32_t *member,
-                   int32_t members, double t, const double *x, int32_t flags, double *scale)
-{
-    size_t rows = (size_t)s->balance.rows;
-    double *r = malloc((rows + (size_t)s->balance.entries + 1) * sizeof *r);
-    if (!r)
-        return -2;
-    int failed = sd_start_residual(s, t, x, r) | sd_start_jacobian(s, t, x, r + rows);
-    if (!failed)
-        failed = sd_scale(&s->balance, nominal, s->written, rated, member, members, x, r + rows, r, flags, scale);
-    free(r);
-    return failed;
-}
-
-int sd_start_sizes(const sd_rows_of_start *s, double t, const double *x, const double *scale, double *size)
-{
-    const sd_balance *m = &s->balance;
-    double *values = malloc(((size_t)m->entries + 1) * sizeof *values);
-    if (!values)
-        return -2;
-    int failed = sd_start_jacobian(s, t, x, values);
-    memset(size, 0, (size_t)m->rows * sizeof *size);
-    for (int32_t e = 0; e < m->entries; e++) {
-        double of = fabs(x[m->column[e]]);
-        size[m->row[e]] += fabs(values[e]) * (scale[m->column[e]] >= of || isnan(scale[m->column[e]]) ? scale[m->column[e]] : of);
-    }
-    free(values);
-    return failed;
-}
-
 /* What one iteration needs; the arrays of one block of memory. */
 typedef struct {
     int32_t rows, unknowns;                       /* in use, free */

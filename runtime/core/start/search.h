@@ -27,13 +27,6 @@ typedef struct sd_rows_of_start {
 int sd_start_residual(const sd_rows_of_start *start, double t, const double *x, double *r);
 int sd_start_jacobian(const sd_rows_of_start *start, double t, const double *x, double *values);
 
-/* scale [unknowns]: as sd_scale, at x; -2: no memory */
-int sd_start_scale(const sd_rows_of_start *start, const double *nominal, const int32_t *rated, const int32_t *member,
-                   int32_t members, double t, const double *x, int32_t flags, double *scale);
-
-/* size [rows] := sum of |slope| times the larger of scale and |x| over the entries of each row; -2: no memory */
-int sd_start_sizes(const sd_rows_of_start *start, double t, const double *x, const double *scale, double *size);
-
 /* One problem: rows `use` in the unknowns `free`, which move from the guess by scale / weight. */
 typedef struct sd_search {
     const sd_rows_of_start *start;
