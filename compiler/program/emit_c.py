@@ -17,6 +17,7 @@ from sysdyn.compiler.program.emit_c_rolled import Rolled
 from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT, TURNS
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
 from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
+from sysdyn.compiler.program.sharing import shared
 
 C = Notation("sqrt", "pow", "sd_whole", "INFINITY", "NAN")
 
@@ -41,7 +42,7 @@ def emit_c(program: Program, form: DescriptorForm, head: str = HEAD) -> str:
     rolled = Rolled(_ARGUMENTS, _PASSED)
     kept = {k for k, found in turned.items() if RARE * len(found) > len(program.routines[k].body)}
     rolled.outputs(program, _printer, kept)
-    left = {k: r for k, r in enumerate(program.routines) if k not in rolled.calls}
+    left = {k: shared(r) for k, r in enumerate(program.routines) if k not in rolled.calls}
     inside = {k: _inside(r, turned.get(k, {})) for k, r in left.items()}
     rolled.loops(program, {k: inside[k] for k, r in left.items() if r.loops})
     number = Counter((routine.block, routine.part) for routine in program.routines)

@@ -218,7 +218,24 @@ def test_machine_code_of_complex_numbers_agrees_to_the_bit(n):
 
 
 @pytest.mark.parametrize("n", [5, 12, 25])
-@pytest.mark.parametrize("small", [0.0, 1e-14, 1e-4])
+@pytest.mark.parametrize("small", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
+def test_pivots_that_become_small_cost_few_digits_whoever_solves(n, small):
+    """While entries grow moderately the order stays: a multiplier of 1e3 costs three digits."""
+    rng = np.random.default_rng(n)
+    matrix = csc_array(rng.normal(size=(n, n)) + 3.0 * n * np.eye(n))
+    solver = replayed(matrix)
+    values = matrix.data.copy()
+    values[np.repeat(np.arange(n), n) == np.tile(np.arange(n), n)] *= small
+    full = values.reshape(n, n).T
+    assert solver.factor(values, np.ones(n)) == 0
+    b = rng.normal(size=n)
+    found = solver.solve(b.copy())
+    size = np.abs(full).sum(axis=1).max() * np.abs(found).max()
+    assert np.abs(full @ found - b).max() < 1e-12 * size
+
+
+@pytest.mark.parametrize("n", [5, 12, 25])
+@pytest.mark.parametrize("small", [0.0, 1e-14, 1e-6])
 def test_an_order_that_makes_entries_grow_gives_way_to_pivoting(n, small):
     """A pivot of the order found becomes small beside its column: exchanges are wanted, and made."""
     rng = np.random.default_rng(n)

@@ -8,10 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define GROWTH 1e2         /* largest multiplier, in scaled terms: more costs digits */
+#define GROWTH 1e3         /* largest multiplier, in scaled terms: it costs that many digits of a correction */
 #define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
 #define SHARE 4            /* nor do large ones before this part of n */
+#define MISSES 3           /* matrices that an order did not serve, each of which costs a fortieth of a search, before another is */
 #ifdef SD_COMPLEX
 #define NUMBERS SD_COMPLEX_NUMBERS
 #else
@@ -46,7 +47,7 @@ static void drop_order(sd_elimination *e)
 void sd_elimination_forget(sd_elimination *elimination)
 {
     drop_order(elimination);
-    elimination->samples = elimination->seen = elimination->waited = 0;
+    elimination->samples = elimination->seen = elimination->waited = elimination->missed = 0;
     elimination->wait = FIRST > elimination->n / SHARE ? FIRST : elimination->n / SHARE;
 }
 
@@ -254,7 +255,8 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
     sd_elimination *e = elimination;
     size_t size = (size_t)e->entries;
     e->seen++;
-    int due = e->waited >= e->wait;
+    e->missed += e->ready;
+    int due = e->waited >= e->wait && (!e->ready || e->missed >= MISSES);
     if (due || !(e->seen & (e->seen - 1))) { /* of the first ones the 1st, 2nd, 4th, ... */
         if (e->samples == SD_SAMPLES)
             memmove(e->sample, e->sample + size, (size_t)--e->samples * size * sizeof(sd_number));
@@ -262,7 +264,7 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
     }
     if (!due)
         return;
-    e->waited = 0;
+    e->waited = e->missed = 0;
     e->wait += e->wait / 2; /* where no order lasts, looking for one stays cheap */
     prepare(e);
 }

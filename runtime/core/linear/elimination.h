@@ -39,7 +39,7 @@ typedef struct sd_elimination {
     int32_t ready;               /* an order was found */
     int32_t factors, inside;     /* cells of factors; of all */
     int32_t samples, seen;
-    int32_t wait, waited;        /* matrices from one order to the next at least; since the last */
+    int32_t wait, waited, missed; /* matrices from one order to the next at least; since the last; that it did not serve */
     sd_number *sample;           /* [SD_SAMPLES][entries] scaled matrices, the newest last */
     sd_number *cell;             /* inverse pivots, other factors; then n each: right side, magnitudes, sizes of rows, their
                                     growth; constants */

@@ -118,7 +118,7 @@ static void let_go(writer *w, int place)
 static int last_used(const writer *w)
 {
     int found = KEPT;
-    for (int r = KEPT + 1; r < REGISTERS; r++)
+    for (int r = KEPT + 1; r < REGISTERS && w->next[found] < NEVER; r++)
         if (w->next[r] > w->next[found])
             found = r;
     return found;
@@ -155,7 +155,7 @@ static int fetch(writer *w, int32_t place, int32_t next, int scratch)
         w->next[r] = next;
         return r;
     }
-    r = last_used(w);
+    r = next < NEVER ? last_used(w) : scratch; /* not used again: worth no register */
     if (w->next[r] <= next)
         r = scratch;
     else

@@ -48,7 +48,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
     double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->test_weight, &bdf->delta,
-                          &bdf->predicted, &bdf->predicted_d, &bdf->scale, &bdf->terms, &bdf->rate,
+                          &bdf->moved, &bdf->moved_d, &bdf->scale, &bdf->terms, &bdf->rate,
                           &bdf->newton_power, &bdf->test_power};
     for (int i = 0; i < VECTORS; i++, next += m)
         *vectors[i] = next;
@@ -157,10 +157,35 @@ static int rows_hold(sd_bdf *bdf, double t)
     return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, all, bdf->terms) < 0;
 }
 
+/* the residual in delta is finite; else bad_row says where not */
+static int finite(sd_bdf *bdf)
+{
+    int32_t bad = sd_first_bad(bdf->n, bdf->delta);
+    if (bad >= 0)
+        bdf->bad_row = bad;
+    return bad < 0;
+}
+
+/* Why a correction is not finite: the first `corrections` from the prediction on once more, each residual looked at.  What
+ * is not finite in a residual is in the correction, which is looked at in any case: good ones are spared the pass. */
+static int cause_of(sd_bdf *bdf, double t, int corrections)
+{
+    sd_bdf_predict(bdf);
+    for (int m = 0; m < corrections; m++) {
+        sd_residual(bdf->system, t, bdf->y, bdf->yd, bdf->delta);
+        if (*bdf->system->stop)
+            return SD_STOPPED;
+        if (!finite(bdf))
+            return SD_NONFINITE;
+        sd_linear_solve(bdf->linear, bdf->delta);
+        sd_bdf_move(bdf);
+    }
+    return SD_NEWTON;
+}
+
 /* Newton's iteration from the prediction with the present factors */
 static int iterate(sd_bdf *bdf, double t)
 {
-    int32_t n = bdf->n;
     double first = 0.0;
     int converged = 0, judged = bdf->system->scales > 0;
     for (int m = 0; m < ITERATIONS + judged; m++) {
@@ -169,11 +194,8 @@ static int iterate(sd_bdf *bdf, double t)
         bdf->newton_iterations++;
         if (*bdf->system->stop)
             return SD_STOPPED;
-        int32_t bad = sd_first_bad(n, d);
-        if (bad >= 0) {
-            bdf->bad_row = bad;
+        if (judged && !finite(bdf)) /* rows are judged, and columns may be left out of the correction */
             return SD_NONFINITE;
-        }
         if (converged && rows_hold(bdf, t))
             return SD_FINE;
         if (m == ITERATIONS)
@@ -182,7 +204,7 @@ static int iterate(sd_bdf *bdf, double t)
         sd_linear_solve(bdf->linear, d);
         double size = sd_bdf_move(bdf);
         if (!isfinite(size))
-            return SD_NEWTON;
+            return cause_of(bdf, t, m + 1);
         if (m == 0) {
             first = size;
             converged = size <= 100.0 * DBL_EPSILON;
@@ -226,7 +248,7 @@ static int correct(sd_bdf *bdf)
         if (cause == SD_FINE || cause == SD_STOPPED || bdf->fresh_jacobian)
             return cause;
         bdf->fresh_jacobian = -1; /* once more with a fresh Jacobian */
-        sd_bdf_begin(bdf);
+        sd_bdf_predict(bdf);
     }
 }
 
@@ -268,13 +290,13 @@ static int too_small(const sd_bdf *bdf)
 static void project(sd_bdf *bdf)
 {
     size_t size = (size_t)bdf->n * sizeof(double);
-    memcpy(bdf->predicted, bdf->y, size);
-    memcpy(bdf->predicted_d, bdf->yd, size);
-    if (sd_settle_point(bdf->project, bdf->t, bdf->predicted, bdf->predicted_d))
+    memcpy(bdf->moved, bdf->y, size);
+    memcpy(bdf->moved_d, bdf->yd, size);
+    if (sd_settle_point(bdf->project, bdf->t, bdf->moved, bdf->moved_d))
         return;
     for (int32_t i = 0; i < bdf->n; i++) {
-        bdf->ee[i] += bdf->predicted[i] - bdf->y[i];
-        bdf->y[i] = bdf->predicted[i];
+        bdf->ee[i] += bdf->moved[i] - bdf->y[i];
+        bdf->y[i] = bdf->moved[i];
     }
 }
 

@@ -36,7 +36,7 @@ typedef struct sd_bdf {
     double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
         gamma[SD_MAX_ORDER + 2];
     double *phi[SD_MAX_ORDER + 2];
-    double *y, *yd, *ee, *weight, *newton_weight, *test_weight, *delta, *predicted, *predicted_d, *scale;
+    double *y, *yd, *ee, *weight, *newton_weight, *test_weight, *delta, *moved, *moved_d, *scale;
     double *terms, *rate, *jy, *jyd, *g, *memory;
     double *newton_power, *test_power, h_weighed; /* powers of h by which unknowns count, and of which h */
     double error_next;        /* estimate of the local error at the order chosen next */
@@ -65,7 +65,6 @@ void sd_bdf_restore(sd_bdf *bdf);
 void sd_bdf_weights(sd_bdf *bdf);
 void sd_bdf_step_weights(sd_bdf *bdf);
 void sd_bdf_predict(sd_bdf *bdf);
-void sd_bdf_begin(sd_bdf *bdf);
 void sd_bdf_matrix(sd_bdf *bdf);
 double sd_bdf_move(sd_bdf *bdf);
 void sd_bdf_orders(const sd_bdf *bdf, double *norm);

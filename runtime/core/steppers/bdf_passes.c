@@ -19,7 +19,6 @@ static inline __attribute__((always_inline)) void predict(sd_bdf *bdf, const int
 {
     const int32_t n = bdf->n;
     double *phi[SD_MAX_ORDER + 1], gamma[SD_MAX_ORDER + 1];
-    double *const predicted = bdf->predicted, *const predicted_d = bdf->predicted_d;
     double *const own = bdf->y, *const own_d = bdf->yd, *const ee = bdf->ee;
     for (int32_t k = 0; k <= order; k++) {
         phi[k] = bdf->phi[k];
@@ -32,29 +31,16 @@ static inline __attribute__((always_inline)) void predict(sd_bdf *bdf, const int
             y += difference;
             yd += gamma[k] * difference;
         }
-        SD_AT(predicted, i) = SD_AT(own, i) = y;
-        SD_AT(predicted_d, i) = SD_AT(own_d, i) = yd;
+        SD_AT(own, i) = y;
+        SD_AT(own_d, i) = yd;
         SD_AT(ee, i) = (sd_lanes){0.0};
     }
 }
 
-/* predicted, predicted_d := the polynomial through the past, at the new t; y, yd begin there, ee at 0 */
+/* y, yd := the polynomial through the past, at the new t, where a correction begins; ee := 0 */
 SD_WIDE void sd_bdf_predict(sd_bdf *bdf)
 {
     OF_ORDER(predict, bdf, bdf->order)
-}
-
-/* y, yd, ee as they are before a correction */
-SD_WIDE void sd_bdf_begin(sd_bdf *bdf)
-{
-    const int32_t n = bdf->n;
-    double *const y = bdf->y, *const yd = bdf->yd, *const ee = bdf->ee;
-    const double *const predicted = bdf->predicted, *const predicted_d = bdf->predicted_d;
-    for (int32_t i = 0; i < n; i += SD_LANES) {
-        SD_AT(y, i) = SD_FROM(predicted, i);
-        SD_AT(yd, i) = SD_FROM(predicted_d, i);
-        SD_AT(ee, i) = (sd_lanes){0.0};
-    }
 }
 
 /* y -= delta and what goes with it; root mean square of delta in Newton's weights */
@@ -147,6 +133,7 @@ static void set_powers(sd_bdf *bdf)
     bdf->h_weighed = bdf->h;
 }
 
+/* newton_weight, test_weight := weight times the powers of this step */
 SD_WIDE void sd_bdf_step_weights(sd_bdf *bdf)
 {
     if (bdf->h != bdf->h_weighed)

@@ -78,10 +78,21 @@ static void steep_terms(sd_system *system, double t, const double *y, const doub
         s[system->held_row[i]] = 0.0;
 }
 
+/* the first row with terms s, not all zero (a row that is not steep has none), that is beyond their part `limit`; -1: none */
+static int32_t first_beyond(int32_t rows, const double *r, double limit, const double *s)
+{
+    for (int32_t i = 0; i < rows; i++)
+        if (s[i] != 0.0 && !(fabs(r[i]) <= limit * s[i]))
+            return i;
+    return -1;
+}
+
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
                        const double *g, const double *scale, int all, double *s)
 {
     steep_terms(system, t, y, rate, s);
+    if (!all && first_beyond(system->rows, r, limit, s) < 0)
+        return -1; /* what follows adds to the terms */
     for (int32_t i = 0; i < system->rows; i++)
         s[i] = -s[i]; /* what is known already is not added to, but for what is nothing */
     for (int32_t j = 0; j < system->unknowns; j++)
@@ -92,10 +103,7 @@ int32_t sd_first_unmet(sd_system *system, double t, const double *y, const doubl
                 s[system->row[e]] += fabs(g[e]) * (fabs(y[j]) + FAINT * scale[j]);
     for (int32_t i = 0; i < system->rows; i++)
         s[i] = fabs(s[i]);
-    for (int32_t i = 0; i < system->rows; i++)
-        if (s[i] != 0.0 && !(fabs(r[i]) <= limit * s[i])) /* 0: not steep, or every term is zero */
-            return i;
-    return -1;
+    return first_beyond(system->rows, r, limit, s);
 }
 
 int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r,

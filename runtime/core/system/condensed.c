@@ -4,6 +4,19 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* the same of one unknown, as most of a small model stand */
+static inline void evaluate_one(const sd_straight *straight, double *x, int rate)
+{
+    const int32_t *source = straight->source, terms = straight->terms;
+    const double *f = straight->factor;
+    double sum = terms > 0 ? f[0] * x[source[0]] : 0.0;
+    for (int32_t k = 1; k < terms; k++)
+        sum += f[k] * x[source[k]];
+    if (straight->constant && !rate)
+        sum += straight->constant[0];
+    x[straight->place] = sum;
+}
+
 /* x := factors * sources + constant, up to three terms in one pass over memory */
 static void evaluate(const sd_straight *straight, double *x, int rate)
 {
@@ -35,22 +48,35 @@ static void evaluate(const sd_straight *straight, double *x, int rate)
 
 void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
 {
-    for (int32_t s = 0; s < condensed->straights; s++)
-        evaluate(&condensed->straight[s], x, rate);
+    for (int32_t s = 0; s < condensed->straights; s++) {
+        if (condensed->straight[s].number == 1)
+            evaluate_one(&condensed->straight[s], x, rate);
+        else
+            evaluate(&condensed->straight[s], x, rate);
+    }
+}
+
+/* a span of numbers, most of a small model of one */
+static inline void copy(double *to, const double *from, int32_t number)
+{
+    if (number == 1)
+        *to = *from;
+    else
+        memcpy(to, from, (size_t)number * sizeof *to);
 }
 
 static void scatter(const sd_condensed *condensed, const double *z, double *x)
 {
     for (int32_t s = 0; s < condensed->unknown_spans; s++) {
         const sd_span *span = &condensed->unknown[s];
-        memcpy(x + span->full, z + span->kept, (size_t)span->number * sizeof *x);
+        copy(x + span->full, z + span->kept, span->number);
     }
 }
 
 static void gather(int32_t spans, const sd_span *span, const double *x, double *z)
 {
     for (int32_t s = 0; s < spans; s++)
-        memcpy(z + span[s].kept, x + span[s].full, (size_t)span[s].number * sizeof *x);
+        copy(z + span[s].kept, x + span[s].full, span[s].number);
 }
 
 void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate)
