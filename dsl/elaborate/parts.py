@@ -49,7 +49,7 @@ class Requirement:
     condition: Node
     loops: tuple[Loop, ...]
     place: Place
-    text: str
+    written: syntax.Expr
 
 
 @dataclass(slots=True)

@@ -568,6 +568,8 @@ def derivative(root: Node, by: Node) -> Node:
         return const(0.0)
     if root.op == "sum" and by in root.args and not any(a.args for a in root.args):
         return const(root.data[1][root.args.index(by)])
+    if root.op == "mul" and by in root.args and not any(a.args for a in root.args):
+        return _chain(root, [const(1.0 if a is by else 0.0) for a in root.args])
     return differential(root, {by: const(1.0)})
 
 

@@ -46,16 +46,7 @@ def law_of(
     span: syntax.Span,
 ) -> LawOf:
     """Classify `side = value`; wanted: the kind that the author named (None in a component's law)."""
-    dimension = branch_dimension(branch.domain, side)
-    message = f"law of '{branch.name}': {side} is in {dim.show(dimension)}, the law in {{}}"
-    read = context.scalar(value)
-    found = read.dimension
-    other = [s for s in "efqp" if found and found == branch_dimension(branch.domain, s) and s != side]
-    meant = wanted[0] if wanted in ("effort", "flow") else None if wanted else next(iter(other), None)
-    if meant in other and found != dimension and context.bare(value) is None:
-        said = message.format(dim.show(found))
-        raise context.fail("E208", said, value.span, help=f"{meant} = ..., which is in {dim.show(found)}")
-    node = context.fitting(read, value, dimension, "E208", message)
+    node = _in_dimension(context, branch, side, value, wanted)
     own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
     others = sorted(set(own) - {side})
     if side in own or len(others) > 1:
@@ -81,6 +72,24 @@ def law_of(
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
     return LawOf(kind, side, node)
+
+
+def _in_dimension(
+    context: Context, branch: BranchSymbol, side: str, value: syntax.Expr, wanted: str | None
+) -> Node:
+    """The law as a node; E208 where its dimension is not that of its side."""
+    dimension = branch_dimension(branch.domain, side)
+    read = context.scalar(value)
+    found = read.dimension
+    if found is None or found == dimension:
+        return read.node
+    message = f"law of '{branch.name}': {side} is in {dim.show(dimension)}, the law in {{}}"
+    other = [s for s in "efqp" if found and found == branch_dimension(branch.domain, s) and s != side]
+    meant = wanted[0] if wanted in ("effort", "flow") else None if wanted else next(iter(other), None)
+    if meant in other and context.bare(value) is None:
+        said = message.format(dim.show(found))
+        raise context.fail("E208", said, value.span, help=f"{meant} = ..., which is in {dim.show(found)}")
+    return context.fitting(read, value, dimension, "E208", message)
 
 
 def _controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -236,9 +237,10 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
 def values(model: Elaborator, known: Values, report: Report) -> None:
     """E322, E324, E805, E807 with the values bound."""
     for r in model.parts.requirements:
-        node, loops, place, text = r.condition, r.loops, r.place, r.text
+        node, loops, place = r.condition, r.loops, r.place
         bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
         if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
+            text = format_expression(r.written)
             shown = ", ".join(_valued(n, known.number(n, bound), model) for n in _parameters(node))
             report.error("E322", f"require {text} fails: {shown}", place, help=f"values for which {text}")
     for node, place in _expressions(model):
