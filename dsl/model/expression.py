@@ -453,6 +453,11 @@ def variables(root: Node) -> frozenset[Node]:
     return root.variables or frozenset()
 
 
+def ordered_variables(root: Node) -> list[Node]:
+    """The same in the order they were made: for whoever makes nodes of them, so that a text is the same each time."""
+    return sorted(variables(root), key=lambda n: n.number)
+
+
 _ONE_ARGUMENT: Mapping[str, Callable[[Node], Node]] = {
     "signal": lambda x: const(1.0),
     "sin": lambda x: call("cos", x),
@@ -593,7 +598,7 @@ def rate(node: Node) -> Node | None:
 def time_derivative(root: Node) -> Node:
     """Total derivative by t; ValueError names an unknown whose derivative is not among the variables."""
     seeds: dict[Node, Node] = {}
-    for node in sorted(variables(root), key=lambda n: n.number):
+    for node in ordered_variables(root):
         dot = rate(node)
         if dot is None:
             raise ValueError(to_text(node))
