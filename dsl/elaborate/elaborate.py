@@ -26,6 +26,8 @@ from sysdyn.dsl.tree import syntax
 
 _ALONE = (syntax.Input, syntax.Port, syntax.Branch, syntax.Law, syntax.Level)
 """Statements that a model reads otherwise than a component does, or refuses."""
+_STATED = tuple(STATEMENTS)
+"""Statements that make equations, in the order in which they are resolved."""
 
 
 class Elaborator(Instances):
@@ -46,7 +48,7 @@ class Elaborator(Instances):
                 assert isinstance(statement, syntax.Broken)
                 self.scope.broken |= statement.names
             self.declare_parameters(self._body, {})
-            self.each(self._body.of(*DECLARED, *_ALONE, loops=True), self._declared)
+            self.each(self._body.with_loops((*DECLARED, *_ALONE)), self._declared)
             self.bodies.append((self.space, self._body))
 
     def _declared(self, statement: syntax.Statement) -> None:
@@ -90,12 +92,13 @@ class Elaborator(Instances):
         self.resolver.complete = True
         self._said(syntax.Constraint, self.constraint)
         for space, body in self.bodies:
-            if not body.of(*STATEMENTS) and all(type(s) is not Definition for s in space.scope.symbols.values()):
+            kinds = {type(s) for s, _ in body.of(_STATED)}
+            if not kinds and all(type(s) is not Definition for s in space.scope.symbols.values()):
                 continue
             with self.entering(space):
-                for kind, method in STATEMENTS.items():
-                    if chosen := body.of(kind):
-                        self.each(chosen, partial(method, self))
+                for kind in _STATED:
+                    if kind in kinds:
+                        self.each(body.of(kind), partial(STATEMENTS[kind], self))
                 self._definitions()
 
     def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator
 from sysdyn.dsl.elaborate.parts import Nested
 from sysdyn.dsl.tree import syntax
 
+Kinds = type | tuple[type, ...]
+
 
 class Body:
     """Statements of a component or a model with the loops around each; `of` picks kinds, once for all instances.
@@ -14,24 +16,30 @@ class Body:
     order: the parameters in the order of their dependence, once an instance has found it sound (parameters.py).
     """
 
-    __slots__ = ("_head", "_kinds", "order", "statements")
+    __slots__ = ("_around", "_head", "_kinds", "order", "statements")
 
     def __init__(self, statements: Iterable[Nested]) -> None:
         self.statements = tuple(statements)
         self.order: tuple[tuple[syntax.Param, tuple[syntax.For, ...]], ...] | None = None
         self._head: Interface | None = None
-        self._kinds: dict[tuple[object, ...], tuple[Nested, ...]] = {}
+        self._kinds: dict[Kinds, tuple[Nested, ...]] = {}
+        self._around: dict[Kinds, tuple[Nested, ...]] = {}
 
     def __iter__(self) -> Iterator[Nested]:
         return iter(self.statements)
 
-    def of(self, *kinds: type, loops: bool = False) -> tuple[Nested, ...]:
-        """The statements of these kinds, in their order; loops: and all that stand in loops, whose bounds are read."""
-        key = (*kinds, loops)
-        found = self._kinds.get(key)
+    def of(self, kinds: Kinds) -> tuple[Nested, ...]:
+        """The statements of these kinds, in their order."""
+        found = self._kinds.get(kinds)
         if found is None:
-            found = tuple(s for s in self.statements if isinstance(s[0], kinds) or (loops and s[1]))
-            self._kinds[key] = found
+            found = self._kinds[kinds] = tuple(s for s in self.statements if isinstance(s[0], kinds))
+        return found
+
+    def with_loops(self, kinds: Kinds) -> tuple[Nested, ...]:
+        """The same with all that stand in loops, whose bounds are read."""
+        found = self._around.get(kinds)
+        if found is None:
+            found = self._around[kinds] = tuple(s for s in self.statements if s[1] or isinstance(s[0], kinds))
         return found
 
     @property
@@ -50,7 +58,7 @@ class Interface:
         self.inputs: dict[str, syntax.Input] = {}
         self.ports: dict[str, syntax.Port] = {}
         self.branches: dict[str, syntax.Branch] = {}
-        for statement, _ in body.of(syntax.Param, syntax.Input, syntax.Port, syntax.Branch):
+        for statement, _ in body.of((syntax.Param, syntax.Input, syntax.Port, syntax.Branch)):
             match statement:
                 case syntax.Param():
                     self.parameters[statement.decl.name] = statement

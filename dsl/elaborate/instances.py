@@ -180,7 +180,7 @@ class Instances(Elements):
             self._required(s, component, head, arguments)
         if head.inputs:
             self._bind_inputs(s, space, head, inputs)
-        declared, instances = body.of(*DECLARED, loops=True), body.of(syntax.Instance)
+        declared, instances = body.with_loops(DECLARED), body.of(syntax.Instance)
         with self.entering(space) if declared or instances else nullcontext():
             self.each(declared, self.declare)
             self.bodies.append((space, body))

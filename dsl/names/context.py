@@ -395,6 +395,8 @@ class Context:
 
     def _bare(self, expression: syntax.Expr) -> tuple[str, str | None] | None:
         """The one parameter among the factors of an expression that is a bare number: its name and that number."""
+        if isinstance(expression, (syntax.Quantity, syntax.Number)):
+            return None
         inner: object = expression
         while isinstance(inner, (syntax.Negative, syntax.Group)):
             inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr

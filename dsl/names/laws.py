@@ -29,11 +29,13 @@ class LawOf:
 
 def own_variables(branch: BranchSymbol, at: tuple[Node, ...], suffix: str = "") -> dict[str, Typed]:
     """Variables e f q p of a branch under the names that its law uses."""
-    found = {}
-    for letter in "efqp":
-        node = ex.var(branch.family.name, f"b{letter}", *at)
-        found[f"{letter}{suffix}"] = Typed(node, branch_dimension(branch.domain, letter))
-    return found
+    name, d = branch.family.name, branch.domain
+    return {
+        f"e{suffix}": Typed(ex.var(name, "be", *at), d.effort.dimension),
+        f"f{suffix}": Typed(ex.var(name, "bf", *at), d.flow.dimension),
+        f"q{suffix}": Typed(ex.var(name, "bq", *at), d.displacement.dimension),
+        f"p{suffix}": Typed(ex.var(name, "bp", *at), d.momentum.dimension),
+    }
 
 
 def law_of(

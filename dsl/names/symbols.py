@@ -287,7 +287,7 @@ class Scope:
     broken: set[str] = field(default_factory=set)
     missed: bool = False
     """Whether a name of a statement that could not be read was asked for."""
-    said: dict[tuple[str, int], Unit] = field(default_factory=dict)
+    read: dict[tuple[str, int], Unit] | None = None
     """Units that were read here, by their text and the number of those declared then."""
 
     def find(self, name: str) -> Symbol | None:

@@ -251,7 +251,8 @@ def values(model: Elaborator, known: Values, report: Report) -> None:
 
 
 def _parameters(node: Node) -> list[Node]:
-    return [n for n in ex.topological([node]) if n.op == "param"]
+    nodes = ex.topological([node]) if any(a.args for a in node.args) else (*node.args, node)
+    return [n for n in dict.fromkeys(nodes) if n.op == "param"]
 
 
 def _valued(node: Node, value: float, model: Elaborator) -> str:
@@ -261,7 +262,7 @@ def _valued(node: Node, value: float, model: Elaborator) -> str:
 
 
 def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
-    for inner in ex.topological([node]):
+    for inner in ex.topological([node]) if node.args else ():
         if inner.op != "mul" or not any(e < 0 for e in inner.data):
             continue
         for exponent, factor in zip(inner.data, inner.args, strict=True):

@@ -143,7 +143,7 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
     slope = ex.derivative(branch.law, own[0])
     if slope.op == "const" and not slope.data < 0.0:
         return
-    if any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
+    if slope.op != "param" and any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
         return
     bound = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
     value = known.number(slope, bound)
