@@ -125,7 +125,7 @@ def linear(constant: float, terms: Iterable[tuple[float, Node]]) -> Node:
     total = constant
     found: dict[Node, float] = {}
     for coefficient, node in terms:
-        if node.op != "sum" and node.op != "const":  # most terms
+        if node.op not in {"sum", "const"}:  # most terms
             found[node] = found.get(node, 0.0) + coefficient
             continue
         inner, parts = _terms(node)
