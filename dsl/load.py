@@ -248,7 +248,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
     return Network(
         model=elaborator.model.name.name,
         place=Place(elaborator.source, elaborator.model.name.span),
-        parameters=tuple(replace(p, whole=p.name in whole) for p in parts.parameters.values()),
+        parameters=tuple(replace(p, whole=True) if p.name in whole else p for p in parts.parameters.values()),
         quasis=tuple(elaborator.parts.quasis),
         speeds=tuple(elaborator.parts.speeds),
         tables=tuple(elaborator.files.tables.values()),

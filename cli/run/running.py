@@ -15,6 +15,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import lock, targets
 from sysdyn.cli.run.events import plan, zeno
 from sysdyn.cli.run.expectations import Claim, judge, watch
+from sysdyn.cli.run.memory import keep_pages
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started, start
@@ -99,6 +100,7 @@ class Ran:
 def run(request: Request, report: Report, progress: Progress | None = None) -> Ran | None:
     """Simulate; None where the report says why not.  UsageError, OSError and TraceError pass through."""
     began = time.monotonic()
+    keep_pages()
     check_tolerances(request)
     if request.output and request.file != "-" and _same(request.output, request.file):
         raise UsageError(f"-o {request.output} is the model itself")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sysdyn.compiler.forms.descriptor import HOME, Block, DescriptorForm, Pin
-from sysdyn.dsl.model.expression import Node, neg, substitute, var, variables
+from sysdyn.dsl.model.expression import Node, neg, ordered_variables, substitute, var
 
 
 def with_book_signs(form: DescriptorForm) -> DescriptorForm:
@@ -23,7 +23,7 @@ def with_book_signs(form: DescriptorForm) -> DescriptorForm:
 def signed(root: Node) -> Node:
     """The expression with every conjugate's sign changed."""
     change = {}
-    for node in variables(root):
+    for node in ordered_variables(root):
         if node.op == "var" and node.data[1] == "p":
             owner, kind, order = node.data
             change[node] = neg(var(owner, kind, *node.args, order=order))

@@ -33,6 +33,7 @@ from sysdyn.dsl.model.expression import (
     gradient,
     is_const,
     neg,
+    ordered_variables,
     substitute,
     time_derivative,
     to_text,
@@ -153,7 +154,7 @@ def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:
 
 def total_rate(root: Node) -> Node:
     """Total derivative by t, the derivatives of multipliers among its variables."""
-    seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in variables(root)}
+    seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in ordered_variables(root)}
     return differential(root, seeds)
 
 
@@ -291,7 +292,7 @@ class _Lowering:
     def _in_states(self, root: Node, what: str, place: Place | None) -> Node:
         """The expression with the rates of dynamic variables replaced by what they are: it has a rate of its own."""
         for _ in range(1 + len(self.speeds)):
-            rates = [n for n in variables(root) if n.op == "var" and n.data[1:] == ("s", 1)]
+            rates = [n for n in ordered_variables(root) if n.op == "var" and n.data[1:] == ("s", 1)]
             if not rates:
                 return root
             if any(n.data[0] not in self.speeds for n in rates):

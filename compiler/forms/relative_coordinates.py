@@ -23,6 +23,7 @@ from sysdyn.dsl.model.expression import (
     derivative,
     index,
     is_const,
+    ordered_variables,
     sub,
     substitute,
     topological,
@@ -175,7 +176,7 @@ def _meet(a: tuple[tuple[Node, Node], ...], b: tuple[tuple[Node, Node], ...]) ->
 def _unknowns(model: EnergyModel) -> Iterable[Node]:
     """Every variable of a coordinate that any statement reads."""
     names = {c.name for c in model.coordinates}
-    return (n for root in model.expressions() for n in variables(root) if n.op == "var" and n.data[0] in names)
+    return (n for root in model.expressions() for n in ordered_variables(root) if n.op == "var" and n.data[0] in names)
 
 
 def _changed(model: EnergyModel, change: _Anchors) -> EnergyModel:

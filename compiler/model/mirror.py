@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from sysdyn.dsl.model.expression import Node, substitute, var, variables
+from sysdyn.dsl.model.expression import Node, ordered_variables, substitute, var
 from sysdyn.values import dataclass
 
 
@@ -48,7 +48,7 @@ def lettered(formulation: str, root: Node) -> Node:
     if not formulation.startswith("co_"):
         return root
     change = {}
-    for node in variables(root):
+    for node in ordered_variables(root):
         if node.op == "var" and node.data[1] in ("p", "e"):
             owner, kind, order = node.data
             shown = var(owner, "bq", *node.args, order=order) if kind == "p" else None

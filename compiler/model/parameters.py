@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import Value, evaluate, over
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
 from sysdyn.dsl.model.expression import Node, const, to_text, topological
-from sysdyn.dsl.model.network import Loop, Network, Parameter, Shape
+from sysdyn.dsl.model.network import ElementSetting, Loop, Network, Parameter, Shape
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 Extents = tuple[tuple[int, int], ...]  # (first, last) of each index
@@ -43,6 +43,10 @@ class Parameters:
         self._network = network
         self._tables = {t.name: t for t in network.tables}
         self._known = {p.name: p for p in network.parameters}
+        self._settings: dict[str, list[ElementSetting]] = {}
+        for setting in network.elements:
+            self._settings.setdefault(setting.name, []).append(setting)
+        self._given = {key if isinstance(key, str) else key[0] for key in overrides} | self._settings.keys()
         self._check(overrides)
         for parameter in self._ordered(overrides):
             self._bind(parameter, overrides)
@@ -81,12 +85,15 @@ class Parameters:
     def _uses(self, parameter: Parameter, overridden: bool) -> list[str]:
         roots = [] if overridden else list(parameter.values)
         roots += [node for pair in parameter.shape for node in pair]
-        roots += [node for e in self._network.elements if e.name == parameter.name for node in (*e.at, e.value)]
-        names = [n.data for n in topological(roots) if n.op == "param"]
-        return [n for n in dict.fromkeys(names) if n in self._known]
+        roots += [node for e in self._settings.get(parameter.name, ()) for node in (*e.at, e.value)]
+        nodes = topological(roots) if any(r.args for r in roots) else roots
+        return [n for n in dict.fromkeys(n.data for n in nodes if n.op == "param") if n in self._known]
 
     def _bind(self, parameter: Parameter, overrides: Mapping[Override, Any]) -> None:
         name, place = parameter.name, parameter.place
+        if name not in self._given and (number := _number(parameter)) is not None:
+            self.values[name] = number
+            return
         box = self.extents(parameter.shape, place)
         if math.prod(extents(box)) > LARGEST:
             text = f"'{name}' has {math.prod(extents(box))} elements, more than {LARGEST}"
@@ -101,10 +108,9 @@ class Parameters:
             values = np.broadcast_to(values, extents(box)).copy()
         else:
             values = self._formula(parameter, box)
-        for setting in self._network.elements:
-            if setting.name == name and name not in overrides:
-                *at, value = evaluate((*setting.at, setting.value), self.checked(setting.place))
-                values[self._element(name, box, tuple(at), setting.place)] = value
+        for setting in () if name in overrides else self._settings.get(name, ()):
+            *at, value = evaluate((*setting.at, setting.value), self.checked(setting.place))
+            values[self._element(name, box, tuple(at), setting.place)] = value
         for key, value in overrides.items():
             if not isinstance(key, str) and key[0] == name:
                 values[self._element(name, box, key[1:], place)] = value
@@ -188,6 +194,14 @@ class Parameters:
         if not np.all(np.isfinite(values)):
             text = f"division by zero, or a number too large, in {what} with the values bound"
             raise ModelError([Diagnostic("E324", text, place)])
+
+
+def _number(parameter: Parameter) -> float | None:
+    """A finite number that stands by itself: a netlist has tens of thousands of them."""
+    if parameter.shape or parameter.indices or parameter.whole or len(parameter.values) != 1:
+        return None
+    node = parameter.values[0]
+    return node.data if node.op == "const" and math.isfinite(node.data) else None
 
 
 def _placed(found: Diagnostic, place: Place) -> Diagnostic:

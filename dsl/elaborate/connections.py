@@ -38,6 +38,9 @@ class Connections(Statements):
 
     def _label(self, s: syntax.Instance) -> tuple[tuple[Node, ...], Shape]:
         """Indices of a label, and first and last of each; a `for` around must show in them."""
+        own = self.resolver.loops[len(self.current.loops) :]
+        if not own and not s.decl.indices:
+            return (), ()
         at = tuple(self.resolver.index(i) for i in s.decl.indices)
         shape = []
         for node, index in zip(at, s.decl.indices, strict=True):
@@ -48,7 +51,6 @@ class Connections(Statements):
             else:
                 shape.append((node, node))
         used = set(at)
-        own = self.resolver.loops[len(self.current.loops) :]
         if any(ex.index(loop.index) not in used for loop in own):
             message = f"'{s.decl.name}' stands in a 'for': its label needs the loop variable"
             raise self.resolver.fail("E106", message, s.decl.span, help=f"{s.decl.name}[{own[-1].index}]")
@@ -125,22 +127,18 @@ class Connections(Statements):
 
     def _along(self, plus: End, minus: End, domain: DomainSymbol) -> Ends:
         """A branch that hangs on a coordinate acts along an expression."""
-        coordinates = [e for e in (plus, minus) if e.node is not None and e.node.family.name in self._coordinate_names]
-        if not coordinates:
+        names = {c.name for c in self.parts.coordinates} if self.parts.coordinates else ()
+        if not any(e.node is not None and e.node.family.name in names for e in (plus, minus)):
             return Ends(plus, minus, None, domain)
 
         def displacement(end: End) -> Node:
             if end.node is None:
                 return ex.const(0.0)
-            kind = "q" if end.node.family.name in self._coordinate_names else "nq"
+            kind = "q" if end.node.family.name in names else "nq"
             return ex.var(end.node.family.name, kind, *end.at)
 
         node = ex.sub(displacement(plus), displacement(minus))
         return Ends(None, None, Typed(node, domain.displacement.dimension), domain)
-
-    @property
-    def _coordinate_names(self) -> set[str]:
-        return {c.name for c in self.parts.coordinates}
 
     def end(self, e: syntax.Expr, domain: DomainSymbol | None) -> End | None:
         """One end: a node, a port, a coordinate of a common-flow domain, or ground (None without a domain)."""
@@ -181,6 +179,8 @@ class Connections(Statements):
     ) -> End:
         if len(indices) != len(symbol.family.shape):
             raise self.resolver.index_count(symbol.name, len(symbol.family.shape), len(indices), e.span)
+        if not indices and not symbol.family.prefix:
+            return End(symbol, (), symbol.domain)
         at = (*symbol.family.prefix, *self.resolver.indices(symbol.name, symbol.family.shape, indices))
         return End(symbol, tuple(ex.substitute(a, change) for a in at), symbol.domain)
 

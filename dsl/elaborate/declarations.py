@@ -9,7 +9,8 @@ from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.parameters import Parameters
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Coordinate, Initial, NodeFamily, Parameter, State, Unknown
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, Parameter, State, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, si
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.context import Failed
@@ -26,12 +27,29 @@ from sysdyn.dsl.names.symbols import (
     UnknownSymbol,
     nearest,
 )
-from sysdyn.dsl.text.diagnostics import Related
+from sysdyn.dsl.text.diagnostics import Related, Report
 from sysdyn.dsl.tree import syntax
+
+DECLARED = (
+    syntax.Coord,
+    syntax.Implicit,
+    syntax.State,
+    syntax.Node,
+    syntax.Let,
+    syntax.Output,
+    syntax.Quasi,
+    syntax.Constraint,
+    syntax.Discrete,
+)
+"""Statements that bring names into a scope by `declare`."""
 
 
 class Declarations(Parameters):
     """Brings the names of a space into scope."""
+
+    def __init__(self, report: Report) -> None:
+        super().__init__(report)
+        self._begun: dict[tuple[Node, tuple[Loop, ...], int], Initial] = {}  # by target, loops, depth
 
     def declare(self, statement: syntax.Statement) -> None:
         """One declaration; statements of other kinds are passed over."""
@@ -130,12 +148,12 @@ class Declarations(Parameters):
         """Enter an initial value; override: of a scene.  What stands further outside goes before (language, 34)."""
         path = self.current.path
         initial = replace(initial, depth=0 if override else 2 + path.count(".") if path else 1)
-        for before in self.parts.initials:
-            if before.target is initial.target and before.loops == initial.loops and before.depth == initial.depth:
-                related = (Related("first here", before.place),)
-                message = f"'{initial.target}' gets its initial value twice"
-                self.report.error("E106", message, initial.place, related=related)
-                raise Failed
+        before = self._begun.setdefault((initial.target, initial.loops, initial.depth), initial)
+        if before is not initial:
+            related = (Related("first here", before.place),)
+            message = f"'{initial.target}' gets its initial value twice"
+            self.report.error("E106", message, initial.place, related=related)
+            raise Failed
         self.parts.initials.append(initial)
 
     def _state(self, statement: syntax.State) -> None:

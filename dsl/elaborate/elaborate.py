@@ -6,9 +6,13 @@ it.  What a later issue builds is reported as N608 with its place, and the rest 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import groupby
 
+from sysdyn.dsl.elaborate.declarations import DECLARED
 from sysdyn.dsl.elaborate.files import FileScope
+from sysdyn.dsl.elaborate.head import Body
 from sysdyn.dsl.elaborate.instances import Instances
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.statements import STATEMENTS
@@ -20,6 +24,11 @@ from sysdyn.dsl.names.symbols import Definition, Scope, Space, Typed
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.tree import syntax
 
+_ALONE = (syntax.Input, syntax.Port, syntax.Branch, syntax.Law, syntax.Level)
+"""Statements that a model reads otherwise than a component does, or refuses."""
+_STATED = tuple(STATEMENTS)
+"""Statements that make equations, in the order in which they are resolved."""
+
 
 class Elaborator(Instances):
     """Elaborates one model of a file."""
@@ -30,16 +39,16 @@ class Elaborator(Instances):
         self.model = model
         self.source = files.file.source
         self.space = Space("", Scope(files.scope), files.scope, self.source, component=model.name.name)
-        self._body = list(flatten(model.body))
+        self._body = Body(flatten(model.body))
 
     def names(self) -> None:
         """Bring the model's names into scope; values of inputs may change until `elements`."""
         with self.entering(self.space):
-            for statement, _ in self._body:
-                if isinstance(statement, syntax.Broken):
-                    self.scope.broken |= statement.names
+            for statement, _ in self._body.of(syntax.Broken):
+                assert isinstance(statement, syntax.Broken)
+                self.scope.broken |= statement.names
             self.declare_parameters(self._body, {})
-            self.each(self._body, self._declared)
+            self.each(self._body.with_loops((*DECLARED, *_ALONE)), self._declared)
             self.bodies.append((self.space, self._body))
 
     def _declared(self, statement: syntax.Statement) -> None:
@@ -62,9 +71,7 @@ class Elaborator(Instances):
         """Elaborate the model's instances, those inside them, and the laws of all."""
         with self.entering(self.space):
             self.announce(self._body)
-        for space, body in self.bodies:
-            with self.entering(space):
-                self.each([s for s in body if isinstance(s[0], syntax.Law)], self.law)
+        self._said(syntax.Law, self.law)
         for _, group in groupby(self.pending, key=lambda pending: id(pending.space)):
             own = list(group)
             with self.entering(own[0].space):
@@ -76,21 +83,30 @@ class Elaborator(Instances):
                     except Failed:
                         continue
         for space, _ in self.bodies:
-            with self.entering(space):
-                self.lawless(space)
+            if space.ends.keys() - space.laws.keys():
+                with self.entering(space):
+                    self.lawless(space)
 
     def statements(self) -> None:
         """Resolve what the model and its instances say: constraints first, which others may read."""
         self.resolver.complete = True
+        self._said(syntax.Constraint, self.constraint)
         for space, body in self.bodies:
+            kinds = {type(s) for s, _ in body.of(_STATED)}
+            if not kinds and all(type(s) is not Definition for s in space.scope.symbols.values()):
+                continue
             with self.entering(space):
-                self.each([s for s in body if isinstance(s[0], syntax.Constraint)], self.constraint)
-        for space, body in self.bodies:
-            with self.entering(space):
-                for kind, method in STATEMENTS.items():
-                    chosen = [s for s in body if isinstance(s[0], kind)]
-                    self.each(chosen, lambda s, m=method: m(self, s))
+                for kind in _STATED:
+                    if kind in kinds:
+                        self.each(body.of(kind), partial(STATEMENTS[kind], self))
                 self._definitions()
+
+    def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
+        """Carry out all statements of a kind, in the bodies where they stand."""
+        for space, body in self.bodies:
+            if chosen := body.of(kind):
+                with self.entering(space):
+                    self.each(chosen, do)
 
     def quadratures(self) -> None:
         """States for the integrals that traces, lets and expectations read."""

@@ -122,9 +122,10 @@ class Elements(Connections):
         whole = (*symbol.family.prefix, *at)
 
         def resolve() -> None:
-            own = own_variables(symbol, whole)
+            own = self.current.bound if not kind and symbol.family.name == self.current.path else None
+            own = own_variables(symbol, whole) if own is None else own
             self._hidden(value, own, symbol.name)
-            with self.resolver.inside(loops, bound), self.resolver.bound(own):
+            with self.resolver.inside(loops, {**bound, **own}):
                 law = law_of(self.resolver, symbol, whole, side, value, kind, span)
             if law.kind == "dissipator" and side == "e":
                 node = events.sticking(self, law.law, symbol.family.name, whole, loops, self.place(s.span))

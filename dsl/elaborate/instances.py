@@ -7,15 +7,16 @@ elaborated under the label's path.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 
+from sysdyn.dsl.elaborate.declarations import DECLARED
 from sysdyn.dsl.elaborate.elements import Elements
 from sysdyn.dsl.elaborate.files import FileScope, exported
-from sysdyn.dsl.elaborate.head import Interface
+from sysdyn.dsl.elaborate.head import Body, Interface
 from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.parameters import Argument
-from sysdyn.dsl.elaborate.parts import Nested, flatten
+from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
@@ -57,21 +58,22 @@ class Instances(Elements):
     def __init__(self, report: Report) -> None:
         super().__init__(report)
         self.files: FileScope
-        self.bodies: list[tuple[Space, list[Nested]]] = []
+        self.bodies: list[tuple[Space, Body]] = []
         self.choices: dict[str, LevelChoice] = {}
         self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
         self._waiting: dict[int, list[Callable[[], None]]] = {}  # instances not yet elaborated, by their symbol
+        self._insides: dict[tuple[int, str | None], tuple[ComponentSymbol, Body]] = {}  # by component and level
         self.resolver.awaken = self._awaken
 
-    def announce(self, statements: Sequence[Nested]) -> None:
+    def announce(self, body: Body) -> None:
         """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
         waiting = []
-        for statement, loops in statements:
-            if isinstance(statement, syntax.Instance):
-                try:
-                    waiting.append(self._announced(statement, loops))
-                except Failed:
-                    self.scope.broken.add(statement.decl.name)
+        for statement, loops in body.of(syntax.Instance):
+            assert isinstance(statement, syntax.Instance)
+            try:
+                waiting.append(self._announced(statement, loops))
+            except Failed:
+                self.scope.broken.add(statement.decl.name)
         for do in waiting:
             do()
 
@@ -150,36 +152,43 @@ class Instances(Elements):
         )
         level, body = choose_level(self, component, s, path)
         space.level, space.elsewhere = level, elsewhere(component, level)
-        self._fill(symbol, s, component, space, list(flatten(body)))
+        self._fill(symbol, s, component, space, self._inside(component, level, body))
+
+    def _inside(self, component: ComponentSymbol, level: str | None, body: tuple[syntax.Statement, ...]) -> Body:
+        """The statements of a component at a level: one value for all instances."""
+        key = id(component), level
+        if key not in self._insides:
+            self._insides[key] = component, Body(flatten(body))
+        return self._insides[key][1]
 
     def _fill(
-        self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: list[Nested]
+        self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: Body
     ) -> None:
         """Arguments and connections, then the statements of the body, in the space of the instance."""
-        head = Interface(body)
-        with self._unread(any(isinstance(statement, syntax.Broken) for statement, _ in body)):
-            arguments = self._arguments(s, component, head, space)
-            inputs = self._connect(s, component, head, space)
-        solve_units(self, s, space, head, arguments, inputs)
+        head, broken = body.head, body.of(syntax.Broken)
+        with self._unread() if broken else nullcontext():
+            arguments, inputs = self._arguments(s, component, head, space)
+            self._connect(s, component, head, space, inputs)
+        if head.generic:
+            solve_units(self, s, space, head, arguments, inputs)
         symbol.spaces.append(space)
         with self.entering(space):
-            for statement, _ in body:
-                if isinstance(statement, syntax.Broken):
-                    self.scope.broken |= statement.names
+            for statement, _ in broken:
+                assert isinstance(statement, syntax.Broken)
+                self.scope.broken |= statement.names
             self.declare_parameters(body, arguments)
             self._required(s, component, head, arguments)
-        self._bind_inputs(s, space, head, inputs)
-        with self.entering(space):
-            self.each(body, self.declare)
+        if head.inputs:
+            self._bind_inputs(s, space, head, inputs)
+        declared, instances = body.with_loops(DECLARED), body.of(syntax.Instance)
+        with self.entering(space) if declared or instances else nullcontext():
+            self.each(declared, self.declare)
             self.bodies.append((space, body))
             self.announce(body)
 
     @contextmanager
-    def _unread(self, broken: bool) -> Iterator[None]:
+    def _unread(self) -> Iterator[None]:
         """What connects a component that lost a statement is no mistake: its port may stand there."""
-        if not broken:
-            yield
-            return
         before, silent = self.report, Report()
         self.report = self.resolver.report = silent
         try:
@@ -193,9 +202,10 @@ class Instances(Elements):
 
     def _arguments(
         self, s: syntax.Instance, component: ComponentSymbol, head: Interface, space: Space
-    ) -> dict[str, Argument]:
-        """Values of parameters; those that a level chosen by the scene has no use for are left out."""
+    ) -> tuple[dict[str, Argument], dict[str, syntax.Expr]]:
+        """Values of parameters, and inputs; those that a level chosen by the scene has no use for are left out."""
         found: dict[str, Argument] = {}
+        inputs: dict[str, syntax.Expr] = {}
         others = set(space.elsewhere) - set(head.parameters) if space.path in self.levels else ()
         for arg in s.args or ():
             if arg.name is None:
@@ -205,7 +215,7 @@ class Instances(Elements):
                 message = f"'{text}' is a positional argument: those of '{component.name}' are named"
                 raise self.resolver.fail("E404", message, arg.span, help=help_)
             if arg.name in head.inputs:
-                head.given[arg.name] = arg.value
+                inputs[arg.name] = arg.value
                 continue
             if arg.name in others:
                 message = f"'{s.decl.name}' has no parameter '{arg.name}' at level {space.level}: left out"
@@ -219,7 +229,7 @@ class Instances(Elements):
                     "E405", f"'{component.name}' has no parameter '{arg.name}'", arg.span, help=listed
                 )
             found[arg.name] = (arg.value, self.resolver.resolve(arg.value), self.resolver.bare(arg.value))
-        return found
+        return found, inputs
 
     def _required(
         self, s: syntax.Instance, component: ComponentSymbol, head: Interface, given: dict[str, Argument]
@@ -236,11 +246,15 @@ class Instances(Elements):
         return self._instance_source
 
     def _connect(
-        self, s: syntax.Instance, component: ComponentSymbol, head: Interface, space: Space
-    ) -> dict[str, syntax.Expr]:
-        """Bind ports and branches; the inputs' expressions come back."""
+        self,
+        s: syntax.Instance,
+        component: ComponentSymbol,
+        head: Interface,
+        space: Space,
+        inputs: dict[str, syntax.Expr],
+    ) -> None:
+        """Bind ports and branches; `inputs` takes the expressions of those that are connected."""
         self._instance_source = self.resolver.source
-        inputs = dict(head.given)
         bound: set[str] = set()
         for connection in s.connections:
             match connection:
@@ -266,7 +280,6 @@ class Instances(Elements):
                 raise self.resolver.fail(
                     "E414", f"input '{name}' of '{s.decl.name}' is not bound", s.span, help=f"{name} = ..."
                 )
-        return inputs
 
     def _by_name(
         self, s: syntax.Instance, component: ComponentSymbol, head: Interface, connection: syntax.Connection

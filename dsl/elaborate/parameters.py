@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from contextlib import nullcontext
 
-from sysdyn.dsl.elaborate.parts import ElaborationContext, Nested
+from sysdyn.dsl.elaborate.head import Body
+from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -17,6 +18,7 @@ from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.tree import syntax
 
+Stated = tuple[syntax.Param, tuple[syntax.For, ...]]
 Argument = tuple[syntax.Expr, Typed | Vector, str | None]
 """As written, its value where the instance stands, and the name of the bare number that it is."""
 
@@ -24,28 +26,36 @@ Argument = tuple[syntax.Expr, Typed | Vector, str | None]
 class Parameters(ElaborationContext):
     """Declares parameters."""
 
-    def declare_parameters(self, statements: Sequence[Nested], given: dict[str, Argument]) -> None:
+    def declare_parameters(self, body: Body, given: dict[str, Argument]) -> None:
         """Parameters in the order of their dependence (the default of one may name another); given: arguments."""
-        found: dict[str, tuple[syntax.Param, tuple[syntax.For, ...]]] = {}
-        for statement, loops in statements:
-            if isinstance(statement, syntax.Param):
-                name = statement.decl.name
-                if name in found:
-                    related = (Related("first declared here", self.place(found[name][0].decl.span)),)
-                    self.report.error(
-                        "E106", f"'{name}' is declared twice", self.place(statement.decl.span), related=related
-                    )
-                    continue
-                found[name] = (statement, loops)
-        for name in self._by_dependence(found):
-            statement, loops = found[name]
+        said = len(self.report)
+        order = body.order if body.order is not None else self._by_dependence(self._first(body))
+        if len(self.report) == said:  # what is wrong is told of each instance
+            body.order = order
+        for statement, loops in order:
             try:
-                with self.inside(loops):
-                    self._parameter(statement, given.get(name))
+                with self.inside(loops) if loops else nullcontext():
+                    self._parameter(statement, given.get(statement.decl.name))
             except Failed:
-                self.scope.broken.add(name)
+                self.scope.broken.add(statement.decl.name)
 
-    def _by_dependence(self, found: dict[str, tuple[syntax.Param, tuple[syntax.For, ...]]]) -> list[str]:
+    def _first(self, body: Body) -> dict[str, Stated]:
+        """The parameters of a body by their names; E106 where there are two of one."""
+        found: dict[str, Stated] = {}
+        for statement, loops in body.of(syntax.Param):
+            assert isinstance(statement, syntax.Param)
+            name = statement.decl.name
+            if name in found:
+                related = (Related("first declared here", self.place(found[name][0].decl.span)),)
+                self.report.error(
+                    "E106", f"'{name}' is declared twice", self.place(statement.decl.span), related=related
+                )
+                continue
+            found[name] = (statement, loops)
+        return found
+
+    def _by_dependence(self, found: dict[str, Stated]) -> tuple[Stated, ...]:
+        """The parameters, those that others name before these; E105."""
         needs = {name: _names_in(statement) & found.keys() for name, (statement, _) in found.items()}
         order: list[str] = []
         state: dict[str, int] = {}
@@ -72,7 +82,7 @@ class Parameters(ElaborationContext):
                             self.scope.broken |= {name, other}
                         elif other not in state:
                             stack.append((other, False))
-        return order
+        return tuple(found[name] for name in order)
 
     def _parameter(self, statement: syntax.Param, given: Argument | None) -> None:
         decl = statement.decl

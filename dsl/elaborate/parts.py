@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from sysdyn.dsl.model import budget
@@ -49,7 +50,7 @@ class Requirement:
     condition: Node
     loops: tuple[Loop, ...]
     place: Place
-    text: str
+    written: syntax.Expr
 
 
 @dataclass(slots=True)
@@ -121,8 +122,11 @@ class ElaborationContext:
         """Carry out statements in their loops; what fails has been reported."""
         for statement, loops in statements:
             try:
-                with self.inside(loops) if loops else nullcontext():
-                    self.in_parts(lambda s=statement: do(s), statement.span)  # type: ignore[misc]
+                if loops:
+                    with self.inside(loops):
+                        self.in_parts(partial(do, statement), statement.span)
+                else:
+                    self.in_parts(partial(do, statement), statement.span)
             except Failed:  # what it would have declared is not reported again where it is used
                 for decl in declared(statement):
                     if decl.name not in self.scope.symbols:

@@ -8,7 +8,6 @@ from contextlib import ExitStack, nullcontext
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.declarations import Declarations
 from sysdyn.dsl.elaborate.parts import Requirement
-from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -186,8 +185,7 @@ class Statements(Declarations):
 
     def _require(self, s: syntax.Require) -> None:
         node = self.resolver.condition(s.condition)
-        text = format_expression(s.condition)
-        self.parts.requirements.append(Requirement(node, self.resolver.loops, self.place(s.span), text))
+        self.parts.requirements.append(Requirement(node, self.resolver.loops, self.place(s.span), s.condition))
 
     def expect(self, s: syntax.Expect) -> None:
         """`expect`, in a model or in a scene."""

@@ -32,6 +32,11 @@ def at_rest() -> Iterator[None]:
         gc.enable()
 
 
+def kept() -> bool:
+    """Whether the process ends with its command."""
+    return _keeping
+
+
 def keep() -> None:
     """The process ends with its command: what a long text has become is never looked through for garbage."""
     global _keeping

@@ -125,6 +125,9 @@ def linear(constant: float, terms: Iterable[tuple[float, Node]]) -> Node:
     total = constant
     found: dict[Node, float] = {}
     for coefficient, node in terms:
+        if node.op not in {"sum", "const"}:  # most terms
+            found[node] = found.get(node, 0.0) + coefficient
+            continue
         inner, parts = _terms(node)
         if node.op == "sum" and coefficient not in (1.0, -1.0) and len(parts) > 1:
             found[node] = found.get(node, 0.0) + coefficient
@@ -137,9 +140,9 @@ def linear(constant: float, terms: Iterable[tuple[float, Node]]) -> Node:
         return const(total)
     if total == 0.0 and len(kept) == 1 and kept[0][0] == 1.0:
         return kept[0][1]
-    ordered = tuple(sorted((n.number, c) for c, n in kept))
-    data = (total + 0.0, tuple(c for c, _ in kept))
-    return _make("sum", data, tuple(n for _, n in kept), key=(total + 0.0, ordered))
+    ordered = tuple(sorted([(n.number, c) for c, n in kept]))
+    data = (total + 0.0, tuple([c for c, _ in kept]))
+    return _make("sum", data, tuple([n for _, n in kept]), key=(total + 0.0, ordered))
 
 
 def add(*nodes: Node) -> Node:
@@ -173,6 +176,10 @@ def _factors(node: Node) -> tuple[float, Sequence[tuple[float, Node]]]:
     return 1.0, ((1.0, node),)
 
 
+_TAKEN_APART = frozenset(("const", "sum", "mul"))
+"""Operations that are no factors of a product as they stand."""
+
+
 def _whole(value: float) -> bool:
     return value == int(value) if abs(value) < 2**53 else True
 
@@ -186,6 +193,9 @@ def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
     total = constant
     found: dict[Node, float] = {}
     for exponent, node in factors:
+        if node.op not in _TAKEN_APART:  # most factors
+            found[node] = found.get(node, 0.0) + exponent
+            continue
         inner, parts = _factors(node)
         if exponent == 1.0 and len(parts) > WIDE:
             found[node] = found.get(node, 0.0) + exponent  # the derivative of a chain of calls: shared, not copied
@@ -205,8 +215,8 @@ def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
     if len(kept) == 1 and kept[0][0] == 1.0:
         node = kept[0][1]
     else:
-        ordered = tuple(sorted((n.number, e) for e, n in kept))
-        node = _make("mul", tuple(e for e, _ in kept), tuple(n for _, n in kept), key=ordered)
+        ordered = tuple(sorted([(n.number, e) for e, n in kept]))
+        node = _make("mul", tuple([e for e, _ in kept]), tuple([n for _, n in kept]), key=ordered)
     return node if total == 1.0 else linear(0.0, ((total, node),))
 
 
@@ -453,6 +463,11 @@ def variables(root: Node) -> frozenset[Node]:
     return root.variables or frozenset()
 
 
+def ordered_variables(root: Node) -> list[Node]:
+    """The same in the order they were made: for whoever makes nodes of them, so that a text is the same each time."""
+    return sorted(variables(root), key=lambda n: n.number)
+
+
 _ONE_ARGUMENT: Mapping[str, Callable[[Node], Node]] = {
     "signal": lambda x: const(1.0),
     "sin": lambda x: call("cos", x),
@@ -574,6 +589,8 @@ def derivative(root: Node, by: Node) -> Node:
         return const(0.0)
     if root.op == "sum" and by in root.args and not any(a.args for a in root.args):
         return const(root.data[1][root.args.index(by)])
+    if root.op == "mul" and by in root.args and not any(a.args for a in root.args):
+        return _chain(root, [const(1.0 if a is by else 0.0) for a in root.args])
     return differential(root, {by: const(1.0)})
 
 
@@ -597,7 +614,7 @@ def rate(node: Node) -> Node | None:
 def time_derivative(root: Node) -> Node:
     """Total derivative by t; ValueError names an unknown whose derivative is not among the variables."""
     seeds: dict[Node, Node] = {}
-    for node in sorted(variables(root), key=lambda n: n.number):
+    for node in ordered_variables(root):
         dot = rate(node)
         if dot is None:
             raise ValueError(to_text(node))

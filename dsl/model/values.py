@@ -28,6 +28,8 @@ class Values:
 
     def number(self, node: Node, bound: Mapping[Node, float] | None = None) -> float:
         """The value of a node made of parameters and bound loop variables; NaN if it holds anything else."""
+        if node.op == "param" and not node.args and not bound:
+            return self._element(node.data, ())
         return float(ex.evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
 
     def truth(self, node: Node, bound: Mapping[Node, float] | None = None) -> bool:

@@ -99,6 +99,24 @@ class Entered:
         it._bound, it._loops, it.file_scope, it.scope, it.source = self._before
 
 
+class Inside:
+    """Back where a statement stands, with its loops and what was bound there: a context by hand as well."""
+
+    __slots__ = ("_before", "_bound", "_context", "_loops")
+
+    def __init__(self, context: Context, loops: tuple[Loop, ...], bound: dict[str, Typed]) -> None:
+        self._context, self._loops, self._bound = context, list(loops), bound
+
+    def __enter__(self) -> None:
+        it = self._context
+        self._before = it._bound, it._loops
+        it._bound, it._loops = self._bound, self._loops
+
+    def __exit__(self, *failed: object) -> None:
+        it = self._context
+        it._bound, it._loops = self._before
+
+
 class Context:
     """What is in sight, and what has been learnt on the way."""
 
@@ -112,7 +130,7 @@ class Context:
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
         self.constraints: dict[str, list[Constraint]] = {}
-        self._quantities: dict[tuple[int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number and unit
+        self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}
         self._applied: dict[tuple[syntax.Function, tuple[Node, ...]], Node | None] = {}  # functions to arguments
         self._active: list[Definition] = []
@@ -157,15 +175,9 @@ class Context:
         """What is bound here: to be brought into sight again later."""
         return dict(self._bound)
 
-    @contextmanager
-    def inside(self, loops: tuple[Loop, ...], sight: dict[str, Typed]) -> Iterator[None]:
+    def inside(self, loops: tuple[Loop, ...], sight: dict[str, Typed]) -> Inside:
         """Go back to where a statement stands."""
-        before = self._bound, self._loops
-        self._bound, self._loops = sight, list(loops)
-        try:
-            yield
-        finally:
-            self._bound, self._loops = before
+        return Inside(self, loops, sight)
 
     @contextmanager
     def unknown_as(self, code: str, message: str) -> Iterator[None]:
@@ -383,6 +395,8 @@ class Context:
 
     def _bare(self, expression: syntax.Expr) -> tuple[str, str | None] | None:
         """The one parameter among the factors of an expression that is a bare number: its name and that number."""
+        if isinstance(expression, (syntax.Quantity, syntax.Number)):
+            return None
         inner: object = expression
         while isinstance(inner, (syntax.Negative, syntax.Group)):
             inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr

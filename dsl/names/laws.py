@@ -29,11 +29,13 @@ class LawOf:
 
 def own_variables(branch: BranchSymbol, at: tuple[Node, ...], suffix: str = "") -> dict[str, Typed]:
     """Variables e f q p of a branch under the names that its law uses."""
-    found = {}
-    for letter in "efqp":
-        node = ex.var(branch.family.name, f"b{letter}", *at)
-        found[f"{letter}{suffix}"] = Typed(node, branch_dimension(branch.domain, letter))
-    return found
+    name, d = branch.family.name, branch.domain
+    return {
+        f"e{suffix}": Typed(ex.var(name, "be", *at), d.effort.dimension),
+        f"f{suffix}": Typed(ex.var(name, "bf", *at), d.flow.dimension),
+        f"q{suffix}": Typed(ex.var(name, "bq", *at), d.displacement.dimension),
+        f"p{suffix}": Typed(ex.var(name, "bp", *at), d.momentum.dimension),
+    }
 
 
 def law_of(
@@ -46,16 +48,7 @@ def law_of(
     span: syntax.Span,
 ) -> LawOf:
     """Classify `side = value`; wanted: the kind that the author named (None in a component's law)."""
-    dimension = branch_dimension(branch.domain, side)
-    message = f"law of '{branch.name}': {side} is in {dim.show(dimension)}, the law in {{}}"
-    read = context.scalar(value)
-    found = read.dimension
-    other = [s for s in "efqp" if found and found == branch_dimension(branch.domain, s) and s != side]
-    meant = wanted[0] if wanted in ("effort", "flow") else None if wanted else next(iter(other), None)
-    if meant in other and found != dimension and context.bare(value) is None:
-        said = message.format(dim.show(found))
-        raise context.fail("E208", said, value.span, help=f"{meant} = ..., which is in {dim.show(found)}")
-    node = context.fitting(read, value, dimension, "E208", message)
+    node = _in_dimension(context, branch, side, value, wanted)
     own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
     others = sorted(set(own) - {side})
     if side in own or len(others) > 1:
@@ -81,6 +74,24 @@ def law_of(
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
     return LawOf(kind, side, node)
+
+
+def _in_dimension(
+    context: Context, branch: BranchSymbol, side: str, value: syntax.Expr, wanted: str | None
+) -> Node:
+    """The law as a node; E208 where its dimension is not that of its side."""
+    dimension = branch_dimension(branch.domain, side)
+    read = context.scalar(value)
+    found = read.dimension
+    if found is None or found == dimension:
+        return read.node
+    message = f"law of '{branch.name}': {side} is in {dim.show(dimension)}, the law in {{}}"
+    other = [s for s in "efqp" if found and found == branch_dimension(branch.domain, s) and s != side]
+    meant = wanted[0] if wanted in ("effort", "flow") else None if wanted else next(iter(other), None)
+    if meant in other and context.bare(value) is None:
+        said = message.format(dim.show(found))
+        raise context.fail("E208", said, value.span, help=f"{meant} = ..., which is in {dim.show(found)}")
+    return context.fitting(read, value, dimension, "E208", message)
 
 
 def _controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:

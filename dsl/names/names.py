@@ -51,7 +51,8 @@ class Names(Context):
 
     def _quantity(self, e: syntax.Quantity) -> Value:
         """A number with its unit, in SI."""
-        key = id(self.scope), e.text, e.unit.text
+        scope = self.scope.declaring
+        key = id(scope), len(scope.units), e.text, e.unit.text
         known_ = self._quantities.get(key)
         if known_ is not None:
             self._looks_like_division(e)
@@ -66,7 +67,7 @@ class Names(Context):
         value = e.value if unit.scale == 1 else float(Fraction(e.text) * unit.scale)
         found = Typed(ex.const(value), unit.dimension)
         if "$" not in e.unit.text:
-            self._quantities[key] = self.scope, found
+            self._quantities[key] = scope, found
         return found
 
     def _looks_like_division(self, e: syntax.Quantity) -> None:

@@ -287,6 +287,8 @@ class Scope:
     broken: set[str] = field(default_factory=set)
     missed: bool = False
     """Whether a name of a statement that could not be read was asked for."""
+    read: dict[tuple[str, int], Unit] | None = None
+    """Units that were read here, by their text and the number of those declared then."""
 
     def find(self, name: str) -> Symbol | None:
         """The symbol of that name, nearest level first."""
@@ -305,6 +307,14 @@ class Scope:
                 return scope.units[name]
             scope = scope.outer
         return None
+
+    @property
+    def declaring(self) -> Scope:
+        """The nearest scope that declares units of its own, or the outermost: units mean the same in all up to it."""
+        scope = self
+        while not scope.units and scope.outer is not None:
+            scope = scope.outer
+        return scope
 
     def is_broken(self, name: str) -> bool:
         """Whether the name stands in a statement that could not be read."""

@@ -13,6 +13,19 @@ from sysdyn.dsl.tree import syntax
 
 def read_unit(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -> Unit | None:
     """The value of a unit; None after reporting E201 or E209."""
+    declaring = scope.declaring
+    if declaring.read is None:
+        declaring.read = {}
+    key = unit.text, len(declaring.units)
+    found = declaring.read.get(key)
+    if found is None:
+        found = _read(unit, scope, source, report)
+        if found is not None and "$" not in unit.text:
+            declaring.read[key] = found
+    return found
+
+
+def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -> Unit | None:
     dimension: Dimension = NONE
     scale = Fraction(1)
     for factor in unit.factors:

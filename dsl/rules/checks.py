@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -236,9 +237,10 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
 def values(model: Elaborator, known: Values, report: Report) -> None:
     """E322, E324, E805, E807 with the values bound."""
     for r in model.parts.requirements:
-        node, loops, place, text = r.condition, r.loops, r.place, r.text
+        node, loops, place = r.condition, r.loops, r.place
         bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
         if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
+            text = format_expression(r.written)
             shown = ", ".join(_valued(n, known.number(n, bound), model) for n in _parameters(node))
             report.error("E322", f"require {text} fails: {shown}", place, help=f"values for which {text}")
     for node, place in _expressions(model):
@@ -249,7 +251,8 @@ def values(model: Elaborator, known: Values, report: Report) -> None:
 
 
 def _parameters(node: Node) -> list[Node]:
-    return [n for n in ex.topological([node]) if n.op == "param"]
+    nodes = ex.topological([node]) if any(a.args for a in node.args) else (*node.args, node)
+    return [n for n in dict.fromkeys(nodes) if n.op == "param"]
 
 
 def _valued(node: Node, value: float, model: Elaborator) -> str:
@@ -259,7 +262,7 @@ def _valued(node: Node, value: float, model: Elaborator) -> str:
 
 
 def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
-    for inner in ex.topological([node]):
+    for inner in ex.topological([node]) if node.args else ():
         if inner.op != "mul" or not any(e < 0 for e in inner.data):
             continue
         for exponent, factor in zip(inner.data, inner.args, strict=True):

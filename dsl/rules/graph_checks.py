@@ -120,11 +120,11 @@ def _idle_branches(model: Elaborator, report: Report) -> None:
 def _lossless(model: Elaborator, report: Report) -> None:
     """E314: `lossless` holds by construction where a component is made of couplings alone."""
     for space, body in model.bodies:
-        claims = [s for s, _ in body if isinstance(s, syntax.Lossless)]
+        claims = body.of(syntax.Lossless)
         if not claims:
             continue
         inside = [b for b in model.parts.branches if b.name.startswith(f"{space.path}.")]
-        place = Place(space.source, claims[0].span)
+        place = Place(space.source, claims[0][0].span)
         wrong = next((b for b in inside if b.kind in ("dissipator", "effort", "flow", "kinetic", "potential")), None)
         if wrong is not None and wrong.kind in ("dissipator", "effort", "flow"):
             message = f"'lossless' fails: '{wrong.name}' is a {wrong.kind}" + (
@@ -143,7 +143,7 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
     slope = ex.derivative(branch.law, own[0])
     if slope.op == "const" and not slope.data < 0.0:
         return
-    if any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
+    if slope.op != "param" and any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
         return
     bound = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
     value = known.number(slope, bound)

@@ -30,7 +30,10 @@ def passivity(network: Network, known: Values, report: Report) -> None:
 
 def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
     if law.op == "sum" and law.data[0] == 0.0 and len(law.args) == 1 and law.args[0].op == "var":
-        return  # R*f
+        return  # 5 ohm*f
+    factors = zip(law.data, law.args, strict=True) if law.op == "mul" else ()
+    if law.op == "mul" and all(e == 1.0 if a.op == "var" else a.op == "param" for e, a in factors):
+        return  # R*f, and what reads other unknowns
     nodes = ex.topological([law])
     own = [n for n in nodes if n.op == "var"]
     if len(own) != 1 or own[0].data[0] != branch.name or any(n.op in ("time", "table") for n in nodes):

@@ -113,8 +113,8 @@ def _keep(group: Any, parameters: Sequence[Parameter]) -> None:
         kind, unit = units[parameter.unit]
         name = parameter.name.replace("/", "\u2215").encode()
         data = h5d.create(group.id, name, real, scalar, untimed)
-        data.write(h5s.ALL, h5s.ALL, np.array(parameter.value, dtype=np.float64))
-        h5a.create(data, b"units", kind, scalar).write(unit)
+        data.write(h5s.ALL, h5s.ALL, np.array(parameter.value, dtype=np.float64), real)
+        h5a.create(data, b"units", kind, scalar).write(unit, kind)
 
 
 def clear(path: Path) -> None:

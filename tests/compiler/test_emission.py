@@ -17,7 +17,9 @@ from sysdyn.compiler.program import build as build_
 from sysdyn.compiler.program import cache as cache_
 from sysdyn.compiler.program.emit_c import emit_c
 from sysdyn.compiler.program.emit_numpy import emit_numpy
+from sysdyn.dsl import load as dsl
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.text.diagnostics import Report
 
 HERE = Path(__file__).parent
 HOSTILE = ('x; system("ls")', "*/ #include </etc/passwd>", "größe_ß", "a" * 10_000, "int", "\\", "% s", "x\ny")
@@ -67,6 +69,19 @@ def test_an_earlier_model_changes_nothing():
     first = text("solenoid")
     text("two_link_arm")
     assert text("solenoid") == first
+
+
+def test_where_values_lie_in_memory_changes_nothing():
+    """The rate of a balance makes nodes of a set of unknowns: in the order of their making, not of their addresses."""
+    document = dsl.read(HERE.parents[1] / "models" / "seed" / "msd_velocity_source.sd", Report())
+    scene = next(iter(document.scenes.values()))
+    texts, kept = set(), []
+    for k in range(20):
+        with x.fresh():
+            net = dsl.network(document, document.models["msd_velocity_source"], scene, Report())
+            kept.append([object() for _ in range(37 * k)])
+            texts.add(compile_network(net, traced=True).text)
+    assert len(texts) == 1
 
 
 def renamed(net, change):
