@@ -43,6 +43,7 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     """
     flows, implicit = system.are("f"), system.are("e")
     differential = system.differential(jyd)
+    smooth = unique(system, jyd)
     state = system.are("q", "p", "s") | (flows & differential)
     test = np.where(state, 0, -1)
     power = np.zeros(system.unknowns, dtype=np.int32)
@@ -51,6 +52,9 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
         steep = np.zeros(system.unknowns, dtype=bool)
         steep[system.pattern.columns_of()[system.steep_rows(t)[system.pattern.row]]] = True
         power[multiplier | ((implicit | (flows & ~differential)) & ~steep)] = 1
+        # flows that stores know by differences alone: what they have in common is a rate of what balances hold
+        shared = flows & state & ~smooth
+        power[shared] = test[shared] = 1
     if index >= 3:
         power[system.are("kappa", "mu")] = 2
         power[system.are("f", "p") & state] = 1
@@ -60,7 +64,7 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     if (test < 0).all():
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
-    return Roles(test.astype(np.int32), power, state, differential, unique(system, jyd), idle)
+    return Roles(test.astype(np.int32), power, state, differential, smooth, idle)
 
 
 def without_rate(found: Roles, flows: NDArray[np.bool_]) -> Roles:
