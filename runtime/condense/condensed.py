@@ -20,6 +20,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
 from sysdyn.values import dataclass
 
@@ -140,10 +141,7 @@ class Condensed:
         number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1
         where = Places(place[self.pattern.row[entries]], number[self.pattern.columns_of()[entries]])
         rest, _ = compress(open_.size, left.size, [where])
-        found, looks = np.full(left.size, -1, dtype=np.int32), np.zeros(1, dtype=np.int64)
-        arrays = (lib.pointer(item) for item in (rest.column, rest.row, found, looks))
-        if lib.core.sd_match(rest.rows, rest.unknowns, *arrays) < 0:
-            raise MemoryError
+        found = matched(rest)
         if (found < 0).any():
             return False
         own[left] = open_[found]
@@ -438,8 +436,19 @@ def departures(system: System) -> list[tuple[str, str]]:
     ]
 
 
+def _defining(settled: System, rates: Mask, dropped: Mask, derived: Mask) -> bool:
+    """Whether each dropped row can be told for the rate of an unknown of its own among the derived; rates [entries]."""
+    row_at, at = np.cumsum(dropped) - 1, np.cumsum(derived) - 1
+    here = rates & dropped[settled.pattern.row]
+    places = Places(row_at[settled.pattern.row[here]], at[settled.pattern.columns_of()[here]])
+    pattern, _ = compress(int(dropped.sum()), int(derived.sum()), [places])
+    return int((matched(pattern) >= 0).sum()) == pattern.rows
+
+
 def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:
-    """Rows of the settled form that are left [rows]; None where observers read rates that only the others determine."""
+    """Rows of the settled form that are left [rows]; None where the others say more than what leaves moves by: what
+    balances it would be open, or rates that observers read.
+    """
     description = settled.description
     first = {(group, family): at for group, family, at in stepped.form.groups}
     kept = np.ones(settled.rows, dtype=bool)
@@ -457,6 +466,8 @@ def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -
     dropped = np.zeros(settled.rows, dtype=bool)
     dropped[rows[moving & derived[columns]]] = True
     dropped &= kept
+    if not _defining(settled, moving & derived[columns], dropped, derived):
+        return None
     read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.rates or ()}
     open_ = columns[moving & dropped[rows] & ~derived[columns]]
     if read & set(settled.family_of[open_].tolist()):

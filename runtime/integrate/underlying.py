@@ -21,11 +21,11 @@ from sysdyn.runtime.model.forms import Planned
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
+from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import column_order
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.levels import undifferentiated
-from sysdyn.runtime.structure.matching import matched
 from sysdyn.values import dataclass
 
 SMALL = 32

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.structure.matching import matched
+from sysdyn.runtime.numerics.matching import matched
 
 LARGE = 4000
 """Unknowns beyond which the paths are not sought."""

@@ -4,8 +4,8 @@ import small_models as models
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.start.start import consistent_start
-from sysdyn.runtime.structure.matching import matched
 from sysdyn.runtime.structure.structure import _growth_index, null_vectors, pencil_index, structure
 
 # differential index of the seed's catalogue (seed/README.md, sections 3 and 4)
