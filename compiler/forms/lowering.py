@@ -11,10 +11,10 @@ With u the loop-local unknowns of a term, every gradient is taken once per term 
 
 from __future__ import annotations
 
+import math
+import random
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.audit import add_audit
 from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
@@ -125,18 +125,18 @@ def _of_one_combination(energy: Node, rates: Sequence[Node]) -> bool:
     slopes = gradient(energy, rates)
     if len(rates) == 2 and is_const(add(*slopes), 0.0):
         return True
-    random, values = np.random.default_rng(7), dict[Node, float]()
+    drawn, known = random.Random(7), dict[Node, float]()
 
-    def at_random() -> NDArray[np.float64]:
-        values.update((rate, random.uniform(0.5, 1.5)) for rate in rates)
-        return np.array(evaluate(slopes, lambda n: values.setdefault(n, random.uniform(0.5, 1.5))))
+    def at_random() -> list[float]:
+        known.update((rate, drawn.uniform(0.5, 1.5)) for rate in rates)
+        return evaluate(slopes, lambda n: known.setdefault(n, drawn.uniform(0.5, 1.5)))
 
     try:
         one, other = at_random(), at_random()
     except (ValueError, ArithmeticError, KeyError):
         return False
-    both = np.outer(one, other)
-    return bool(np.linalg.norm(both - both.T) < PARALLEL * np.linalg.norm(both))
+    pivot, size = max(range(len(one)), key=lambda k: abs(one[k])), math.hypot(*one) * math.hypot(*other)
+    return all(abs(a * other[pivot] - b * one[pivot]) < PARALLEL * size for a, b in zip(one, other, strict=True))
 
 
 def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:

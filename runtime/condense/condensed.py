@@ -22,6 +22,7 @@ from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
+from sysdyn.runtime.numerics.points import distinct
 from sysdyn.values import dataclass
 
 LEAST, STEEP = 12, 50
@@ -436,13 +437,11 @@ def departures(system: System) -> list[tuple[str, str]]:
     ]
 
 
-def _defining(settled: System, rates: Mask, dropped: Mask, derived: Mask) -> bool:
-    """Whether each dropped row can be told for the rate of an unknown of its own among the derived; rates [entries]."""
-    row_at, at = np.cumsum(dropped) - 1, np.cumsum(derived) - 1
-    here = rates & dropped[settled.pattern.row]
-    places = Places(row_at[settled.pattern.row[here]], at[settled.pattern.columns_of()[here]])
-    pattern, _ = compress(int(dropped.sum()), int(derived.sum()), [places])
-    return int((matched(pattern) >= 0).sum()) == pattern.rows
+def _defining(rows: Ints, columns: Ints) -> bool:
+    """Whether each of the rows can be told for a column of its own, by their entries."""
+    own, each = distinct(rows), distinct(columns)
+    pattern, _ = compress(own.size, each.size, [Places(np.searchsorted(own, rows), np.searchsorted(each, columns))])
+    return int((matched(pattern) >= 0).sum()) == own.size
 
 
 def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:
@@ -466,7 +465,8 @@ def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -
     dropped = np.zeros(settled.rows, dtype=bool)
     dropped[rows[moving & derived[columns]]] = True
     dropped &= kept
-    if not _defining(settled, moving & derived[columns], dropped, derived):
+    rates = moving & derived[columns] & dropped[rows]
+    if not _defining(rows[rates], columns[rates]):
         return None
     read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.rates or ()}
     open_ = columns[moving & dropped[rows] & ~derived[columns]]

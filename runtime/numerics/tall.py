@@ -14,6 +14,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.numerics.ordering import tall_order
+from sysdyn.runtime.numerics.points import uniform
 from sysdyn.values import dataclass
 
 Entries = tuple[Any, Any, Floats]
@@ -84,7 +85,8 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     """
     columns = _columns(shape, entries, fewer=True)
     assert columns is not None
-    arrays, found = columns.arrays(), np.random.default_rng(5).uniform(0.5, 1.0, columns.pattern.unknowns)
+    # numbers of which no row's coefficients make zero by chance; half to one
+    arrays, found = columns.arrays(), 0.75 + 0.25 * np.cos(2.0 * np.pi * uniform(columns.pattern.unknowns))
     limits = PIVOT, FILLED * columns.pattern.entries
     failed = lib.core.sd_left_open(
         columns.pattern.rows, found.size, *(lib.pointer(item) for item in arrays), *limits, lib.pointer(found)

@@ -30,6 +30,10 @@ TRANSLATION, ROTATION = domain("translation", "flow"), domain("rotation", "flow"
 HEAT = domain("heat", "effort", True)
 
 
+def of(name, kind, *at):
+    return x.var(name, kind, *at)
+
+
 def node(value):
     return value if isinstance(value, x.Node) else x.const(value)
 

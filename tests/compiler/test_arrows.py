@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from catalogue import ONE, PLACE
-from networks import ELECTRICAL, TRANSLATION, Net, compiled, matched, poles
+from networks import ELECTRICAL, TRANSLATION, Net, compiled, matched, of, poles
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.dead_branches import dead_branches
 from sysdyn.compiler.network.influence import links, reached
@@ -19,10 +19,6 @@ from sysdyn.dsl.model.network import Dynamic, Energy, State
 def _fresh():
     with x.fresh():
         yield
-
-
-def of(name, kind, *at):
-    return x.var(name, kind, *at)
 
 
 def ends(b):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from networks import ELECTRICAL, HYDRAULIC, TRANSLATION, Net, compiled, solve
+from networks import ELECTRICAL, HYDRAULIC, TRANSLATION, Net, compiled, of, solve
 from sysdyn.compiler.network.primal import primal
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Loop
@@ -12,10 +12,6 @@ from sysdyn.dsl.model.network import Loop
 def _fresh():
     with x.fresh():
         yield
-
-
-def of(name, kind, *at):
-    return x.var(name, kind, *at)
 
 
 def i(offset=0):
