@@ -293,6 +293,7 @@ SOLVED = {
 @pytest.mark.parametrize(
     ("name", "formulation"), [(name, f) for name, some in SOLVED.items() for f in (FAMILY if LONG else some)]
 )
+@pytest.mark.one_in(3)
 def test_the_underlying_equations_solve_the_rows(name, formulation):
     """Rates and multipliers printed against a numerical solution of the rows that they come from."""
     with ex.fresh():

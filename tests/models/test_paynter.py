@@ -158,6 +158,7 @@ LAID_OUT = [
 
 
 @pytest.mark.parametrize(("domain", "function", "place", "formulation"), LAID_OUT)
+@pytest.mark.one_in(4)
 def test_its_own_variable_is_simulated_rightly(tmp_path, domain, function, place, formulation):
     known = STATE_FUNCTIONS[function]
     variable = names(place, domain)[known.own]
