@@ -17,6 +17,12 @@ def _one_cache(tmp_path_factory):
         yield
 
 
+@pytest.fixture(autouse=True)
+def _here(monkeypatch):
+    """Work stays in this process unless a test asks for more of them: a clock would choose, and patches stay behind."""
+    monkeypatch.setattr("sysdyn.cli.run.crew.PAYS", 1e6)
+
+
 @pytest.fixture
 def effort():
     """Calls a function and counts the lines of Python that it runs: what a clock would say on a machine of its own."""

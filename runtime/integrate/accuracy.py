@@ -55,6 +55,10 @@ algebra alone determines has no error that a step could test); the least that th
 BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
 """The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
 steps of a run behind which none is shortened."""
+LOST = 0.01
+"""Of what it is: where two runs differ by more they hardly share a digit."""
+FALLS, FAINT = 0.3, 100.0
+"""Of a quantity that is zero: of its largest in the run before at most; times what is round-off beside its unit."""
 PARTED, MUCH = 10.0, 0.3
 BEND = 4.0
 LOOSE, TAME = 1e-5, 1e-6
@@ -63,6 +67,8 @@ next where they have, or where Newton's failures say so before."""
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 """Relative errors below this are those of the numbers themselves."""
 LARGEST = float(np.finfo(np.float64).max)
+TINY = 1e-30
+"""An estimate beside what was asked below which it counts as none."""
 
 
 FEW_STEPS, MANY_STEPS = 40, 150
@@ -120,7 +126,7 @@ def law_of(method: str, *, steep: bool) -> Law:
 class Sampled:
     """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
-    is zero to round-off; between [instants]: between an event of this run and the same one of the run before it; late
+    is zero; left_open(): the same by the equations, where two runs share no digit of one; between [instants]: between an event of this run and the same one of the run before it; late
     [instants, quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep
     front no more is asked; there: values and late at instants of its own, for the run behind it (None: those are the
     same); strained: Newton failed so often that the tolerance says little of its steps.
@@ -131,6 +137,7 @@ class Sampled:
     largest: Floats
     steps: int
     noise: Floats | float = 0.0
+    left_open: Callable[[], Floats] | None = None
     between: NDArray[np.bool_] | None = None
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
@@ -179,6 +186,23 @@ def lateness(time: Floats, values: Floats, rates: Floats, tolerance: float) -> F
     return tolerance * np.fmin(np.abs(rates), BEND * slopes)
 
 
+def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
+    """Quantities [quantities] of which both runs have round-off alone, by symmetry or by a balance: it is nobody's error.
+
+    Beside others of their unit they are seen at once, also where they fall with the tolerance: then they are errors of
+    what cancels.  Where two runs miss the target the equations are asked.
+    """
+    before, now = (np.abs(values).max(axis=0) for values in (coarse.own[0], fine.values))
+    seen = np.maximum(before, now)
+    found = (seen <= fine.noise) | ((now <= FALLS * before) & (now <= FAINT * np.asarray(fine.noise)))
+    if fine.left_open is not None:
+        far = apart(coarse, fine).max(axis=0)
+        lost = ~found & (far > target * fine.largest) & (far > LOST * seen)
+        if lost.any():
+            found |= lost & (seen <= fine.left_open())
+    return np.asarray(found)
+
+
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
     """(largest relative difference, the same over the accuracy wanted) of two runs, in the finer one's sizes."""
     size = fine.largest
@@ -188,8 +212,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     before = coarse.own[0]
     if before.shape != fine.values.shape:
         return np.inf, np.inf
-    # zero by symmetry, in both runs: what is left of it is nobody's error
-    use &= ~(np.maximum(np.abs(before), np.abs(fine.values)).max(axis=0) <= fine.noise)
+    use &= ~zero(coarse, fine, target)
     if not use.any():
         return 0.0, 0.0
     there = ... if fine.between is None else ~fine.between
@@ -201,7 +224,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     return float(relative.max()), float((relative / target[use]).max())
 
 
-def parted(coarse: Sampled, fine: Sampled) -> bool:
+def parted(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
     """Whether two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it
     is: then they ran away, and that both end alike, beside what has become of them, says little.  At fine tolerances a
     front that begins at next to nothing looks alike, and nothing runs away.
@@ -215,7 +238,8 @@ def parted(coarse: Sampled, fine: Sampled) -> bool:
         away = apart(coarse, fine)[1:] > np.maximum(PARTED * most, MUCH * now)
     if fine.between is not None:
         away[fine.between[1:]] = False
-    return bool((away & (np.abs(values[0]) > fine.noise)).any())
+    away &= np.abs(values[0]) > fine.noise
+    return bool(away.any()) and bool((away & ~zero(coarse, fine, target)).any())
 
 
 def _shrink(power: float, step: float, far: float) -> float:
@@ -303,7 +327,7 @@ class _Estimate:
         What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
         """
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
-        drop = (1.0 / max(AIM * self.over, 1e-300)) ** (1.0 / power)
+        drop = max(AIM * self.over, TINY) ** (-1.0 / power)
         least, most = (FIRST_DROP, LITTLE) if self._power is None else (1e-3, LEFT)
         return max(float(np.clip(drop, least, most)) * tolerance, self.law.finest)
 
@@ -336,7 +360,7 @@ def control(
         apart = estimate.compare(last, now, shorter)
         if now.steps == last.steps and apart < ROUND_OFF:
             return _shifted(run, now, target, number)
-        away = parted(last, now)
+        away = parted(last, now, target)
         if estimate.over <= 1.0 and not (doubted and number == 2) and not away:
             return _achieved(estimate.apart, True, number, now.tolerance)
         held = now.steps * longest < HOLDS and now.steps < ENOUGH

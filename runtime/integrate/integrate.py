@@ -553,6 +553,7 @@ class Integration:
             self.ledgers,
             self.happened(),
             self.run_.contents.beyond,
+            (*self.method.point(), self._sizes()[0]),
         )
 
     def __del__(self) -> None:

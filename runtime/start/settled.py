@@ -25,7 +25,7 @@ LARGE = 100_000
 """Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before."""
 LIGHT = 1e-3
 """Weight (of squares) of displacements without inertia: they follow those that have some."""
-FREE = 1e-4
+FREE = 1e-6
 """Weight (of squares: its square) of unknowns that follow from the state."""
 OPEN = 1e-6
 """Of a unit vector: a part of it that is open."""

@@ -50,6 +50,7 @@ def test_an_item_that_kills_its_process_costs_its_own_answer():
 
 
 def test_processes_begin_where_what_is_left_foreseeably_pays(monkeypatch):
+    monkeypatch.setattr(crew, "PAYS", 3.0)
     monkeypatch.setattr(crew, "cores", lambda: 2)
     assert {p for _, p, _ in crew.each(later_first, [2, 3, 4], None)} == {os.getpid()}, "too small"
     first, *others = (p for _, p, _ in crew.each(later_first, [0, *[2] * 28], None))
