@@ -100,7 +100,7 @@ LAWS = {
     # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
     # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3
-    "radau": Law(5.0, 0.9, 0.65, 1e-17, 1.2, 0.15),
+    "radau": Law(5.0, 0.9, 0.65, 1e-17, ratio=0.05),
     # of order 8 a tolerance a quarter as large costs a sixth of a run, a miss costs one: a gain of 40 left a third run
     # to one model in five, 160 to one in fifty; the credit of a wider ratio pays for the looser draft
     "dopri": Law(160.0, 1.0, 0.9, 2e-14, ratio=0.05),
