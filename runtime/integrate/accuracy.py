@@ -1,7 +1,8 @@
 """An accuracy asked for, met by an estimate of the global error.
 
-A draft is followed by a run at the tolerance that should do, a seventh or a tenth of it or, where the draft took many
+A draft is followed by a run at the tolerance that should do, a tenth or a twentieth of it or, where the draft took many
 steps, less, and both are compared at instants of the draft's own rows; a run behind them at instants of the last one's.
+Where little happens in a draft of radau, the run behind it is one of the bdf.
 With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
 measured over three runs, at most what the method's law credits.  Where the estimate misses what was asked, a finer run
 follows and is compared with the last one.
@@ -65,6 +66,10 @@ ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
 LARGEST = float(np.finfo(np.float64).max)
 
 
+QUIET, AGREE = 1.35, 2.0
+"""Steps of a draft over those of its longest step, up to which little happens in it: a lighter method then follows, and
+a run of its own differs from the draft by its own error, AGREE times of which is the estimate (on 175 runs of eleven
+models the estimate was 1 to 13 times the error, mostly 2)."""
 FEW_STEPS, MANY_STEPS = 40, 150
 """Of a draft in which little happens, or much: beyond, errors do not follow from the number of steps."""
 
@@ -155,6 +160,17 @@ class Achieved:
     met: bool
     runs: int
     tolerance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Lighter:
+    """A method whose runs cost less where little happens.  law: how its errors follow its tolerance; take: the runs go
+    on with it; leave: they go on with the method before, compared with the run before.
+    """
+
+    law: Law
+    take: Callable[[], None]
+    leave: Callable[[], None]
 
 
 Run = Callable[[float, float], Sampled]
@@ -310,13 +326,39 @@ class _Estimate:
         return max(float(np.clip(drop, least, most)) * tolerance, self.law.finest)
 
 
+def _agreed(run: Run, draft: Sampled, lighter: Lighter, target: Floats, wanted: float) -> Achieved | None:
+    """What a run of the lighter method is worth behind a draft in which little happens: a pair of two methods, whose
+    errors have nothing in common.  None where much happens, or where it fails or misses: the method before goes on.
+    """
+    if draft.strained or draft.steps * STRETCH * LONGEST > QUIET:
+        return None
+    lighter.take()
+    try:
+        now = run(lighter.law.tolerance(wanted), LONGEST)
+    except SolverFailure as failure:
+        if failure.cause == "max_wall":
+            raise
+    else:
+        apart, over = difference(draft, now, target)
+        if AGREE * over <= 1.0 and not parted(draft, now):
+            return _achieved(AGREE * apart, True, 2, now.tolerance)
+    lighter.leave()
+    return None
+
+
 def control(
-    run: Run, target: Floats, law: Law, *, doubted: bool = False, first: float | None = None
+    run: Run,
+    target: Floats,
+    law: Law,
+    *,
+    doubted: bool = False,
+    first: float | None = None,
+    lighter: Lighter | None = None,
 ) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
 
     doubted: another method failed here, and the first pair of runs is not believed on its own; first: the tolerance
-    of the run behind the draft, where one is known that does.
+    of the run behind the draft, where one is known that does; lighter: takes over where little happens.
 
     Raises SolverFailure where the first runs fail.
     """
@@ -330,6 +372,10 @@ def control(
         tolerance = law.tolerance(wanted, last.steps)
     tolerance = max(min(tolerance, law.ratio * last.tolerance), law.far * last.tolerance, law.finest)
     tolerance = min(tolerance, TAME) if last.strained else tolerance
+    usual = first is None and wanted < 1.0 and not doubted
+    light = _agreed(run, last, lighter, target, wanted) if lighter is not None and usual else None
+    if light is not None:
+        return light
     while number < RUNS:
         number += 1
         now = _finer(run, last, tolerance, longest, law, compared=bool(np.isfinite(estimate.over)))
