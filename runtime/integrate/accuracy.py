@@ -52,7 +52,8 @@ TIMING, SHARE = 1e-9, 1e-3
 """Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
 HOLDS, SHORTEN = 1.2, 1.0 / 32.0
 """Steps of a run over those of the longest length, up to which that length holds them and the tolerance does not (what
-algebra alone determines has no error that a step could test); the least that the next run's is of it."""
+algebra alone determines has no error that a step could test), in both runs of a pair; the least that the next run's is
+of it."""
 BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
 """The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
 steps of a run behind which none is shortened."""
@@ -326,11 +327,21 @@ class _Estimate:
         return max(float(np.clip(drop, least, most)) * tolerance, self.law.finest)
 
 
+def _held(run: Sampled, longest: float) -> bool:
+    """Whether the longest step, and not the tolerance, holds the steps."""
+    return run.steps * longest < HOLDS and run.steps < ENOUGH
+
+
+def _quiet(draft: Sampled) -> bool:
+    """Whether little happens in a draft."""
+    return draft.steps * STRETCH * LONGEST <= QUIET
+
+
 def _agreed(run: Run, draft: Sampled, lighter: Lighter, target: Floats, wanted: float) -> Achieved | None:
     """What a run of the lighter method is worth behind a draft in which little happens: a pair of two methods, whose
     errors have nothing in common.  None where much happens, or where it fails or misses: the method before goes on.
     """
-    if draft.strained or draft.steps * STRETCH * LONGEST > QUIET:
+    if draft.strained or not _quiet(draft):
         return None
     lighter.take()
     try:
@@ -366,6 +377,7 @@ def control(
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, tolerance, law)
     estimate, longest = _Estimate(law, target), LONGEST
+    still = _quiet(last)
     shorter: float | None = None
     number = 1
     if first is None and wanted < 1.0:
@@ -387,7 +399,8 @@ def control(
         away = parted(last, now)
         if estimate.over <= 1.0 and not (doubted and number == 2) and not away:
             return _achieved(estimate.apart, True, number, now.tolerance)
-        held = now.steps * longest < HOLDS and now.steps < ENOUGH
+        before, still = still, _held(now, longest)
+        held = before and still
         if now.tolerance <= 1.01 * law.finest and not held:
             break
         shorter = estimate.shorter() if held else None

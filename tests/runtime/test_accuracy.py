@@ -122,6 +122,19 @@ def test_a_draft_in_which_much_happens_asks_for_a_finer_run():
     assert asked[1] < 0.3 * law.tolerance(1e-4, 20)
 
 
+@pytest.mark.parametrize(("steps", "shorter"), [(18, True), (40, False)])
+def test_steps_are_shortened_where_their_length_holds_both_runs(steps, shorter):
+    asked = []
+
+    def run(tolerance, longest):
+        asked.append(longest)
+        off = 0.1 if len(asked) == 1 else 1e-3 / len(asked) ** 6
+        return sampled(tolerance, [1.0, 0.5 + off], steps=steps if len(asked) == 1 else round(1.1 / longest))
+
+    assert control(run, np.array([1e-3]), LAWS["radau"]).met
+    assert (asked[2] < 0.5 * asked[1]) is shorter
+
+
 def two_methods(error, fails=False):
     """Runs of a method r without error and of b; what was run; the change between them."""
     now, made = ["r"], []
