@@ -37,7 +37,7 @@ REFINED, REFINE, HELPS = 4, 0.3, 0.5
 is left of one that a step spoils."""
 LITTLE_HAPPENS = "little happens"
 """Why method auto goes on with the bdf behind a draft of radau."""
-LIGHT = 300
+LIGHT = 200
 """Steps of the bdf there, beyond which they are no cheaper than radau's."""
 SMALL = 100
 """Unknowns up to which steep laws are the bdf's: where they turn, Newton's method holds the steps of any method, and a
