@@ -171,12 +171,21 @@ class Runs:
                 layouts["instants"] = before
         return before[1]
 
-    def take(self, way: Way) -> None:
-        """Goes on with another method and form."""
+    def take(self, way: Way, patience: int | None = None) -> None:
+        """Goes on with another method and form; patience: steps of a run with it."""
+        before = getattr(self, "way", way)
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
         self._beside: tuple[Floats, Floats, Floats] | None = None
-        self.patience: int | None = None
-        self._origin: Origin | None = None
+        self.patience: int | None = patience
+        self._compared_before = getattr(self, "common", None)
+        if before is way or (before.system, before.index) != (way.system, way.index):
+            self._origin: Origin | None = None
+
+    def take_back(self, way: Way) -> None:
+        """Goes on as before the last `take`: the next run is compared where that of the method before it was."""
+        instants = self._compared_before
+        self.take(way)
+        self.common = instants
 
     @property
     def origin(self) -> Origin | None:

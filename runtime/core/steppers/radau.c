@@ -324,6 +324,7 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;
     radau->steps++;
     radau->taken++;
+    sd_radau_note_points(radau);
     radau->rejected = 0;
     /* the Jacobian lasts while Newton converges fast; the factors while the step hardly changes */
     if (radau->theta > GOOD)
