@@ -1,8 +1,8 @@
 """What round-off leaves of quantities that are zero.
 
-Rows are met to eps times their largest term, no better: unknowns are known to what the inverse of the Jacobian of a step
-makes of that (backward error analysis: Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 7).  What
-is zero counts in a row as the largest of its kind and unit would: beside that it is known.
+Rows are met to eps times their largest term, no better: unknowns are known to what the inverse of the Jacobian of a
+step makes of that (backward error analysis: Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 7).
+What is zero counts in a row as the largest of its kind and unit would: beside that it is known.
 """
 
 from __future__ import annotations
