@@ -25,7 +25,9 @@ from sysdyn.values import dataclass
 Mask = NDArray[np.bool_]
 Longs = NDArray[np.int64]
 HEALTHY = 1e-7
-"""Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less."""
+"""Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less.  Where
+a row reads one unknown else, which carries the state, and no constant, it is a multiple of that and has all its digits
+(the voltage of a capacitor of 1 pF, whose charge stays)."""
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
 LONGEST = 12
 """Definitions one after the other: through more of them the rest would read everything (a chain of scalars)."""
@@ -80,29 +82,37 @@ def steady(description: Description, blocks: tuple[str, ...] = ("phi", "phi_rate
     return all(kernel.curved is not None and not kernel.curved for kernel in kernels)
 
 
-def _candidates(system: System) -> tuple[Mask, Longs]:
-    """Entries [entries] through which a row might define an unknown, whatever the numbers; places of what is unread."""
+def _candidates(system: System) -> tuple[Mask, Longs, Mask]:
+    """Entries [entries] through which a row might define an unknown, whatever the numbers; places of what is unread;
+    the unknowns [unknowns] that stay because rows read their derivatives.
+    """
     columns, rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
     moving = system.structural()[1]
     unread = unread_families(system.description, (call.block for call in system.form.calls))
     gone = np.isin(system.family_of, unread) & system.are("q")
     usable = affine(system)
     usable[rows[moving]] = False
-    kept = gone.copy()
-    kept[columns[moving]] = kept[system.form.k_q] = True
-    return usable[rows] & ~kept[columns], np.flatnonzero(gone)
+    carried = np.zeros(system.unknowns, dtype=bool)
+    carried[columns[moving]] = carried[system.form.k_q] = True
+    carried &= ~gone
+    return usable[rows] & ~(carried | gone)[columns], np.flatnonzero(gone), carried
 
 
-def definable(system: System, jy: Floats) -> Mask:
-    """Entries [entries] through which a row can define an unknown, by their values jy at any point."""
+def definable(system: System, jy: Floats, constant: Floats) -> Mask:
+    """Entries [entries] through which a row can define an unknown, by their values jy at any point; constant [rows]:
+    what is left of each row where all unknowns are zero.
+    """
     columns, rows = system.pattern.columns_of(), system.pattern.row
     size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
     weight = size * by_row[rows] * by_column[columns]
     largest = np.zeros(system.rows)
     np.maximum.at(largest, rows, weight)
-    may = system.once("may leave", lambda: _candidates(system))[0]
-    return np.asarray(may & (weight > 0.0) & (weight >= HEALTHY * largest[rows]))
+    may, _, carried = system.once("may leave", lambda: _candidates(system))
+    reads = weight > 0.0
+    multiple = (np.bincount(rows[reads], minlength=system.rows) == 2) & (constant == 0.0)
+    multiple &= np.bincount(rows[reads & carried[columns]], minlength=system.rows) == 1
+    return np.asarray(may & reads & ((weight >= HEALTHY * largest[rows]) | multiple[rows]))
 
 
 def eliminate(system: System, allowed: Mask) -> Elimination:
