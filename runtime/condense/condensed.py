@@ -96,7 +96,7 @@ class Room:
         entries = max(system.pattern.entries for system in systems) + 1
         self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
         self.r = np.zeros(max(system.rows for system in systems) + 1)
-        self.jy, self.jyd = np.zeros(entries), np.zeros(entries)
+        self.slope = np.zeros(entries)
 
 
 class Condensed:
@@ -287,8 +287,7 @@ class Condensed:
             y=lib.pointer(room.y),
             yd=lib.pointer(room.yd),
             r=lib.pointer(room.r),
-            jy=lib.pointer(room.jy),
-            jyd=lib.pointer(room.jyd),
+            slope=lib.pointer(room.slope),
         )
         self.core = lib.System(
             unknowns=self.unknowns,

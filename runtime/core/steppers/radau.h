@@ -89,7 +89,7 @@ typedef struct sd_radau {
     double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
-    double complex *w[SD_PAIRS], *gz;
+    double complex *w[SD_PAIRS], *right; /* right sides and solutions; their memory */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
     sd_system *other;             /* its system */
     double *point_y, *point_rate; /* [n] */
