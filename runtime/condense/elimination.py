@@ -82,9 +82,9 @@ def steady(description: Description, blocks: tuple[str, ...] = ("phi", "phi_rate
     return all(kernel.curved is not None and not kernel.curved for kernel in kernels)
 
 
-def _candidates(system: System) -> tuple[Mask, Longs, Mask]:
-    """Entries [entries] through which a row might define an unknown, whatever the numbers; places of what is unread;
-    the unknowns [unknowns] that stay because rows read their derivatives.
+def _candidates(system: System) -> tuple[Longs, Mask, Mask]:
+    """Entries of the rows that might define an unknown, whatever the numbers; what is unread [unknowns]; the unknowns
+    that stay because rows read their derivatives [unknowns].
     """
     columns, rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
     moving = system.structural()[1]
@@ -94,8 +94,7 @@ def _candidates(system: System) -> tuple[Mask, Longs, Mask]:
     usable[rows[moving]] = False
     carried = np.zeros(system.unknowns, dtype=bool)
     carried[columns[moving]] = carried[system.form.k_q] = True
-    carried &= ~gone
-    return usable[rows] & ~(carried | gone)[columns], np.flatnonzero(gone), carried
+    return np.flatnonzero(usable[rows]), gone, carried & ~gone
 
 
 def definable(system: System, jy: Floats, constant: Floats) -> Mask:
@@ -105,20 +104,23 @@ def definable(system: System, jy: Floats, constant: Floats) -> Mask:
     columns, rows = system.pattern.columns_of(), system.pattern.row
     size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
-    weight = size * by_row[rows] * by_column[columns]
+    here, gone, carried = system.once("may leave", lambda: _candidates(system))
+    i, j = rows[here], columns[here]
+    weight = size[here] * by_row[i] * by_column[j]
     largest = np.zeros(system.rows)
-    np.maximum.at(largest, rows, weight)
-    may, _, carried = system.once("may leave", lambda: _candidates(system))
+    np.maximum.at(largest, i, weight)
     reads = weight > 0.0
-    multiple = (np.bincount(rows[reads], minlength=system.rows) == 2) & (constant == 0.0)
-    multiple &= np.bincount(rows[reads & carried[columns]], minlength=system.rows) == 1
-    return np.asarray(may & reads & ((weight >= HEALTHY * largest[rows]) | multiple[rows]))
+    multiple = (np.bincount(i[reads], minlength=system.rows) == 2) & (constant == 0.0)
+    multiple &= np.bincount(i[reads & carried[j]], minlength=system.rows) == 1
+    found = np.zeros(rows.size, dtype=bool)
+    found[here] = ~(carried | gone)[j] & reads & ((weight >= HEALTHY * largest[i]) | multiple[i])
+    return found
 
 
 def eliminate(system: System, allowed: Mask) -> Elimination:
     """What can leave a form; allowed [entries]: `definable`."""
     gone = system.once("may leave", lambda: _candidates(system))[1]
-    return _Search(system, allowed).found(gone)
+    return _Search(system, allowed).found(np.flatnonzero(gone))
 
 
 def _rank(system: System, family: int) -> int:
