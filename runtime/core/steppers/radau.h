@@ -91,7 +91,7 @@ typedef struct sd_radau {
     double apart[SD_POINTS], bend[SD_POINTS]; /* of each of the last points x_i: the product of all 1 / (x_i - x_j), twice
                                                * their sum */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
-    double complex *w[SD_PAIRS], *gz;
+    double complex *w[SD_PAIRS], *right; /* right sides and solutions; their memory */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
     sd_system *other;             /* its system */
     double *point_y, *point_rate; /* [n] */
