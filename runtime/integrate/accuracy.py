@@ -136,10 +136,11 @@ def law_of(method: str, *, steep: bool) -> Law:
 class Sampled:
     """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
-    is zero; left_open(): the same by the equations, where two runs share no digit of one; between [instants]: between an event of this run and the same one of the run before it; late
-    [instants, quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep
-    front no more is asked; there: values and late at instants of its own, for the run behind it (None: those are the
-    same); strained: Newton failed so often that the tolerance says little of its steps.
+    is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants]:
+    between an event of this run and the same one of the run before it; late [instants, quantities]: what the dense
+    output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
+    and late at instants of its own, for the run behind it (None: those are the same); strained: Newton failed so often
+    that the tolerance says little of its steps.
     """
 
     tolerance: float
@@ -208,7 +209,7 @@ def lateness(time: Floats, values: Floats, rates: Floats, tolerance: float) -> F
 
 
 def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
-    """Quantities [quantities] of which both runs have round-off alone, by symmetry or by a balance: it is nobody's error.
+    """Quantities [quantities] of which both runs have round-off alone, by symmetry or a balance: it is nobody's error.
 
     Beside others of their unit they are seen at once, also where they fall with the tolerance: then they are errors of
     what cancels.  Where two runs miss the target the equations are asked.
@@ -377,7 +378,7 @@ def _agreed(run: Run, draft: Sampled, lighter: Lighter, target: Floats, wanted: 
             raise
     else:
         apart, over = difference(draft, now, target)
-        if AGREE * over <= 1.0 and not parted(draft, now):
+        if AGREE * over <= 1.0 and not parted(draft, now, target):
             return _achieved(AGREE * apart, True, 2, now.tolerance)
     lighter.leave()
     return None
