@@ -11,12 +11,13 @@ Euler's method is not judged.  Received: options, the accuracy control's result,
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.values import dataclass
 
@@ -134,9 +135,16 @@ def allowed(options: Options) -> float:
 
 
 def judge(
-    options: Options, method: str, balances: Iterable[Balance], accurate: bool, missed: Iterable[Estimate]
+    options: Options,
+    method: str,
+    balances: Iterable[Balance],
+    accurate: bool,
+    missed: Iterable[Estimate],
+    left_open: Callable[[], Floats] | None = None,
 ) -> Judgement:
-    """The verdict; accurate: an accuracy was asked for; missed: quantities that did not reach it."""
+    """The verdict; accurate: an accuracy was asked for; missed: quantities that did not reach it; left_open(): what
+    round-off leaves open of each balance [balances]: where nothing moves it is all there is.
+    """
     balances = tuple(balances)
     conserved = tuple(b for b in balances if b.conserved)
     if method == "euler":
@@ -145,10 +153,12 @@ def judge(
     found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time) for e in missed] if accurate else []
     part = allowed(options)
     for kind, what in (("energy", "energy"), ("invariant", "invariants")):
-        own = [b for b in balances if b.kind == kind]
+        own = [(k, b) for k, b in enumerate(balances) if b.kind == kind]
         judged += [what] if own else []
-        for b in own:
+        for k, b in own:
             limit = part * b.turnover
+            if limit < b.value and left_open is not None:
+                limit = max(limit, float(left_open()[k]))
             if not b.value <= limit:
                 found.append(NotMet(what, b.value, limit, b.element.label, b.first_beyond(limit), b.unit, b.element))
     return Judgement(tuple(judged), tuple(found), conserved)

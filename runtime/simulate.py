@@ -157,7 +157,7 @@ def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter |
 def _unbalanced(runs: Runs, options: Options) -> float:
     """How many times its limit the worst ledger of the last run is off."""
     assert runs.done is not None
-    found = judge(options, runs.method, runs.done[0].balances, False, ()).not_met
+    found = judge(options, runs.method, runs.done[0].balances, False, (), runs.open_balances).not_met
     return max((f.value / f.limit if f.value is not None and f.limit > 0.0 else np.inf for f in found), default=0.0)
 
 
@@ -368,14 +368,13 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         raise
     assert runs.done is not None
     missed = _missed(runs, options, achieved)
-    judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed)
+    judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed, runs.open_balances)
     close(runs, achieved, judgement)
     finished, _, writer = runs.done
     if finished.unsettled and not options.events:
         warnings = (*warnings, f"{finished.unsettled} rows do not meet the equations: they are the integrator's own")
-    nominal = runs.nominal(finished.largest, finished.magnitude)
     estimate = achieved.error_estimate if achieved is not None else None
-    lost = tuple(cancelled(nominal, writer.seen(), options.accuracy, estimate))
+    lost = tuple(cancelled(runs.terms(finished.largest), writer.seen(), options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
     return outcome(True, options.t_end, achieved, None, **told)

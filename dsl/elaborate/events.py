@@ -280,7 +280,9 @@ def _stick_in_plane(
     """
     (at, loops), (node, bound, sense) = where, what
     unit, flows = si(NONE), node.args
-    n = tuple(_sense(frame, f"{name} direction {k}", at, loops, place) for k in (1, 2))
+    n = tuple(  # any at first: at rest there is none
+        _sense(frame, f"{name} direction {k}", at, loops, place, begins) for k, begins in ((1, 1.0), (2, 0.0))
+    )
     labels = (name, f"{name} across")
     for label, flow in zip(labels, flows, strict=True):
         frame.parts.constraints.append(Constraint("psi", label, at, flow, loops, unit, place))
@@ -302,11 +304,18 @@ def _rates(root: Node) -> bool:
     return any(n.op == "var" and (n.data[1] in ("f", "nf", "bf") or n.data[2] == 1) for n in ex.variables(root))
 
 
-def _sense(frame: ElaborationContext, name: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place) -> Node:
-    """A parameter that holds the sense of a slip: 1, -1, or 0 while it sticks."""
+def _sense(
+    frame: ElaborationContext,
+    name: str,
+    at: tuple[Node, ...],
+    loops: tuple[Loop, ...],
+    place: Place,
+    begins: float = 0.0,
+) -> Node:
+    """A parameter that holds the sense of a slip: 1, -1, or 0 while it sticks; or a part of its direction."""
     shape = tuple((loop.first, loop.last) for loop in loops) if at else ()
     indices = tuple(loop.index for loop in loops) if at else ()
-    parameter = Parameter(name, shape, si(NONE), (ex.const(0.0),), indices, place)
+    parameter = Parameter(name, shape, si(NONE), (ex.const(begins),), indices, place)
     frame.parts.parameters[parameter.name] = parameter
     frame.parts.discretes.add(parameter.name)
     return ex.param(parameter.name, *at)

@@ -5,8 +5,8 @@
 
 A guess of the active set gives flows (impulses in the metric of the inertia where they must jump) and, by the settled
 rows, rates and multipliers; the first condition that does not hold, in the order written, changes its member, and so on
-(Murty's least-index principal pivoting, which ends for a positive definite matrix and is watched for cycles).  Where a
-gap closes with speed v, Newton's law asks for value' = -restitution v first, by the same pivoting on impulses >= 0.
+(Murty's least-index principal pivoting, which ends for a positive definite matrix and is watched for cycles).  Gaps
+that close are struck before (impacts.py).
 """
 
 from __future__ import annotations
@@ -20,25 +20,24 @@ from sysdyn.runtime.events.mates import mates
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Contact, Plan
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.system import System
 
 FAINT = 1e-3
 """Of the magnitude of an unknown."""
 NEAR, BESIDE = 3, 60
 """Members that change at once, and trials, where an active set contradicts itself."""
-UNSEEN = 16.0 * float(np.finfo(float).eps)
-"""Of the terms of a gap: a flight lower than that."""
 MANY = 2
 """Diodes that change at once, at least: fewer are turned one by one."""
+BODIES = 4.0
+"""Inertias that a contact may stop at once, of the one that its largest multiplier and rate tell."""
+UNTOLD = 1e-9
+"""Change of a bound by reactions of one that is round-off."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
 
 Settle = Callable[[float, Floats, Floats], tuple[Floats, Floats, Floats] | None]
 """t, y, yd -> y, yd consistent with the active set and the impulses [unknowns] that took the flows there; None: no
 such point was found."""
-Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]
-"""t, y, yd, aims [settled rows] -> y after impulses that bring the flow rows to their aims; the impulses [unknowns]."""
 
 
 class NoActiveSetError(Exception):
@@ -58,9 +57,9 @@ class Contacts:
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
+        self._finite, self._unknown = frozenset[int](), True
         self.singular: Callable[[float, Floats, Floats], bool] | None = None
         self._contradicts: set[tuple[bool, ...]] = set()
-        self.fastest = np.zeros(len(contacts))
         self.time = 0.0
         places = self.switches.places
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
@@ -68,8 +67,8 @@ class Contacts:
             same = [c for c in contacts if (c.kind, observer.unit(c.value)) == kind]
             for name in ("value", "rate", "multiplier"):
                 observer.alike([getattr(c, name) for c in same])
-        self._multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
-        self.frozen = mates(plan, system, self._multiplier)
+        self.multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
+        self.frozen = mates(plan, system, self.multiplier)
 
     def size(self, magnitude: Floats, time: float) -> None:
         """Least sizes of values, rates and multipliers: FAINT of those of the unknowns (magnitude [unknowns]) and of a
@@ -79,7 +78,7 @@ class Contacts:
         kinds, largest = self.system.kinds, self.observer.largest
         families = self.system.description.families
         units = np.array([families[k].unit if k >= 0 else "" for k in self.system.family_of])
-        for contact, place in zip(self.contacts, self._multiplier, strict=True):
+        for contact, place in zip(self.contacts, self.multiplier, strict=True):
             own = kinds == ("q" if contact.kind == "phi" else "f")
             alike = own & (units == self.observer.unit(contact.value))
             size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
@@ -146,6 +145,11 @@ class Contacts:
             self._direct(contact, values[list(contact.aim[2:4])])
             self.p[contact.sense] = 0.0 if self.active[k] else 1.0
 
+    def slip(self, k: int, sense: float) -> None:
+        """Dry friction at its bound in a sense."""
+        self.active[k] = False
+        self.p[self.contacts[k].sense] = sense
+
     def _direct(self, contact: Contact, along: Floats) -> None:
         """The direction of a slip in the plane."""
         size = float(np.hypot(*along))
@@ -168,8 +172,13 @@ class Contacts:
             elif self.bar(k, values):
                 if self.active[k]:
                     yield k
-            elif test(self, k, contact, values, float(impulses[self._multiplier[k]])):
+            elif test(self, k, contact, values, self._impulse_on(k, impulses)):
                 yield k
+
+    def _impulse_on(self, k: int, impulses: Floats) -> float:
+        """That of a contact; of friction in the plane its size."""
+        own = float(impulses[self.multiplier[k]])
+        return float(np.hypot(own, impulses[self.multiplier[k + 1]])) if self.contacts[k].kind == "planar" else own
 
     def bar(self, k: int, values: Floats) -> bool:
         """Whether the guard of an inequality says that it is not there."""
@@ -181,8 +190,7 @@ class Contacts:
         """Whether a contact is wrong as it is: one that holds pulls, or one that is open closes."""
         zero = self.observer.zero
         if self.active[k]:
-            least = zero(c.multiplier)  # and an impulse is one over the time in which things change
-            return bool(impulse < -least * self.time or values[c.multiplier] < -least)
+            return bool(impulse < -self.impulse(c) or values[c.multiplier] < -zero(c.multiplier))
         if values[c.value] > zero(c.value):
             return False
         if c.kind == "psi":
@@ -192,22 +200,47 @@ class Contacts:
             closing or (values[c.rate] <= zero(c.rate) and values[c.acceleration] < -zero(c.acceleration))
         )
 
+    def impulse(self, c: Contact) -> float:
+        """Below it an impulse is zero: that of a multiplier over the time in which things change, and what takes a flow
+        that is zero to nothing, by the inertia that the largest multipliers and rates tell.
+        """
+        flow, change = (c.rate, c.acceleration) if c.kind == "phi" else (c.value, c.rate)
+        zero, largest = self.observer.zero, self.observer.largest
+        stops = BODIES * zero(flow) / largest[change] if largest[change] > 0.0 else 0.0
+        return max(zero(c.multiplier) * self.time, float(stops * largest[c.multiplier]))
+
     def _friction(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         """Whether friction is wrong as it is: what sticks is beyond its bound, or what slides turns back."""
         zero, sense = self.observer.zero, float(self.p[c.sense])
         if values[c.bound] == 0.0:  # no friction: it does not hold, whatever holds the bodies (a latch, another law)
             return bool(self.active[k] or sense == 0.0)
         if self.active[k]:
-            return bool(abs(values[c.multiplier]) > values[c.bound] * (1.0 + 1e-9) + zero(c.multiplier))
+            beyond = abs(values[c.multiplier]) > values[c.bound] * (1.0 + 1e-9) + zero(c.multiplier)
+            return bool(beyond or (k in self._finite and abs(impulse) > self.impulse(c)))
         if sense == 0.0:
             return True
         slip = sense * values[c.value]
         return bool(slip < -zero(c.value) or (slip <= zero(c.value) and sense * values[c.rate] < -zero(c.rate)))
 
+    def finite(self, t: float, y: Floats, yd: Floats) -> frozenset[int]:
+        """The frictions whose bound no reaction tells: no impulse is within it."""
+        if self._unknown:
+            reactions = self.system.are("kappa", "mu", "e")[: y.size]
+            bounds = [self.system.observe(t, np.where(reactions, y + s, y), yd) for s in (-1.0, 0.0, 1.0)]
+            frictions = (k for k, c in enumerate(self.contacts) if c.kind in ("friction", "planar"))
+            self._finite = frozenset(k for k in frictions if np.ptp([self._bound(k, b) for b in bounds]) <= UNTOLD)
+            self._unknown = False
+        return self._finite
+
+    def _bound(self, k: int, values: Floats) -> float:
+        """What a friction holds at most."""
+        c = self.contacts[k]
+        return float(values[c.bound] if c.kind == "friction" else values[c.upper] + np.hypot(*values[list(c.aim[2:4])]))
+
     def _planar(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero, speed = self.observer.zero, values[c.aim[4]]
         if self.active[k]:
-            return bool(values[c.upper] < -zero(c.multiplier))
+            return bool(values[c.upper] < -zero(c.multiplier) or (k in self._finite and abs(impulse) > self.impulse(c)))
         if self.p[c.sense] == 0.0:
             return True
         if speed > zero(c.aim[4]):
@@ -222,11 +255,11 @@ class Contacts:
         changed: list[int] = []
         fewest = len(self.contacts)
         block: tuple[NDArray[np.bool_], int, Floats] | None = None
+        self.finite(t, y, yd)
         for _ in range(TRIALS * (1 + len(self.contacts))):
             self.apply()
             state = self.state()
-            if state in seen:  # another order of pivots: from the other end
-                changed.reverse()
+            again = state in seen
             seen.add(state)
             found = self._settled_by(t, y, yd, settle)
             if found is None and block is not None:  # sources that they short: one of them alone
@@ -240,6 +273,9 @@ class Contacts:
             wrong = list(self._wrongs(values, found[2]))
             if not wrong:
                 return found[0], found[1]
+            if again and all(self._opens(k, found[2]) for k in wrong):  # from behind their impulses on
+                y, yd = found[:2]
+                seen.clear()
             # diodes all at once while they become fewer (Judice and Pires 1994), else the first
             several = MANY < len(wrong) < fewest and all(self.contacts[k].kind == "psi" for k in wrong)
             block = (self.active.copy(), wrong[0], values) if several else None
@@ -249,6 +285,10 @@ class Contacts:
                 self.turn(k, values)
         names = dict.fromkeys(self.contacts[k].name for k in changed[-6:] or range(min(len(self.contacts), 6)))
         raise NoActiveSetError(tuple(names))
+
+    def _opens(self, k: int, impulses: Floats) -> bool:
+        """Whether an impulse has stopped what closed, and nothing holds it afterwards."""
+        return bool(self.active[k]) and self.contacts[k].kind == "psi" and impulses[self.multiplier[k]] > 0.0
 
     def _beside(
         self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]
@@ -311,83 +351,6 @@ class Contacts:
             self.p[contact.sense] = np.sign(values[contact.value])
             return
         self.flip(k, values)
-
-    # -- impacts -------------------------------------------------------------------------------------------------
-
-    def strike(self, t: float, y: Floats, yd: Floats, strike: Strike, rest: float) -> Floats:
-        """Y after the impacts of the gaps that close; rest: see plan.Plan."""
-        values, terms = self.observer(t, y, yd), self.observer.terms.copy()
-        near = [
-            k
-            for k, c in enumerate(self.contacts)
-            if c.kind == "phi" and not self.bar(k, values) and self._touches(k, c, values)
-        ]
-        speed = {k: float(values[self.contacts[k].rate]) for k in near}
-        closing = [k for k in near if speed[k] < -self.observer.zero(self.contacts[k].rate)]
-        if not closing:
-            return y
-        for k in closing:
-            self.fastest[k] = max(self.fastest[k], -speed[k])
-        aim = {}
-        for k in near:
-            c, back = self.contacts[k], self.contacts[k].restitution * max(-speed[k], 0.0)
-            # what rises less than round-off of its gap cannot be told from rest
-            risen = back**2 > -2.0 * values[c.acceleration] * UNSEEN * terms[c.value]
-            bounces = risen and back > max(rest * self.fastest[k], self.observer.zero(c.rate))
-            aim[k] = back if bounces else 0.0
-        y, after = self._struck(t, y, yd, strike, (near, closing, aim))
-        for k in near:
-            rate = self.contacts[k].rate
-            self.active[k] = aim[k] == 0.0 and after[rate] <= self.observer.zero(rate)
-        self.apply()
-        return y
-
-    def _touches(self, k: int, c: Contact, values: Floats) -> bool:
-        return bool(self.active[k] or values[c.value] <= self.observer.zero(c.value))
-
-    def _struck(
-        self, t: float, y: Floats, yd: Floats, strike: Strike, what: tuple[list[int], list[int], dict[int, float]]
-    ) -> tuple[Floats, Floats]:
-        """Pivoting on impulses: 0 <= impulse, value'+ >= aim, one of both with equality."""
-        near, closing, aim = what
-        struck = set(closing)
-        for _ in range(TRIALS * (1 + len(near))):
-            for k in near:
-                self.active[k] = k in struck
-            self.apply()
-            found, impulses = strike(t, y, yd, self._aims(aim, struck))
-            values = self.observer(t, found, yd)
-            wrong = (k for k in near if self._bounces_wrong(k, struck, values, impulses, aim))
-            k = next(wrong, -1)
-            if k < 0:
-                return found, values
-            struck ^= {k}
-        raise NoActiveSetError(tuple(self.contacts[k].name for k in near))
-
-    def _bounces_wrong(
-        self, k: int, struck: set[int], values: Floats, impulses: Floats, aim: dict[int, float]
-    ) -> bool:
-        if k in struck:
-            return bool(impulses[self._multiplier[k]] < -self.observer.zero(self.contacts[k].multiplier) * self.time)
-        rate = self.contacts[k].rate
-        return bool(values[rate] < aim[k] - self.observer.zero(rate))
-
-    def _aims(self, aim: dict[int, float], struck: set[int]) -> Floats:
-        """What the rows phi_rate shall be: -value' there."""
-        settled = self._settled
-        aims = np.zeros(settled.rows)
-        first = {(group, family): row for group, family, row in settled.form.groups}
-        for k in struck:
-            family, position = self.switches.places[self.contacts[k].number]
-            row = first["phi_rate", multiplier_row(settled.description, family)] + position
-            aims[row] = -aim[k]
-        return aims
-
-    @property
-    def _settled(self) -> System:
-        if not hasattr(self, "_form"):
-            self._form = self.system.another("settled")
-        return self._form
 
 
 _TESTS = {"friction": Contacts._friction, "planar": Contacts._planar}

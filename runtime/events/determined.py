@@ -2,13 +2,14 @@
 
 Four blocked diodes of a bridge say three things; four that conduct leave the current that circles in them open.  Among
 the active sets that fit, one is taken whose equations determine everything: of dependent constraints one lets go (its
-multiplier is zero, the others hold its value), of undetermined flows that are zero one is held.  Which sets are regular
+multiplier is zero, that of dry friction at its bound, the others hold its value), of undetermined flows that are zero
+one is held.  Which sets are regular
 is a matter of structure: it is asked once for each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -96,25 +97,36 @@ class Determined:
     ) -> Iterator[tuple[Point, int]]:
         """Points of neighbouring active sets that fit too and leave less open."""
         contacts, (open_, turned) = self.contacts, what
-        values, before = contacts.observer(t, *point), contacts.active.copy()
+        values, before = contacts.observer(t, *point), contacts.state()
         part = self._open(t, *point)[1]
         # of equal shares the first counts, not what round-off makes the larger
         order = [k for k in np.argsort(-np.round(part, ALIKE), kind="stable") if part[k] > NOTHING]
         for pivots in (False, True):
             for k in sorted(order, key=lambda k: k in turned):
-                contact = contacts.contacts[k]
-                small = abs(values[contact.value]) <= contacts.observer.zero(contact.value)
-                if contact.kind not in ("psi", "phi") or not small or k in contacts.frozen:
+                small = abs(values[contacts.contacts[k].value]) <= contacts.observer.zero(contacts.contacts[k].value)
+                if not small or k in contacts.frozen:
                     continue
-                contacts.active[k] = not contacts.active[k]
-                contacts.apply()
-                found = self._near(t, point, settle, pivots=pivots)
-                if found is not None:
-                    less = self.nullity(t, *found)
-                    if less < open_:
-                        yield found, less
-                contacts.active[:] = before
-                contacts.apply()
+                for turn in self._turns(k, values):
+                    turn()
+                    contacts.apply()
+                    found = self._near(t, point, settle, pivots=pivots)
+                    if found is not None:
+                        less = self.nullity(t, *found)
+                        if less < open_:
+                            yield found, less
+                    contacts.become(before)
+
+    def _turns(self, k: int, values: Floats) -> Iterator[Callable[[], None]]:
+        """What else contact k may be: friction that sticks may be at its bound in either sense, first that in which it
+        is loaded, while others hold its bodies.
+        """
+        contacts, contact = self.contacts, self.contacts.contacts[k]
+        if contact.kind in ("psi", "phi"):
+            yield lambda: contacts.flip(k, values)
+        elif contact.kind == "friction" and contacts.active[k]:
+            loaded = np.copysign(1.0, values[contact.multiplier])
+            yield lambda: contacts.slip(k, loaded)
+            yield lambda: contacts.slip(k, -loaded)
 
     def _near(self, t: float, point: Point, settle: Settle, *, pivots: bool) -> Point | None:
         """The point of the present active set where that fits, or with pivots of one that fits; None without."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
 from sysdyn.runtime.events.determined import Determined
+from sysdyn.runtime.events.impacts import UNSEEN, Impacts
 from sysdyn.runtime.events.kinks import Kinks, NoBranchError
 from sysdyn.runtime.events.locate import Dense, crossing
 from sysdyn.runtime.events.observer import Observer
@@ -84,6 +85,7 @@ class Handler:
         self.observer = Observer(system, rtol)
         self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
+        self.impacts = Impacts(self.contacts, plan.rest)
         self.kinks = Kinks(plan.kinks, self.observer, self.p)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
@@ -331,24 +333,34 @@ class Handler:
                 self._renew(t, *known)
                 self._note(t, said, touched)
                 return known
-            y = self.contacts.strike(t, y, yd, self._strike, self.plan.rest)
+            y = self.impacts.after(t, y, yd, self._strike)
             values = self.observer(t, y, yd)
             for k in touched:
                 if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                     self.contacts.turn(k, values)
             self.contacts.apply()
             found = self.determined.fit(t, y, yd, restart.struck, touched)
-            tied = any(self.contacts.contacts[k].kind != "phi" for k in touched)  # a gap may have bounced
-            if tied and self.contacts.state() == stood:
+            if self.contacts.state() == stood and self._tied(t, found, touched):
                 found = self._ahead(t, found, stood) or found
             if not self._impacts:
                 self._follows[stood, tuple(touched)] = self.contacts.state()
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
+        found = self._closed(t, found)
         self._renew(t, *found)
         self._bounce(t, *found)
         self._note(t, said, touched)
         return found
+
+    def _closed(self, t: float, point: Point) -> Point:
+        """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""
+        assert self.restart is not None
+        values = self.observer(t, *point)
+        gaps = [c.value for k, c in enumerate(self.plan.contacts) if c.kind == "phi" and self.contacts.active[k]]
+        if not any(abs(values[gap]) > UNSEEN * self.observer.terms[gap] for gap in gaps):
+            return point
+        y, yd, done = self.restart.settler.moved(t, *point)
+        return (y, yd) if done else point
 
     def _remembered(self, t: float, point: Point, key: tuple[tuple[float, ...], tuple[int, ...]]) -> Point | None:
         """The point with the active set that followed when this happened before, where it fits; None where not."""
@@ -366,6 +378,12 @@ class Handler:
         self.contacts.active[:], self.p[:] = before
         self.contacts.apply()
         return None
+
+    def _tied(self, t: float, point: Point, touched: Sequence[int]) -> bool:
+        """Whether something touched may hold or not at this instant: a gap that has not bounced, and all else."""
+        values = self.observer(t, *point)
+        contacts = [self.contacts.contacts[k] for k in touched]
+        return any(c.kind != "phi" or abs(values[c.rate]) <= self.observer.zero(c.rate) for c in contacts)
 
     def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
         """The gaps that an impact opened."""

@@ -7,10 +7,13 @@ What is zero counts in a row as the largest of its kind and unit would: beside t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.points import normal
 
@@ -21,8 +24,27 @@ MARGIN = 64.0
 """Times what they make of a quantity."""
 
 
-def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], step: float) -> Floats:
-    """What round-off leaves open of each quantity [observed] of a run that ended at t (s) in steps of `step` (s).
+PIVOT = 0.1
+"""Of the largest of its column: what an elimination takes as a pivot."""
+HOPS = 3
+"""Pivots in a row: balance, momentum, flow."""
+
+
+class LeftOpen(NamedTuple):
+    """What round-off leaves open of each quantity [observed]; of what a ledger stores, dissipates, is supplied with
+    [ledgers, 4].
+    """
+
+    quantities: Floats
+    ledgers: Floats
+
+    def balances(self, span: float) -> Floats:
+        """Of the balance of each ledger over `span` (s)."""
+        return np.asarray(self.ledgers[:, 0] + span * self.ledgers[:, 1:3].sum(axis=1))
+
+
+def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], step: float) -> LeftOpen:
+    """What round-off leaves open in a run that ended at t (s) in steps of `step` (s).
 
     last [unknowns]: its last y and yd, the largest |y| met.  Zero where the Jacobian says nothing.
     """
@@ -32,13 +54,30 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     with np.errstate(all="ignore"):
         terms = np.abs(jy) * met[columns] + np.abs(jyd) * np.maximum(np.abs(yd), met / step)[columns]
         of_step = jy + jyd / step
-    size, before = np.zeros(system.rows), system.observe(t, y, yd)
+    size = np.zeros(system.rows)
     np.maximum.at(size, rows, terms)
-    found = np.zeros_like(before)
+    before = system.observe(t, y, yd), system.ledgers(t, y, yd)
+    found = LeftOpen(*map(np.zeros_like, before))
     if not (np.isfinite(of_step).all() and np.isfinite(size).all()):
         return found
+    size = _eliminated(system, (rows, columns, of_step), size)
     for error in normal(PROBES, system.rows):
         change = least_norm((system.rows, system.unknowns), (rows, columns, of_step), EPS * size * error)
-        moved = system.observe(t, y + change, yd + change / step)
-        np.fmax(found, np.abs(moved - before), out=found)
-    return MARGIN * found
+        moved = t, y + change, yd + change / step
+        for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
+            np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
+    return found
+
+
+def _eliminated(system: System, entries: tuple[Ints, Ints, Floats], size: Floats) -> Floats:
+    """Terms [rows] with those that elimination brings into a row: of the rows that are pivots of its columns."""
+    rows, columns, values = entries
+    row, column = sparse_factors(rows, columns, np.abs(values), (system.rows, system.unknowns))
+    scaled = np.abs(values) * row[rows] * column[columns]
+    largest, brought = np.zeros(system.unknowns), np.zeros(system.unknowns)
+    np.maximum.at(largest, columns, scaled)
+    pivot = (scaled >= PIVOT * largest[columns]) & (values != 0.0)
+    for _ in range(HOPS):
+        np.maximum.at(brought, columns[pivot], size[rows[pivot]] / np.abs(values[pivot]))
+        np.maximum.at(size, rows, np.abs(values) * brought[columns])
+    return size

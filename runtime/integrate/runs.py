@@ -21,7 +21,7 @@ from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.origin import Origin
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
-from sysdyn.runtime.integrate.round_off import left_open
+from sysdyn.runtime.integrate.round_off import LeftOpen, left_open
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF
@@ -369,8 +369,14 @@ class Runs:
 
     def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""
-        sizes = self.sizes(largest, magnitude)
-        return dict(zip((column.name for column in self.columns), sizes.tolist(), strict=True))
+        return self._named(self.sizes(largest, magnitude))
+
+    def terms(self, largest: Floats) -> dict[str, float]:
+        """Largest terms of each stored quantity, where it is a difference; largest [observed]."""
+        return self._named(largest[self.places])
+
+    def _named(self, values: Floats) -> dict[str, float]:
+        return dict(zip((column.name for column in self.columns), values.tolist(), strict=True))
 
     @property
     def held(self) -> Trace | None:
@@ -428,17 +434,24 @@ class Runs:
         counted = finished.statistics
         strained = counted.newton_failures > STRAINED * counted.steps and not self.system.form.scales
         late = self._late(rows) if instants is not None else 0.0
-        open_ = cache(lambda: self._left_open(finished))
+        open_ = cache(lambda: self._open_quantities(finished))
         found = Sampled(tolerance, values, sizes, counted.steps, noise, open_, between, late, there, strained)
         self.samplings = (*self.samplings[-1:], found)
         return found
 
-    def _left_open(self, finished: Finished) -> Floats:
-        """What the equations of a run leave open of each compared quantity by round-off."""
+    def _left_open(self, finished: Finished) -> LeftOpen:
         assert finished.last is not None
         step = (finished.reached - self.options.t_start) / max(finished.statistics.steps, 1)
-        found = left_open(self.system, finished.reached, finished.last, step)[self.places]
-        return np.append(found, np.zeros(len(self.meters)))
+        return left_open(self.system, finished.reached, finished.last, step)
+
+    def _open_quantities(self, finished: Finished) -> Floats:
+        """What the equations of a run leave open of each compared quantity by round-off."""
+        return np.append(self._left_open(finished).quantities[self.places], np.zeros(len(self.meters)))
+
+    def open_balances(self) -> Floats:
+        """What the equations of the last run leave open of the balance of each ledger by round-off."""
+        assert self.finished is not None
+        return self._left_open(self.finished).balances(self.finished.reached - self.options.t_start)
 
     def _sampled(self, rows: Floats, finished: Finished) -> Floats:
         """The compared quantities [k, quantities] at rows."""

@@ -406,10 +406,15 @@ class System:
 
     def audit(self, t: float, y: Floats, yd: Floats) -> Floats:
         """[kinetic energy, potential energy (J), power dissipated, power supplied (W)]."""
-        values = self._evaluate(
-            "audit", t, self._buffer(y[: self.form.written]), self._buffer(yd[: self.form.written])
-        )
-        return np.concatenate([values, np.zeros(4)])[:4]
+        return np.concatenate([self._audited(t, y, yd), np.zeros(4)])[:4]
+
+    def ledgers(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """Of each ledger [k, 4]: stored, power dissipated, power supplied, the sum of their magnitudes."""
+        return self._audited(t, y, yd)[4:].reshape(-1, 4)
+
+    def _audited(self, t: float, y: Floats, yd: Floats) -> Floats:
+        buffers = (self._buffer(item[: self.form.written]) for item in (y, yd))
+        return self._evaluate("audit", t, *buffers)
 
     # --- facts about the unknowns ---------------------------------------------------------------------------
 

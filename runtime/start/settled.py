@@ -265,6 +265,13 @@ class Settler:
         self.system.failure.check()
         return a[: self._points], b[: self._points], not failed
 
+    def moved(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
+        """The same to round-off, though the state must move for it: not within a basis that leaves it where it is."""
+        basis, self.core.contents.basis, self.core.contents.ready = self.core.contents.basis, None, 0
+        found = self.settle(t, y, yd)
+        self.core.contents.basis, self.core.contents.ready = basis, 0
+        return found
+
     def held(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
         """The same with the state where it is: of large ones within a basis that moves none of it, if there is one."""
         if self.linear is not None or not self.core.contents.basis:

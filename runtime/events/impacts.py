@@ -1,0 +1,155 @@
+"""Impacts: impulses where gaps close, by Newton's law.
+
+    impulse >= 0,  flow+ >= aim,  one of both with equality;  aim = -restitution flow of a gap that closes, else 0
+
+of all gaps that are closed and of all one-way flows at once.  That is the least change of the flows in the metric of
+the inertia under flow+ >= aim; the active set grows by what is violated most and gives up what would pull (Lawson and
+Hanson 1974, chapter 23), so that it never says anything twice.  Aims that contradict each other, in a closed chain of
+contacts, are zero.  Dry friction gives way: a finite effort has no impulse, unless a reaction tells its bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.held_rows import multiplier_row
+from sysdyn.runtime.model.system import System
+
+UNSEEN = 16.0 * float(np.finfo(float).eps)
+"""Of the terms of a gap: a flight lower than that."""
+TRIALS = 20
+"""Sets a contact, beside TRIALS for all."""
+
+Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]
+"""t, y, yd, aims [settled rows] -> y after impulses that bring the flow rows to their aims; the impulses [unknowns]."""
+
+
+class _Struck(NamedTuple):
+    """What impulses of some contacts make: y and values behind them, the impulses [contacts], how far the flows are
+    from their aims, in zeros of theirs, and which impulses pull.
+    """
+
+    struck: list[int]
+    y: Floats
+    values: Floats
+    impulses: Floats
+    off: dict[int, float]
+    pulls: list[int]
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether it does not do what it says: the same flows are asked for twice."""
+        return any(abs(self.off[k]) > 1.0 for k in self.struck)
+
+    @property
+    def fits(self) -> bool:
+        """Whether all impulses push and their aims are met."""
+        return not self.pulls and not self.contradicts
+
+
+class Impacts:
+    """The impacts of a run.  rest: see plan.Plan; fastest [contacts]: speed at which each gap closed at most."""
+
+    def __init__(self, contacts: Contacts, rest: float) -> None:
+        self.contacts, self.rest = contacts, rest
+        self.fastest = np.zeros(len(contacts.contacts))
+
+    def after(self, t: float, y: Floats, yd: Floats, strike: Strike) -> Floats:
+        """Y after the impacts of the gaps that close; the active set is then that of the impulses."""
+        contacts, zero = self.contacts, self.contacts.observer.zero
+        values, terms = contacts.observer(t, y, yd), contacts.observer.terms.copy()
+        near = [k for k in range(len(contacts.contacts)) if k not in contacts.frozen and self._near(k, values)]
+        speed = {k: float(values[self._flow(k)]) for k in near if contacts.contacts[k].kind == "phi"}
+        closing = [k for k in speed if speed[k] < -zero(self._flow(k))]
+        if not closing:
+            return y
+        aim = dict.fromkeys(near, 0.0)
+        for k in closing:
+            c, back = contacts.contacts[k], -contacts.contacts[k].restitution * speed[k]
+            self.fastest[k] = max(self.fastest[k], -speed[k])
+            # what rises less than round-off of its gap cannot be told from rest
+            risen = back**2 > -2.0 * values[c.acceleration] * UNSEEN * terms[c.value]
+            aim[k] = back if risen and back > max(self.rest * self.fastest[k], zero(c.rate)) else 0.0
+        for k in contacts.finite(t, y, yd):
+            if contacts.active[k]:
+                contacts.slip(k, 0.0)
+        y, values = self._struck(t, y, yd, strike, aim)
+        for k in near:
+            contacts.active[k] = aim[k] == 0.0 and values[self._flow(k)] <= zero(self._flow(k))
+        contacts.apply()
+        return y
+
+    def _near(self, k: int, values: Floats) -> bool:
+        """Whether an impulse may come of a contact: a gap that is closed, whatever flow an inequality may stop."""
+        c, contacts = self.contacts.contacts[k], self.contacts
+        closed = c.kind == "phi" and (contacts.active[k] or values[c.value] <= contacts.observer.zero(c.value))
+        return bool(closed or c.kind == "psi") and not contacts.bar(k, values)
+
+    def _flow(self, k: int) -> int:
+        """The row of the flow that an impulse changes."""
+        contact = self.contacts.contacts[k]
+        return contact.rate if contact.kind == "phi" else contact.value
+
+    def _struck(
+        self, t: float, y: Floats, yd: Floats, strike: Strike, aim: dict[int, float]
+    ) -> tuple[Floats, Floats]:
+        """Y and values behind the impulses; aim: of the flow of each contact that may have one."""
+
+        def of(struck: list[int]) -> _Struck:
+            return self._of((t, y, yd), strike, aim, struck)
+
+        now, seen = of([]), list[set[int]]()
+        had = now.impulses
+        for _ in range(TRIALS * (1 + len(aim))):
+            if now.pulls:  # as far on the way as none does: what comes to nothing there is let go
+                part = {k: had[k] / (had[k] - now.impulses[k]) for k in now.pulls}
+                first = min(part, key=part.__getitem__)
+                had = had + part[first] * (now.impulses - had)
+                now = of([k for k in now.struck if k != first])
+                continue
+            had = np.maximum(now.impulses, 0.0)
+            worst = max(now.off, key=now.off.__getitem__)
+            if now.off[worst] <= 1.0:
+                return now.y, now.values
+            before, now = now, of([*now.struck, worst])
+            if now.contradicts:  # what is said by others already takes the place of one of them
+                instead = {j: of([*(k for k in before.struck if k != j), worst]) for j in before.struck}
+                jammed = [worst, *(j for j, one in instead.items() if not one.contradicts)]
+                now = next((one for one in instead.values() if one.fits and set(one.struck) not in seen), now)
+                seen.append(set(now.struck))
+                if now.contradicts and any(aim[k] > 0.0 for k in jammed):  # a closed chain: nothing can part there
+                    return self._struck(t, y, yd, strike, aim | dict.fromkeys(jammed, 0.0))
+        raise NoActiveSetError(tuple(self.contacts.contacts[k].name for k in aim))
+
+    def _of(
+        self, point: tuple[float, Floats, Floats], strike: Strike, aim: dict[int, float], struck: list[int]
+    ) -> _Struck:
+        """What impulses of these alone make."""
+        contacts, zero = self.contacts, self.contacts.observer.zero
+        for k in aim:
+            contacts.active[k] = k in struck
+        contacts.apply()
+        y, impulses = strike(*point, self._aims(aim, struck))
+        values, now = contacts.observer(point[0], y, point[2]), impulses[contacts.multiplier]
+        off = {k: (aim[k] - values[self._flow(k)]) / zero(self._flow(k)) for k in aim}
+        pulls = [k for k in struck if now[k] < -contacts.impulse(contacts.contacts[k])]
+        return _Struck(struck, y, values, np.where(np.isin(np.arange(now.size), struck), now, 0.0), off, pulls)
+
+    def _aims(self, aim: dict[int, float], struck: list[int]) -> Floats:
+        """What the rows phi_rate shall be: -value' there."""
+        settled = self._settled
+        aims = np.zeros(settled.rows)
+        first = {(group, family): row for group, family, row in settled.form.groups}
+        for k in (k for k in struck if aim[k] > 0.0):
+            family, position = self.contacts.switches.places[self.contacts.contacts[k].number]
+            row = first["phi_rate", multiplier_row(settled.description, family)] + position
+            aims[row] = -aim[k]
+        return aims
+
+    @property
+    def _settled(self) -> System:
+        return self.contacts.system.another("settled")

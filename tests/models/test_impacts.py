@@ -1,0 +1,208 @@
+"""Impacts among dry friction, ratchets and closed chains, and friction that is held more often than needed."""
+
+import numpy as np
+import pytest
+from sysdyn import api
+
+FORMULATIONS = pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+LINE = """\
+component gap {
+  param lo = 0 m
+  param bounce = 0
+  branch: translation
+  phi lower: q >= lo restitution bounce
+}
+component ratchet {
+  branch: translation
+  psi one_way: f >= 0 m/s
+}
+"""
+
+
+def run(tmp_path, text, formulation):
+    (tmp_path / "model.sd").write_text(text)
+    return api.simulate(tmp_path / "model.sd", formulation=formulation)
+
+
+def off(trace, name, expected, instant=0.1):
+    """Largest difference of a quantity, the rows of the impact itself (before and behind it) left out."""
+    return np.abs(trace[name].values - expected)[np.abs(trace.time - instant) > 1e-9].max()
+
+
+STRUCK = LINE + """\
+from std.mechanical import mass, coulomb
+model struck {
+  node a, b: translation
+  A: mass(m = 2 kg) a
+  B: mass(m = 3 kg) b
+  rest: coulomb(Fc = 40 N) b -> ground
+  gap: gap(lo = -0.5 m, bounce = 0.5) b -> a
+  init a.q = 0 m
+  init b.q = 0 m
+  init a.f = 5 m/s
+  init b.f = 0 m/s
+}
+scene hit of struck {
+  time 0 s to 0.4 s
+  trace a.f, b.f, b.q every 0.01 s
+  accuracy 1e-8
+}
+"""
+
+
+@FORMULATIONS
+def test_dry_friction_gives_way_to_an_impact(tmp_path, formulation):
+    """No finite effort has an impulse: the body at rest takes its part of the momentum, and slides until it stops."""
+    trace = run(tmp_path, STRUCK, formulation)
+    a, b = 5 - 3 / 5 * 1.5 * 5, 2 / 5 * 1.5 * 5
+    since = trace.time - 0.1
+    behind = since > 0
+    slid = np.minimum(since, b * 3 / 40)
+    assert off(trace, "b.f", np.where(behind, b - 40 / 3 * slid, 0.0)) < 3e-7
+    assert off(trace, "b.q", np.where(behind, b * slid - 20 / 3 * slid**2, 0.0)) < 3e-9
+    assert off(trace, "a.f", np.where(behind, a, 5.0)) < 3e-7
+
+
+FOLLOWED = LINE + """\
+from std.mechanical import mass
+model followed {
+  node a, b: translation
+  A: mass(m = 2 kg) a
+  B: mass(m = 3 kg) b
+  wall: gap(bounce = 0.8) a -> ground
+  pawl: ratchet b -> a
+  init a.q = 0.5 m
+  init b.q = 7 m
+  init a.f = -5 m/s
+  init b.f = -4 m/s
+}
+scene hit of followed {
+  time 0 s to 0.2 s
+  trace a.f, b.f every 0.01 s
+  accuracy 1e-8
+}
+"""
+
+
+@FORMULATIONS
+def test_a_ratchet_hands_an_impact_on(tmp_path, formulation):
+    """What rebounds at 0.8 of its speed takes along what may not be slower than it."""
+    trace = run(tmp_path, FOLLOWED, formulation)
+    behind = trace.time > 0.1
+    assert off(trace, "a.f", np.where(behind, 4.0, -5.0)) < 1e-7
+    assert off(trace, "b.f", np.where(behind, 4.0, -4.0)) < 1e-7
+
+
+JAMMED = LINE + """\
+from std.mechanical import mass
+model jammed {
+  node a, b, c: translation
+  A: mass(m = 2 kg) a
+  B: mass(m = 3 kg) b
+  C: mass(m = 5 kg) c
+  one: gap(lo = -0.5 m, bounce = 0.5) c -> a
+  two: gap(bounce = 0.5) a -> b
+  pawl: ratchet b -> c
+  init a.q = 0 m
+  init b.q = 0 m
+  init c.q = 0 m
+  init a.f = 5 m/s
+  init b.f = 5 m/s
+  init c.f = 0 m/s
+}
+scene hit of jammed {
+  time 0 s to 0.2 s
+  trace a.f, b.f, c.f every 0.01 s
+  accuracy 1e-8
+}
+"""
+
+
+@FORMULATIONS
+def test_a_closed_chain_of_contacts_goes_on_as_one(tmp_path, formulation):
+    """c may not part from a, for a pushes b and b may not be slower than c: no restitution can be met."""
+    trace = run(tmp_path, JAMMED, formulation)
+    behind = trace.time > 0.1
+    for name, before in (("a.f", 5.0), ("b.f", 5.0), ("c.f", 0.0)):
+        assert off(trace, name, np.where(behind, 2.5, before)) < 1e-7
+
+
+HELD = """\
+from std.mechanical import inertia, coulomb_joint, torque
+model held {
+  node a, b: rotation
+  A: inertia(J = 2 kg.m^2) a
+  B: inertia(J = 3 kg.m^2) b
+  one: coulomb_joint(Mc = 4 N.m) a -> ground
+  two: coulomb_joint(Mc = 3 N.m) a -> b
+  three: coulomb_joint(Mc = 5 N.m) b -> ground
+  T: torque(M = 10 N.m/(1 s)*t) ground -> a
+  init a.q = 0 rad
+  init b.q = 0 rad
+  init a.f = 0 rad/s
+  init b.f = 0 rad/s
+}
+scene pull of held {
+  time 0 s to 1.5 s
+  trace a.q, a.f, b.q every 0.05 s
+  accuracy 1e-7
+}
+"""
+
+
+@FORMULATIONS
+def test_friction_that_holds_in_a_loop(tmp_path, formulation):
+    """Three joints hold two bodies: how they share the load is open, that a slides at the sum of its two is not."""
+    trace = run(tmp_path, HELD, formulation)
+    since = np.maximum(trace.time - 0.7, 0.0)
+    assert np.abs(trace["a.q"].values - 10 / 12 * since**3).max() < 1e-7
+    assert np.abs(trace["a.f"].values - 10 / 4 * since**2).max() < 3e-7
+    assert np.abs(trace["b.q"].values).max() < 1e-12
+
+
+@FORMULATIONS
+def test_what_friction_holds_is_at_rest(tmp_path, formulation):
+    """A load below all bounds moves nothing: a trace of zeros, judged as such."""
+    trace = run(tmp_path, HELD.replace("10 N.m/(1 s)*t", "2 N.m*sin(9 rad/s*t)"), formulation)
+    assert trace.attributes["met"] == 1
+    assert max(np.abs(trace[name].values).max() for name in ("a.q", "a.f", "b.q")) < 1e-14
+
+
+PUCK = """\
+model puck {
+  coord x: translation = 0 m
+  coord y: translation = 0 m
+  energy T* = 1/2*(2 kg)*(x'^2 + y'^2)
+  content D = 4 N*FRICTION
+  init x' = 0 m/s
+  init y' = 0 m/s
+  PUSH
+}
+scene slide of puck {
+  time 0 s to 1 s
+  trace x, y, x', y' every 0.05 s
+  accuracy 1e-7
+}
+"""
+
+
+@FORMULATIONS
+@pytest.mark.parametrize("friction", ["abs(y')", "hypot(x', y')"])
+def test_a_flow_that_is_assigned_frees_what_sticks(tmp_path, formulation, friction):
+    """The blow of an event is an impulse as any other: friction brakes what it set going, and does not undo it."""
+    text = PUCK.replace("FRICTION", friction).replace("PUSH", "when t >= 0.5 s { y' := 3 m/s }")
+    trace = run(tmp_path, text, formulation)
+    since = np.maximum(trace.time - 0.5, 0.0)
+    assert off(trace, "y", 3 * since - since**2, 0.5) < 1e-7
+    assert off(trace, "y'", np.where(trace.time > 0.5, 3 - 2 * since, 0.0), 0.5) < 3e-7
+
+
+@FORMULATIONS
+def test_a_puck_is_pulled_from_rest(tmp_path, formulation):
+    """In the plane it sticks until the pull is its bound, and slides along the pull."""
+    push = "work 6 N/(1 s)*t*cos(2.1 rad) on x; work 6 N/(1 s)*t*sin(2.1 rad) on y"
+    trace = run(tmp_path, PUCK.replace("FRICTION", "hypot(x', y')").replace("PUSH", push), formulation)
+    since = np.maximum(trace.time - 4 / 6, 0.0)
+    for name, part in (("x", np.cos(2.1)), ("y", np.sin(2.1))):
+        assert np.abs(trace[name].values - part * 0.5 * since**3).max() < 3e-8
+        assert np.abs(trace[name + "'"].values - part * 1.5 * since**2).max() < 1e-7
