@@ -52,7 +52,7 @@ def test_a_junction_guessed_far_above_its_voltage_is_walked_down(tmp_path, formu
     [("seed/*.sd", ("lagrangian", "co_lagrangian")), *([("*/*.sd", EVERY)] if os.environ.get("SYSDYN_LONG") else [])],
 )
 def test_nearly_all_starts_need_the_first_strategy_alone(pattern, formulations):
-    """One Newton iteration from the guesses, staged: 95 of 100."""
+    """One iteration from the guesses, in what follows from the state or with the least change of it: 95 of 100."""
     found = [strategy for *_, strategy in strategies(pattern, formulations)]
     assert len(found) > 70
     assert found.count("newton") >= 0.95 * len(found)
