@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.integrate.accuracy import Achieved, control
+from sysdyn.runtime.integrate.accuracy import Achieved, Lighter, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
 from sysdyn.runtime.integrate.runs import LONG, Runs, Samples, Way
 from sysdyn.runtime.integrate.second_opinion import confirmed
@@ -35,6 +35,10 @@ NOT_STIFF = "not stiff"
 REFINED, REFINE, HELPS = 4, 0.3, 0.5
 """Runs with shorter steps for the sake of the ledgers, how long they are beside those before, and what of the balance
 is left of one that a step spoils."""
+LITTLE_HAPPENS = "little happens"
+"""Why method auto goes on with the bdf behind a draft of radau."""
+LIGHT = 200
+"""Steps of the bdf there, beyond which they are no cheaper than radau's."""
 SMALL = 100
 """Unknowns up to which steep laws are the bdf's: where they turn, Newton's method holds the steps of any method, and a
 step of the bdf is the cheapest; of larger systems factors and rows are dear, and radau takes the fewest steps."""
@@ -131,8 +135,23 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
     return (Estimate(name, achieved.error_estimate, asked, time),)
 
 
-def _achieved(runs: Runs, options: Options, *, doubted: bool = False) -> Achieved:
-    return control(runs.sampled, _targets(runs, options), runs.way.law, doubted=doubted, first=options.first)
+def _achieved(
+    runs: Runs, options: Options, *, doubted: bool = False, lighter: Lighter | None = None
+) -> Achieved:
+    target = _targets(runs, options)
+    return control(runs.sampled, target, runs.way.law, doubted=doubted, first=options.first, lighter=lighter)
+
+
+def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter | None:
+    """The bdf behind a draft of radau: where so little happens that the longest step holds the steps, its steps cost a
+    third of radau's and its rows less (CPU over eleven seed models: 0.81 of two runs of radau).
+    """
+    way = runs.way
+    small = way.system.unknowns <= SMALL and not options.events and not way.system.form.scales
+    if way.method != "radau" or not small or not others or others[0].method != "bdf":
+        return None
+    light = replace(others[0], reason=LITTLE_HAPPENS)
+    return Lighter(light.law, lambda: runs.take(light, LIGHT), lambda: runs.take_back(way))
 
 
 def _unbalanced(runs: Runs, options: Options) -> float:
@@ -191,7 +210,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     while True:
         runs.patience = LONG if runs.method == "bdf" and others and not steep else None
         try:
-            achieved = _achieved(runs, options, doubted=doubted)
+            achieved = _achieved(runs, options, doubted=doubted, lighter=_lighter(runs, options, others))
         except SolverFailure as failure:
             if not others or _bounded(failure, runs):
                 if missed is None:

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections import Counter
 
 import pytest
 
@@ -14,6 +15,12 @@ def _one_cache(tmp_path_factory):
         patch.setenv("SYSDYN_CACHE", str((base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"))
         patch.delenv("NO_COLOR", raising=False)
         yield
+
+
+@pytest.fixture(autouse=True)
+def _here(monkeypatch):
+    """Work stays in this process unless a test asks for more of them: a clock would choose, and patches stay behind."""
+    monkeypatch.setattr("sysdyn.cli.run.crew.PAYS", 1e6)
 
 
 @pytest.fixture
@@ -36,3 +43,16 @@ def effort():
             sys.settrace(before)
 
     return counted
+
+
+def pytest_collection_modifyitems(config, items):
+    """Of a test that is marked one_in(n) every n-th case runs; all of them with SYSDYN_LONG=1, or where it is named."""
+    if os.environ.get("SYSDYN_LONG") or any("::" in argument for argument in config.args):
+        return
+    seen, kept, left = Counter(), [], []
+    for item in items:
+        mark, name = item.get_closest_marker("one_in"), item.nodeid.partition("[")[0]
+        (left if mark and seen[name] % mark.args[0] else kept).append(item)
+        seen[name] += 1
+    config.hook.pytest_deselected(items=left)
+    items[:] = kept

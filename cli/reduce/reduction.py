@@ -31,7 +31,7 @@ from sysdyn.values import dataclass
 
 FINER = 0.1
 """Of the accuracy: that of the runs that are compared."""
-GRID = 400
+GRID = 1000
 """Intervals of the instants that a trace holds besides its steps: where one has a boundary layer, a cubic over a whole
 interval would add a difference of its own.
 """

@@ -25,32 +25,39 @@ def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quan
         for q in link.joined:
             touched.setdefault(q, []).append(link)
     dead: list[frozenset[Quantity]] = []
-    shapes = {n.name: n.shape for n in network.nodes}
+    grounded = _grounded(network)
+    shapes = {n.name: n.shape for n in network.nodes if n.name in grounded}
     for b in network.branches:
         if len(touched["b", b.name]) == 1 and ("b", b.name) not in read:
-            dead += [frozenset({("b", b.name), end}) for end in _ends(network, shapes, b, touched, read)][:1]
+            dead += [frozenset({("b", b.name), end}) for end in _ends(shapes, b, touched, read)][:1]
     return dead
 
 
 def _ends(
-    network: Network, shapes: dict[str, Shape], b: Branch, touched: dict[Quantity, list[Link]], read: set[Quantity]
+    shapes: dict[str, Shape], b: Branch, touched: dict[Quantity, list[Link]], read: set[Quantity]
 ) -> Iterator[Quantity]:
-    """End nodes of the branch that nothing else touches or reads; shapes: of all nodes."""
+    """End nodes of the branch that nothing else touches or reads; shapes: of all nodes that are joined to a ground."""
     balanced = "flow" if b.domain.common == "effort" else "effort"
     allowed = STORES | {"effort", "flow"} - {balanced}
     names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
     if b.loops or b.kind not in allowed or len(names) != 2 or names[0] == names[1]:
         return
     for name in names:
-        alone = not shapes[name] and len(touched["n", name]) == 1 and ("n", name) not in read
-        if alone and _grounded(network, name):
+        if shapes.get(name) == () and len(touched["n", name]) == 1 and ("n", name) not in read:
             yield "n", name
 
 
-def _grounded(network: Network, node: str) -> bool:
-    """Whether branches join a node to the ground of its domain."""
-    ends = [{end.node for end in (b.plus, b.minus) if end is not None} for b in network.branches]
-    seen: set[str | None] = {node}
-    while any(new := [e for e in ends if e & seen and not e <= seen]) and None not in seen:
-        seen.update(*new)
-    return None in seen
+def _grounded(network: Network) -> set[str | None]:
+    """Nodes that branches join to the ground of their domain (None)."""
+    beside: dict[str | None, set[str | None]] = {}
+    for b in network.branches:
+        ends = {end.node for end in (b.plus, b.minus) if end is not None}
+        for end in ends:
+            beside.setdefault(end, set()).update(ends)
+    seen: set[str | None] = {None}
+    ahead: list[str | None] = [None]
+    while ahead:
+        new = beside.get(ahead.pop(), set()) - seen
+        seen |= new
+        ahead += new
+    return seen

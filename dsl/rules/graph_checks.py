@@ -16,6 +16,9 @@ from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 
+NEAR = 3
+"""Names that a finding shows beside a node's."""
+
 
 def run(model: Elaborator, known: Values, read: frozenset[str], report: Report) -> None:
     """All rules."""
@@ -46,19 +49,26 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
         assert terminal.node is not None
         touched[terminal.node] = touched.get(terminal.node, 0.0) + _count(branch, known)
     mentioned = read | _mentioned(model)
-    names = [n.name for n in model.parts.nodes]
+    alike: dict[str, list[str]] = {}
+    for node in model.parts.nodes:
+        alike.setdefault(_beginning(node), []).append(node.name)
     for node in model.parts.nodes:
         size = math.prod(known.number(b) - known.number(a) + 1 for a, b in node.shape)
         wanted = (2.0 if node.domain.common == "effort" else 1.0) * (size if not node.shape else 1.0)
         count = touched.get(node.name, 0.0)
         if count < wanted and node.name not in mentioned and size > 0 and not math.isnan(count):
-            _lonely(node, count, names, report)
+            _lonely(node, count, alike[_beginning(node)][: NEAR + 1], report)
 
 
-def _lonely(node: NodeFamily, count: float, names: list[str], report: Report) -> None:
+def _beginning(node: NodeFamily) -> str:
+    """What names that are near to a node's have in common with it."""
+    return node.name.lower()[:2]
+
+
+def _lonely(node: NodeFamily, count: float, alike: list[str], report: Report) -> None:
     how = "no element" if not count else "one element only" if node.domain.common == "effort" else "no element"
-    near = [n for n in names if n != node.name and n.lower()[:2] == node.name.lower()[:2]]
-    help_ = f"near names: {', '.join(near[:3])}; " if near else ""
+    near = [n for n in alike if n != node.name]
+    help_ = f"near names: {', '.join(near[:NEAR])}; " if near else ""
     help_ += "connect it to an element, or delete it; ground it if that is meant"
     report.error("E409", f"node '{node.name}' touches {how}", node.place, help=help_)
 

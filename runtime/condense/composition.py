@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.patterns import numbered
 from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
@@ -62,29 +63,25 @@ def composed(start: Longs, kept: Ints, through: Ints) -> Composition:
         places = np.concatenate(columns)
         row, column = owner[term], np.concatenate([kept[direct], places[entry]])
         # one entry of T for each kept unknown that a row reads
-        order = np.lexsort((column, row))
-        new = np.ones(term.size, dtype=bool)
-        new[1:] = (np.diff(row[order]) != 0) | (np.diff(column[order]) != 0)
-        slot = np.empty(term.size, dtype=np.int64)
-        slot[order] = at + np.cumsum(new) - 1
-        rows.append(row[order][new])
-        columns.append(column[order][new])
-        own, first_at, size = np.unique(rows[-1], return_index=True, return_counts=True)
-        first[own], count[own] = at + first_at, size
+        slot, begin, each = numbered(row, column, number, int(column.max(initial=-1)) + 1)
+        size = np.diff(begin)
+        own = np.flatnonzero(size)
+        rows.append(np.repeat(own, size[own]))
+        columns.append(each.astype(np.int64))
+        first[own], count[own] = at + begin[own], size[own]
         terms.append(term)
         read.append(np.concatenate([np.full(direct.size, -1), entry]))
-        level.append(slot)
-        at += rows[-1].size
+        level.append(at + slot.astype(np.int64))
+        at += each.size
     row, column = np.concatenate(rows), np.concatenate(columns)
-    order = np.lexsort((column, row))
-    final = np.empty(order.size, dtype=np.int64)
-    final[order] = np.arange(order.size)
-    begin = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=number))]).astype(np.int64)
+    final, starts, source = (
+        item.astype(np.int64) for item in numbered(row, column, number, int(column.max(initial=-1)) + 1)
+    )
     parts = [(final[slot], term, by) for slot, term, by in zip(level, terms, read, strict=True)]
     direct_entry = np.concatenate([entry[by < 0] for entry, _, by in parts])
     direct_term = np.concatenate([term[by < 0] for _, term, by in parts])
     levels = tuple((entry[by >= 0], term[by >= 0], final[by[by >= 0]]) for entry, term, by in parts if (by >= 0).any())
-    return Composition(begin, column[order], (direct_entry, direct_term), levels)
+    return Composition(starts, source, (direct_entry, direct_term), levels)
 
 
 def _depth(number: int, owner: Longs, through: Ints) -> Longs:

@@ -63,11 +63,10 @@ class Sums:
         return bool((self.factor == other.factor).all() and (self.constant == other.constant).all())
 
 
-def sums(system: System, found: Elimination, t: float, jy: Floats) -> Sums:
-    """The numbers of an elimination: jy [entries]."""
-    zero = np.zeros(system.unknowns)
+def sums(system: System, found: Elimination, jy: Floats, constant: Floats) -> Sums:
+    """The numbers of an elimination: jy [entries]; constant [rows]: the rows where all unknowns are zero."""
     pivot = jy[found.pivot]
-    rest = system.residual(t, zero, zero)[found.row]
+    rest = constant[found.row]
     factor = -jy[found.entry] / np.repeat(pivot, np.diff(found.start))
     left = np.ones(system.unknowns, dtype=bool)
     left[found.place] = left[found.unread] = False
@@ -97,7 +96,7 @@ class Room:
         entries = max(system.pattern.entries for system in systems) + 1
         self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
         self.r = np.zeros(max(system.rows for system in systems) + 1)
-        self.jy, self.jyd = np.zeros(entries), np.zeros(entries)
+        self.slope = np.zeros(entries)
 
 
 class Condensed:
@@ -288,8 +287,7 @@ class Condensed:
             y=lib.pointer(room.y),
             yd=lib.pointer(room.yd),
             r=lib.pointer(room.r),
-            jy=lib.pointer(room.jy),
-            jyd=lib.pointer(room.jyd),
+            slope=lib.pointer(room.slope),
         )
         self.core = lib.System(
             unknowns=self.unknowns,
@@ -368,15 +366,16 @@ class _Condenser:
 
     def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
-        jy, _ = whole.jacobian(t, y, yd)
-        allowed = definable(whole, jy)
+        jy, zero = whole.jacobian(t, y, yd)[0], np.zeros(whole.unknowns)
+        constant = whole.residual(t, zero, zero)
+        allowed = definable(whole, jy, constant)
         if self._found is None or not np.array_equal(allowed, self._allowed):
             self._allowed, self._found, self._forms = allowed, eliminate(whole, allowed), None
         found = self._found
         few = found.place.size + found.unread.size < (1.0 - GAIN) * whole.unknowns
         if few or not np.isfinite(jy[found.entry]).all():
             return None
-        numbers = sums(whole, found, t, jy)
+        numbers = sums(whole, found, jy, constant)
         if not np.isfinite(numbers.constant).all():
             return None
         if self._forms is None:

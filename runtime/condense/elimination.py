@@ -25,7 +25,9 @@ from sysdyn.values import dataclass
 Mask = NDArray[np.bool_]
 Longs = NDArray[np.int64]
 HEALTHY = 1e-7
-"""Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less."""
+"""Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less.  Where
+a row reads one unknown else, which carries the state, and no constant, it is a multiple of that and has all its digits
+(the voltage of a capacitor of 1 pF, whose charge stays)."""
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
 LONGEST = 12
 """Definitions one after the other: through more of them the rest would read everything (a chain of scalars)."""
@@ -80,35 +82,45 @@ def steady(description: Description, blocks: tuple[str, ...] = ("phi", "phi_rate
     return all(kernel.curved is not None and not kernel.curved for kernel in kernels)
 
 
-def _candidates(system: System) -> tuple[Mask, Longs]:
-    """Entries [entries] through which a row might define an unknown, whatever the numbers; places of what is unread."""
+def _candidates(system: System) -> tuple[Longs, Mask, Mask]:
+    """Entries of the rows that might define an unknown, whatever the numbers; what is unread [unknowns]; the unknowns
+    that stay because rows read their derivatives [unknowns].
+    """
     columns, rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
     moving = system.structural()[1]
     unread = unread_families(system.description, (call.block for call in system.form.calls))
     gone = np.isin(system.family_of, unread) & system.are("q")
     usable = affine(system)
     usable[rows[moving]] = False
-    kept = gone.copy()
-    kept[columns[moving]] = kept[system.form.k_q] = True
-    return usable[rows] & ~kept[columns], np.flatnonzero(gone)
+    carried = np.zeros(system.unknowns, dtype=bool)
+    carried[columns[moving]] = carried[system.form.k_q] = True
+    return np.flatnonzero(usable[rows]), gone, carried & ~gone
 
 
-def definable(system: System, jy: Floats) -> Mask:
-    """Entries [entries] through which a row can define an unknown, by their values jy at any point."""
+def definable(system: System, jy: Floats, constant: Floats) -> Mask:
+    """Entries [entries] through which a row can define an unknown, by their values jy at any point; constant [rows]:
+    what is left of each row where all unknowns are zero.
+    """
     columns, rows = system.pattern.columns_of(), system.pattern.row
     size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
-    weight = size * by_row[rows] * by_column[columns]
+    here, gone, carried = system.once("may leave", lambda: _candidates(system))
+    i, j = rows[here], columns[here]
+    weight = size[here] * by_row[i] * by_column[j]
     largest = np.zeros(system.rows)
-    np.maximum.at(largest, rows, weight)
-    may = system.once("may leave", lambda: _candidates(system))[0]
-    return np.asarray(may & (weight > 0.0) & (weight >= HEALTHY * largest[rows]))
+    np.maximum.at(largest, i, weight)
+    reads = weight > 0.0
+    multiple = (np.bincount(i[reads], minlength=system.rows) == 2) & (constant == 0.0)
+    multiple &= np.bincount(i[reads & carried[j]], minlength=system.rows) == 1
+    found = np.zeros(rows.size, dtype=bool)
+    found[here] = ~(carried | gone)[j] & reads & ((weight >= HEALTHY * largest[i]) | multiple[i])
+    return found
 
 
 def eliminate(system: System, allowed: Mask) -> Elimination:
     """What can leave a form; allowed [entries]: `definable`."""
     gone = system.once("may leave", lambda: _candidates(system))[1]
-    return _Search(system, allowed).found(gone)
+    return _Search(system, allowed).found(np.flatnonzero(gone))
 
 
 def _rank(system: System, family: int) -> int:

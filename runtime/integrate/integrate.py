@@ -101,7 +101,6 @@ class Integration:
         self.magnitude = self._magnitudes()
         if system.form.name == "2":
             self._weigh()
-        self._light = origin.light
         self._spare()
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
         self.forms = self._condensed()
@@ -194,7 +193,7 @@ class Integration:
         kinematics = (form.k_q, form.k_f)
         left = self.forms.settled if self.forms is not None and name == "settled" and not whole else None
         system = self.system.another(name)
-        return Settler(system, kinematics, self.magnitude[:n], self._time, state, self._light[:n], left)
+        return Settler(system, kinematics, self.magnitude[:n], self._time, state, left)
 
     def _stages(self) -> tuple[int, int]:
         """Of radau: in the first step, at most."""
@@ -553,6 +552,7 @@ class Integration:
             self.ledgers,
             self.happened(),
             self.run_.contents.beyond,
+            (*self.method.point(), self._sizes()[0]),
         )
 
     def __del__(self) -> None:

@@ -8,19 +8,10 @@ in the metric of the inertia), or, where some unit has none, one over the larges
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import own_inertia
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
-
-
-def light(system: System, jy: Floats, jyd: Floats) -> NDArray[np.bool_]:
-    """Displacements without inertia where others have some [unknowns]."""
-    found, form = np.zeros(system.unknowns, dtype=bool), system.form
-    inertia = np.abs(own_inertia(system, jy, jyd))[form.k_f]
-    found[form.k_q] = (inertia == 0.0) & bool((inertia > 0.0).any())
-    return found
 
 
 def kinematic_scale(system: System, magnitude: Floats, jy: Floats, jyd: Floats) -> Floats:

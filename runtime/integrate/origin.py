@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
-from sysdyn.runtime.integrate.metric import light
 from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
 from sysdyn.runtime.integrate.unknown_roles import Roles, roles, without_rate
 from sysdyn.runtime.model.description import Floats
@@ -33,7 +31,6 @@ class Origin:
         self.roles: Roles = roles(system, start.t, self.jyd, index)
         self.least = np.where(system.are("q", "f"), UNRESOLVED * unresolved(system, self.y, self.jy), 0.0)
         self._sized: tuple[float, tuple[Floats, float]] | None = None
-        self._light: NDArray[np.bool_] | None = None
         self._explicit: tuple[System, Roles] | None = None
         self.kept: Roles | None = None
         """Roles of what is left where unknowns leave the runs (condense/)."""
@@ -59,7 +56,7 @@ class Origin:
 
     def let_go(self) -> None:
         """Of the Jacobian and what follows from it: found again if asked."""
-        self._matrix = self._sized = self._light = None
+        self._matrix = self._sized = None
 
     def sized(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
@@ -67,13 +64,6 @@ class Origin:
             far = self.jy, self.jyd, self.yd, order_of(self.system)
             self._sized = t_end, magnitudes(self.system, self.t, t_end, self.y, self.yd, far)
         return self._sized[1]
-
-    @property
-    def light(self) -> NDArray[np.bool_]:
-        """Displacements without inertia where others have some [unknowns]."""
-        if self._light is None:
-            self._light = light(self.system, self.jy, self.jyd)
-        return self._light
 
     @property
     def explicit(self) -> tuple[System, Roles]:

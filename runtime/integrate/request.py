@@ -92,7 +92,7 @@ class Finished:
 
     magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
     their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest unknown
-    of a row within a step, in magnitudes that it has at steps.
+    of a row within a step, in magnitudes that it has at steps; last [unknowns]: y and yd at its end, the largest |y|.
     """
 
     reached: float
@@ -104,6 +104,7 @@ class Finished:
     ledgers: Ledgers | None = None
     events: tuple[Happened, ...] = ()
     beyond: float = 0.0
+    last: tuple[Floats, Floats, Floats] | None = None
 
     @property
     def balances(self) -> tuple[Balance, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.origin import Origin
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
+from sysdyn.runtime.integrate.round_off import left_open
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF
@@ -169,12 +171,21 @@ class Runs:
                 layouts["instants"] = before
         return before[1]
 
-    def take(self, way: Way) -> None:
-        """Goes on with another method and form."""
+    def take(self, way: Way, patience: int | None = None) -> None:
+        """Goes on with another method and form; patience: steps of a run with it."""
+        before = getattr(self, "way", way)
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
         self._beside: tuple[Floats, Floats, Floats] | None = None
-        self.patience: int | None = None
-        self._origin: Origin | None = None
+        self.patience: int | None = patience
+        self._compared_before = getattr(self, "common", None)
+        if before is way or (before.system, before.index) != (way.system, way.index):
+            self._origin: Origin | None = None
+
+    def take_back(self, way: Way) -> None:
+        """Goes on as before the last `take`: the next run is compared where that of the method before it was."""
+        instants = self._compared_before
+        self.take(way)
+        self.common = instants
 
     @property
     def origin(self) -> Origin | None:
@@ -417,9 +428,17 @@ class Runs:
         counted = finished.statistics
         strained = counted.newton_failures > STRAINED * counted.steps and not self.system.form.scales
         late = self._late(rows) if instants is not None else 0.0
-        found = Sampled(tolerance, values, sizes, counted.steps, noise, between, late, there, strained)
+        open_ = cache(lambda: self._left_open(finished))
+        found = Sampled(tolerance, values, sizes, counted.steps, noise, open_, between, late, there, strained)
         self.samplings = (*self.samplings[-1:], found)
         return found
+
+    def _left_open(self, finished: Finished) -> Floats:
+        """What the equations of a run leave open of each compared quantity by round-off."""
+        assert finished.last is not None
+        step = (finished.reached - self.options.t_start) / max(finished.statistics.steps, 1)
+        found = left_open(self.system, finished.reached, finished.last, step)[self.places]
+        return np.append(found, np.zeros(len(self.meters)))
 
     def _sampled(self, rows: Floats, finished: Finished) -> Floats:
         """The compared quantities [k, quantities] at rows."""
@@ -473,7 +492,7 @@ class Runs:
         with np.errstate(all="ignore"):
             ratio = accuracy.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
-        ratio = np.where(one.own[0] == two.values, 0.0, ratio)
+        ratio = np.where((one.own[0] == two.values) | accuracy.zero(one, two, target), 0.0, ratio)
         ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)

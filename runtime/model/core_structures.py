@@ -108,7 +108,7 @@ class Condensed(c.Structure):
         ("observed_rates", _I),
         *[(name, _P) for name in ["unknown", "row", "straight"]],
         ("products", _L),
-        *[(name, _P) for name in ["from_", "to", "share", "y", "yd", "r", "jy", "jyd"]],
+        *[(name, _P) for name in ["from_", "to", "share", "y", "yd", "r", "slope"]],
     ]
 
 
@@ -285,10 +285,12 @@ class Radau(c.Structure):
         ("slope", _P * POINTS),
         ("refined", _I * POINTS),
         *[(name, _P * STAGES) for name in ["z", "kept", "stage", "stage_d", "d", "base", "full"]],
-        *[(name, _P) for name in ["point", "point_d", "first", "pull", "gap", "y", "rate", "ee", "weight"]],
+        *[(name, _P) for name in ["point", "point_d", "first", "pull", "gap"]],
+        *[(name, _D * POINTS) for name in ["apart", "bend"]],
+        *[(name, _P) for name in ["y", "rate", "ee", "weight"]],
         *[(name, _P) for name in ["newton_weight", "scale", "terms", "jy", "jyd", "g", "memory"]],
         ("w", _P * PAIRS),
-        ("gz", _P),
+        ("right", _P),
         *[(name, _P) for name in ["beside", "other", "point_y", "point_rate"]],
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
         *[(name, _L) for name in ["factorisations", "taken"]],

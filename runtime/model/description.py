@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,7 +169,8 @@ class Initial:
 class Description:
     """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts: what follows from
     the structure of the index forms made so far, found once (System.once); branches: places in p of
-    laws that may slide (events/kinks.py); systems: those of runs one after the other that share p, by index form.
+    laws that may slide (events/kinks.py); systems: those of runs one after the other that share p, by index form;
+    alive: those that somebody has now, where runs do not share them; room: work of their Jacobians.
     """
 
     families: tuple[Family, ...]
@@ -181,6 +183,8 @@ class Description:
     branches: tuple[int, ...] = ()
     systems: dict[Any, Any] | None = field(default=None, compare=False)
     layouts: dict[Any, Any] = field(default_factory=dict, compare=False)
+    alive: WeakValueDictionary[Any, Any] = field(default_factory=WeakValueDictionary, compare=False)
+    room: list[Floats] = field(default_factory=list, compare=False)
 
     def families_of(self, kind: str) -> tuple[int, ...]:
         """Numbers of the families of one kind."""

@@ -64,19 +64,19 @@ class System:
     ) -> System:
         """The same from a description; left_out: multipliers (family, position) of constraints that do not count.
 
-        Where the description has the systems of a run before it, one of those, at this one's numbers.
+        Where the description has the systems of a run before it, one of those, at this one's numbers; else one that
+        somebody has, unless a run gave its rows q' - f factors.
         """
-        made = description.systems
-        if made is None or (index_form, left_out) not in made:
+        made = description.alive if description.systems is None else description.systems
+        self = made.get((index_form, left_out))
+        if self is None or self.carrier is not carrier or (description.systems is None and index_form == "2"):
             self = cls.__new__(cls)
             self._make(description, carrier, index_form, left_out)
-            if made is not None:
-                made[index_form, left_out] = self
-            return self
-        self = made[index_form, left_out]
-        self.description = description
-        self.kinematic_scale[:] = 1.0
-        return self  # type: ignore[no-any-return]
+            made[index_form, left_out] = self
+        elif description.systems is not None:
+            self.description = description
+            self.kinematic_scale[:] = 1.0
+        return self
 
     def another(self, index_form: str) -> System:
         """The same model in another form."""
@@ -202,7 +202,7 @@ class System:
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
         self.kinematic_scale = np.ones(form.k_row.size)
-        self._scratch = np.zeros(layout.entries)
+        self._scratch = self._work(layout.entries)
         self._keep += [calls, slots]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
         self.core = lib.System(
@@ -229,6 +229,13 @@ class System:
         self._sets: dict[bytes, tuple[Any, Any]] = self.once("sets", dict)
         self.switch()
         self.description.switches.join(self)
+
+    def _work(self, entries: int) -> Floats:
+        """Room for the entries of any part, one after the other: all systems of a description have the same."""
+        room = self.description.room
+        if not room or room[0].size < entries:
+            room[:] = [np.zeros(entries)]
+        return room[0]
 
     def switch(self) -> None:
         """Rows of constraints that do not hold read "multiplier = 0"."""

@@ -23,8 +23,6 @@ from sysdyn.runtime.numerics.tall import left_open
 
 LARGE = 100_000
 """Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before."""
-LIGHT = 1e-3
-"""Weight (of squares) of displacements without inertia: they follow those that have some."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
 OPEN = 1e-6
@@ -107,9 +105,8 @@ class Settler:
     """Moves points onto the settled rows.
 
     settled: the System in form "settled"; magnitude [unknowns] of y; rate_magnitude [rates];
-    state [unknowns] bool: unknowns that carry the state and should move least; light [unknowns] bool: displacements
-    without inertia among others that have some, which move more easily.  condensed: what is left of the settled form;
-    the other unknowns follow.
+    state [unknowns] bool: unknowns that carry the state and should move least.  condensed: what is left of the settled
+    form; the other unknowns follow.
     """
 
     def __init__(
@@ -119,7 +116,6 @@ class Settler:
         magnitude: Floats,
         time_scale: float,
         state: NDArray[np.bool_],
-        light: NDArray[np.bool_] | None = None,
         condensed: Condensed | None = None,
     ) -> None:
         self.system, self._points = settled, settled.unknowns
@@ -128,15 +124,12 @@ class Settler:
         if condensed is not None:
             self.rates = condensed.rates
             magnitude, state = magnitude[condensed.kept], state[condensed.kept]
-            light = None if light is None else light[condensed.kept]
         n, k = self._left.unknowns, int(self.rates.size)
         self._n, self._moves = n, n + k
         self.pattern: Pattern
         self._key: tuple[object, ...] = () if condensed is None else condensed.key
         self._sort = settled.once(("sorts", *self._key), self._sorts)
         self._weight = np.ones(self._moves)
-        if light is not None:
-            self._weight[:n][light] = LIGHT
         self._weight[:n][~state] = FREE**2
         self._weight[n:] = FREE**2
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)

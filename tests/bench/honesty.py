@@ -45,7 +45,7 @@ def rows(name: str, formulation: str, accuracies: list[float]) -> list[Row]:
 def row(where: str, asked: float, achieved: float, run: Measured) -> Row:
     """A row without a price."""
     estimate = np.nan if run.estimate is None else run.estimate
-    return Row(where, asked, achieved, estimate, 1.0, run.steps, run.met, run.method, "")
+    return Row(where, asked, achieved, estimate, 1.0, run.steps, run.met, run.method, "", False)
 
 
 def suspicious(row: Row) -> bool:

@@ -260,6 +260,7 @@ class Values:
 
 
 @pytest.mark.parametrize("name", MODELS)
+@pytest.mark.one_in(3)
 def test_what_is_printed_is_what_is_compiled(name):
     """left - right of every equation against the sum of its row, at random values, up to one sign."""
     for formulation in ("lagrangian", "hamiltonian", "co_lagrangian"):
@@ -293,6 +294,7 @@ SOLVED = {
 @pytest.mark.parametrize(
     ("name", "formulation"), [(name, f) for name, some in SOLVED.items() for f in (FAMILY if LONG else some)]
 )
+@pytest.mark.one_in(3)
 def test_the_underlying_equations_solve_the_rows(name, formulation):
     """Rates and multipliers printed against a numerical solution of the rows that they come from."""
     with ex.fresh():
@@ -349,6 +351,7 @@ def test_the_linear_form_is_that_of_linearize(capsys):
 
 
 @pytest.mark.parametrize("name", MODELS)
+@pytest.mark.one_in(3)
 def test_every_model_is_printed(name, capsys):
     code, found = run_json(capsys, "equations", str(SEED / f"{name}.sd"))
     assert code == 0

@@ -117,6 +117,7 @@ def _without_co_kane(request, monkeypatch):
         ("seed/nonlinear_spring", (), FOUR),
     ],
 )
+@pytest.mark.one_in(3)
 def test_models_of_each_kind_agree(name, options, formulations, capsys):
     code, found = run_json(capsys, "verify", str(MODELS / f"{name}.sd"), *options)
     assert code == 0, found["diagnostics"]
@@ -136,13 +137,8 @@ def test_kane_agrees_in_momenta_too(name, capsys):
 
 
 def scenes():
-    """(file, scene) of every scene in models/ but the book's variants, whose solutions are those of models/seed.
-
-    Of models/seed every sixth: tests/models/test_seed.py holds each formulation of all to the book's values.
-    """
-    seeds = sorted(MODELS.glob("seed/*.sd"))
-    left_out = () if LONG else set(seeds) - set(seeds[::6])
-    for path in sorted(p for p in MODELS.glob("*/*.sd") if p.parent.name != "book" and p not in left_out):
+    """(file, scene) of every scene in models/ but the book's variants, whose solutions are those of models/seed."""
+    for path in sorted(p for p in MODELS.glob("*/*.sd") if p.parent.name != "book"):
         for scene in re.findall(r"^scene (\w+)", path.read_text(), re.MULTILINE):
             yield path.relative_to(MODELS).as_posix(), scene
 
@@ -174,6 +170,7 @@ COSTLY = (
 
 
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
+@pytest.mark.one_in(11)
 def test_every_scene_agrees(file, scene, capsys):
     if (file, scene) in COSTLY and not LONG:
         pytest.skip("SYSDYN_LONG=1 verifies it")

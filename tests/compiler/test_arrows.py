@@ -14,11 +14,7 @@ from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Dynamic, Energy, State
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def ends(b):

@@ -13,11 +13,7 @@ from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Constraint, ElementSetting, Energy, Initial, Loop
 from sysdyn.dsl.text.diagnostics import ModelError
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def oscillator(parameters, stiffness, **more):

@@ -24,11 +24,7 @@ from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.text.diagnostics import ModelError
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def box(*ranges):

@@ -12,11 +12,7 @@ from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Constraint, Energy, Initial, Loop, Observation, Work
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def q(name, *at):

@@ -18,11 +18,7 @@ class _Slopes:
     def values(self, branch, node):
         return np.array([float(evaluate([node], lambda leaf, args: VALUES[leaf.data])[0])])
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def given():

@@ -11,11 +11,7 @@ from sysdyn.dsl.model import expression as x
 
 PARAMETERS = ("m", "l", "J")
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def algebra():

@@ -8,11 +8,7 @@ from sysdyn.compiler.model.tables import evaluate as evaluate_table
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Table
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def q():

@@ -16,11 +16,7 @@ from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Constraint, Energy
 from sysdyn.dsl.text.diagnostics import ModelError
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def value(node, **known):

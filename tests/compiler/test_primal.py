@@ -23,11 +23,7 @@ from sysdyn.compiler.network.primal.integrals import antiderivative, line
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.text.diagnostics import ModelError
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def sine(amplitude, frequency):

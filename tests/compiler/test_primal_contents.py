@@ -7,11 +7,7 @@ from sysdyn.compiler.network.primal import primal
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Loop
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def i(offset=0):

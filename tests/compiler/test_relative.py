@@ -9,11 +9,7 @@ from sysdyn.compiler.model.energies import energies
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Energy
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with x.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def quadratic(*terms):

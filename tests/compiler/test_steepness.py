@@ -6,11 +6,7 @@ import pytest
 from sysdyn.compiler.forms.steepness import magnitude, steep
 from sysdyn.dsl.model import expression as ex
 
-
-@pytest.fixture(autouse=True)
-def _fresh():
-    with ex.fresh():
-        yield
+pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def unknown(name):

@@ -109,6 +109,7 @@ def formed_of(model, index, backend, scene, settings):
 @C
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 @pytest.mark.parametrize("model", EVERY if LONG else SLICE)
+@pytest.mark.one_in(2)
 def test_outside_is_inside_to_the_last_bit(tmp_path, model, backend):
     for index in ("auto", *FORMS) if LONG else ("auto", "1"):
         same(model, tmp_path / index, index, backend)
@@ -198,6 +199,7 @@ def test_no_underlying_equation_is_said(tmp_path, capsys):
         ("knife_edge", {"J": 0.9, "v_0": 2.0}), ("parallelogram", {}), ("rolling_disk", {"r": 0.7, "om_0": -0.4}),
     ],
 )  # fmt: skip
+@pytest.mark.one_in(3)
 def test_starts_at_other_parameters(tmp_path, model, changed, index):
     """Outside as inside: initial values by their formulas, constraints and everything that follows from them."""
     found = inside(f"seed/{model}", index, scene="reference")

@@ -77,6 +77,7 @@ def waves():
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize(("text", "exact"), [(LADDER, ladder), (WAVES, waves)], ids=["ladder", "waves"])
+@pytest.mark.one_in(4)
 def test_a_line_meets_its_exponential(tmp_path, text, exact, formulation, method):
     trace = trace_of(tmp_path, text, formulation=formulation, method=method)
     for name, value in zip(("end", "middle", "current"), exact(), strict=True):

@@ -42,6 +42,7 @@ def started(tmp_path, capsys, text):
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("sign", ["+", "-"])
 @pytest.mark.parametrize("angle", [0.0, 0.6, 1.2, 2.0, 3.0, 4.4, -0.9])
+@pytest.mark.one_in(4)
 def test_a_consistent_guess_comes_back(tmp_path, capsys, angle, sign, formulation):
     text = CRANK.format(angle=angle, guess=ROOT.format(sign=sign), formulation=formulation)
     x, th, moved = started(tmp_path, capsys, text)

@@ -57,6 +57,7 @@ def run(folder, text, name, **options):
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("name", NETLISTS)
+@pytest.mark.one_in(3)
 def test_a_netlist_runs_as_it_does_element_by_element(name, tmp_path, monkeypatch):
     text = NETLISTS[name]
     families = gathered(network(text))

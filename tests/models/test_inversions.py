@@ -227,6 +227,7 @@ def _near(trace, expected, within, said):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", [n for n in CASES if n != "diode e(f)"])
+@pytest.mark.one_in(3)
 def test_against_closed_forms(tmp_path, monkeypatch, name, formulation):
     """Inverted, and with the laws kept implicit."""
     text, forms, _ = CASES[name]

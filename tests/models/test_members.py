@@ -39,6 +39,7 @@ def integral(law, x):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", LAWS)
+@pytest.mark.one_in(4)
 def test_state_functions_are_integrals_of_the_law(tmp_path, name, formulation):
     edge, side, text, law, start = LAWS[name]
     given = {"kinetic": "pf", "potential": "qe", "dissipator": "ef"}[edge].replace(side, "")

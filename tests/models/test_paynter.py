@@ -158,6 +158,7 @@ LAID_OUT = [
 
 
 @pytest.mark.parametrize(("domain", "function", "place", "formulation"), LAID_OUT)
+@pytest.mark.one_in(4)
 def test_its_own_variable_is_simulated_rightly(tmp_path, domain, function, place, formulation):
     known = STATE_FUNCTIONS[function]
     variable = names(place, domain)[known.own]
@@ -200,6 +201,7 @@ COORDINATES = {
 @pytest.mark.parametrize("place", COORDINATES)
 @pytest.mark.parametrize("domain", ["translation", "rotation", "electrical", "hydraulic"])
 @pytest.mark.parametrize("transformed", [False, True])
+@pytest.mark.one_in(3)
 def test_coordinates_are_simulated_rightly(tmp_path, domain, place, transformed):
     """One coordinate with all three stores, the inertia (compliance) said by either of its functions."""
     functions = ["T" if transformed else "T*", "V", "D"]

@@ -76,6 +76,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.one_in(3)
 def test_positions_and_contents(tmp_path, case, formulation):
     body, more, start = CASES[case]
     text = MASSES.format(body=body, more=more, traced=", ".join(start))

@@ -81,6 +81,7 @@ def with_more(lines):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", UNREAD)
+@pytest.mark.one_in(4)
 def test_an_unread_subsystem_costs_nothing(tmp_path, name, formulation):
     """The same steps within 2 as without it, the same trace, and the names of what is not there."""
     bare = _bare(formulation)
@@ -326,6 +327,7 @@ def test_every_part_of_a_network_is_known_to_pruning():
 
 
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.one_in(3)
 def test_random_models_agree_with_and_without(tmp_path, seed):
     assert compared(seed, tmp_path).worst <= 1.0
 

@@ -103,7 +103,7 @@ MUTANTS = {
         ('and ("b", b.name) not in read', ""),
         ('len(touched["n", name]) == 1', "True"),
         ('and ("n", name) not in read', ""),
-        ("alone and _grounded(network, name)", "alone"),
+        (" if n.name in grounded", ""),
         ('{"effort", "flow"} - {balanced}', '{"effort", "flow"}'),
         ("b.kind not in allowed or ", ""),
         ('balanced = "flow" if b.domain.common == "effort" else "effort"', 'balanced = "effort"'),

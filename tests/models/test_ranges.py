@@ -17,7 +17,7 @@ model ramp {
   R2: dissipator(e = 5 ohm*f) b
   C: potential(q = 2 uF*e) b
 }
-scene up of ramp { time 0 s to 5 s; trace R.f, R.e, C.e every 0.1 s }
+scene up of ramp { time 0 s to 5 s; trace R.f, R.e, C.e every 0.1 s; accuracy 1e-6 }
 """
 
 

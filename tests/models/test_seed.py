@@ -117,6 +117,7 @@ def in_numpy(model, formulation):
     ("model", "formulation", "backend"),
     [(*case, backend) for case in CASES for backend in ("c", "numpy") if backend == "c" or in_numpy(*case)],
 )
+@pytest.mark.one_in(2)
 def test_reference_values(tmp_path, model, formulation, backend):
     reference = REFERENCES[model]
     found = simulated(tmp_path, model, formulation=formulation, backend=backend, times=reference["t"])
@@ -132,6 +133,7 @@ def twice(model):
 
 
 @pytest.mark.parametrize(("model", "formulation"), [case for case in CASES if case[1] in twice(case[0])])
+@pytest.mark.one_in(4)
 def test_reference_values_at_the_finer_accuracy(tmp_path, model, formulation):
     reference = REFERENCES[model]
     found = simulated(tmp_path, model, formulation=formulation, times=reference["t"], accuracy=FINE)
@@ -163,6 +165,7 @@ def some(model, formulation, case):
 @pytest.mark.parametrize(
     ("model", "formulation", "case"), [(*case, k) for case in CASES for k in range(3) if LONG or some(*case, k)]
 )
+@pytest.mark.one_in(10)
 def test_changed_values(tmp_path, model, formulation, case):
     worst = changed(tmp_path, model, formulation, settings_of(model, case))
     assert max(worst.values()) <= ALLOWED, worst
@@ -188,6 +191,7 @@ def test_changed_values_at_the_finer_accuracy(tmp_path, model, formulation, case
         if LONG or case % 2 == k or len(formulations(model)) == 1
     ],
 )
+@pytest.mark.one_in(2)
 def test_extreme_values(tmp_path, model, formulation, case):
     worst = changed(tmp_path, model, formulation, EXTREME[model][case])
     assert max(worst.values()) <= ALLOWED, worst

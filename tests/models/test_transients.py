@@ -33,6 +33,7 @@ def current(t, quick):
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("quick", [1e-4, 1e-6, 1e-9])
+@pytest.mark.one_in(3)
 def test_a_transient_is_as_exact_as_was_asked(tmp_path, formulation, method, quick):
     path = tmp_path / "coils.sd"
     path.write_text(COILS)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.integrate.accuracy import LAWS, ROUND_OFF, Sampled, control
+from sysdyn.runtime.integrate.accuracy import LAWS, ROUND_OFF, STEEP, Lighter, Sampled, control
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
 
@@ -114,12 +114,60 @@ def test_a_draft_in_which_much_happens_asks_for_a_finer_run():
 
     def run(tolerance, longest):
         asked.append(tolerance)
-        return sampled(tolerance, [1.0, 0.5 + tolerance], steps=100)
+        return sampled(tolerance, [1.0, 0.5 + tolerance], steps=200)
 
-    law = LAWS["radau"]
+    law = STEEP
     assert control(run, np.array([1e-4]), law).met
-    assert asked[1] == pytest.approx(law.tolerance(1e-4, 100))
+    assert asked[1] == pytest.approx(law.tolerance(1e-4, 200))
     assert asked[1] < 0.3 * law.tolerance(1e-4, 20)
+
+
+@pytest.mark.parametrize(("steps", "shorter"), [(18, True), (40, False)])
+def test_steps_are_shortened_where_their_length_holds_both_runs(steps, shorter):
+    asked = []
+
+    def run(tolerance, longest):
+        asked.append(longest)
+        off = 0.1 if len(asked) == 1 else 1e-3 / len(asked) ** 6
+        return sampled(tolerance, [1.0, 0.5 + off], steps=steps if len(asked) == 1 else round(1.1 / longest))
+
+    assert control(run, np.array([1e-3]), LAWS["radau"]).met
+    assert (asked[2] < 0.5 * asked[1]) is shorter
+
+
+def two_methods(error, fails=False):
+    """Runs of a method r without error and of b; what was run; the change between them."""
+    now, made = ["r"], []
+
+    def run(tolerance, longest):
+        made.append(now[0])
+        if fails and now[0] == "b":
+            raise SolverFailure("newton", 0.5, 1e-9, None, None)
+        return sampled(tolerance, [1.0, 0.5 + (error if now[0] == "b" else 0.0)], steps=15 + len(made))
+
+    return run, made, Lighter(LAWS["bdf"], lambda: now.__setitem__(0, "b"), lambda: now.__setitem__(0, "r"))
+
+
+@pytest.mark.parametrize(
+    ("error", "fails", "expected"), [(1e-5, False, "rb"), (1e-4, False, "rbr"), (0.0, True, "rbr")]
+)
+def test_where_little_happens_a_lighter_method_follows(error, fails, expected):
+    run, made, lighter = two_methods(error, fails)
+    achieved = control(run, np.array([1e-4]), LAWS["radau"], lighter=lighter)
+    assert ("".join(made), achieved.met) == (expected, True)
+    assert achieved.error_estimate == pytest.approx(2.0 * error if expected == "rb" else 0.0)
+
+
+@pytest.mark.parametrize(("steps", "doubted"), [(30, False), (15, True)])
+def test_where_much_happens_or_a_method_failed_none_does(steps, doubted):
+    made = []
+
+    def run(tolerance, longest):
+        made.append(tolerance)
+        return sampled(tolerance, [1.0, 0.5 + tolerance], steps=steps + len(made))
+
+    lighter = Lighter(LAWS["bdf"], lambda: pytest.fail("taken"), lambda: None)
+    assert control(run, np.array([1e-4]), LAWS["radau"], lighter=lighter, doubted=doubted).met
 
 
 def test_no_more_is_credited_than_a_tolerance_a_hundred_times_smaller():

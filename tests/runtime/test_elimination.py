@@ -19,10 +19,16 @@ def system_of(*parts, bent=(), **more):
     return System(manifest, binding, load(module))
 
 
+def defining(system, y):
+    """`definable` at a point."""
+    zero = np.zeros(y.size)
+    return definable(system, system.jacobian(0.0, y, zero)[0], system.residual(0.0, zero, zero))
+
+
 def eliminated(system, y):
     """Names of what leaves, in order, and y with their values by their rows alone."""
     jy = system.jacobian(0.0, y, np.zeros(y.size))[0]
-    found = eliminate(system, definable(system, jy))
+    found = eliminate(system, defining(system, y))
     columns = system.pattern.columns_of()
     constant = system.residual(0.0, np.zeros(y.size), np.zeros(y.size))
     for k, (place, row) in enumerate(zip(found.place, found.row, strict=True)):
@@ -74,7 +80,7 @@ def test_no_unknown_is_defined_through_itself():
 
 def allowed(system, y):
     """(label of a row, name of an unknown) that it may define."""
-    may = np.flatnonzero(definable(system, system.jacobian(0.0, y, np.zeros(y.size))[0]))
+    may = np.flatnonzero(defining(system, y))
     rows, columns = system.pattern.row[may], system.pattern.columns_of()[may]
     return {(system.row_label(int(r)).label, system.name(int(c))) for r, c in zip(rows, columns, strict=True)}
 
@@ -90,13 +96,24 @@ def test_a_vanishing_coefficient_defines_nothing(part):
     assert (("three", "e_3") in may) == (part > 0.0)
 
 
+@pytest.mark.parametrize(("law", "leaves"), [("e_1 - 1e12*q_x", True), ("e_1 - 1e12*q_x + 1e12", False),
+                                             ("e_1 - 1e12*q_x + e_2", False), ("e_1 - 1e12*e_2", False)])
+def test_a_multiple_of_what_carries_the_state_keeps_its_digits(law, leaves):
+    """The voltage of a capacitor of 1 pF by its charge, beside resistors of 1 ohm: no difference is taken of it, unless
+    a constant or another unknown stands beside.
+    """
+    laws = {"one": law, "two": "e_1 - e_2 - f_x"}
+    system = system_of("x", "f_x**2/2", work={"x": "-e_1"}, implicit=("1", "2"), gamma=laws)
+    assert (("one", "e_1") in allowed(system, values(system)[0])) == leaves
+
+
 @pytest.mark.parametrize(("potential", "gone"), [("q_x**2", ["q_y"]), ("q_x**2 + q_y**2", []), (0, ["q_x", "q_y"])])
 def test_displacements_that_nothing_reads(potential, gone):
     system = system_of("x y", "f_x**2/2 + f_y**2/2", potential)
     blocks = [call.block for call in system.form.calls]
     families = system.description.families
     assert [families[k].name for k in unread_families(system.description, blocks)] == gone
-    found = eliminate(system, definable(system, system.jacobian(0.0, *(np.zeros(system.unknowns),) * 2)[0]))
+    found = eliminate(system, defining(system, np.zeros(system.unknowns)))
     assert [system.name(int(k)) for k in found.unread] == gone
 
 

@@ -106,6 +106,7 @@ def test_displacements_and_multipliers(form):
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-8])
 @pytest.mark.parametrize("made", [cartesian, minimal])
+@pytest.mark.one_in(2)
 def test_energy_and_constraints_over_many_periods(made, rtol):
     t_end = (150.0 if LONG else 40.0) * SWING
     rows, _, finished = energy(made(), t_end, np.linspace(0.0, t_end, 100), rtol=rtol)

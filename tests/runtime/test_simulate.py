@@ -50,6 +50,20 @@ def test_accuracy_is_met(name, accuracy, tmp_path):
     assert trace.time.size == 41
 
 
+@pytest.mark.parametrize("name", ["lead_filter", "fluid_tank"])
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
+def test_where_little_happens_the_bdf_follows_a_draft_of_radau(name, accuracy, tmp_path):
+    make, t_end, _ = END[name]
+    options = {"every": t_end / 200}
+    result = outcome(make(), tmp_path / "o.h5", t_end, accuracy=accuracy, **options)
+    assert (result.method, result.reason, result.met) == ("bdf", "little happens", True)
+    outcome(make(), tmp_path / "r.h5", t_end, rtol=1e-13, method="radau", **options)
+    trace, exact = Trace.open(tmp_path / "o.h5"), Trace.open(tmp_path / "r.h5")
+    sizes = {n: exact[n].nominal for n in trace.names if exact[n].nominal}
+    errors = [np.abs(np.asarray(trace[n]) - np.asarray(exact[n])).max() / size for n, size in sizes.items()]
+    assert max(errors) <= result.error_estimate <= accuracy
+
+
 def test_trace_of_accepted_steps_holds_the_instants_asked_for(tmp_path):
     result = outcome(models.pendulum(), tmp_path / "o.h5", 4.0, at=(0.4, 1.0), accuracy=1e-4)
     trace = Trace.open(tmp_path / "o.h5")

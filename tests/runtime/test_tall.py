@@ -115,6 +115,25 @@ def test_the_order_of_a_square_grid_fills_little():
     assert _filled(m * m, pairs, order) < 15 * m * m
 
 
+@pytest.mark.parametrize("reach", [1, 2, 3])
+def test_a_line_is_eliminated_from_both_ends(reach):
+    """As short as from one end, and no chain of unknowns that wait for each other is longer than half the line."""
+    n = 301
+    near = np.concatenate([np.stack([np.arange(n - d), np.arange(d, n)]) for d in range(1, reach + 1)], axis=1)
+    row = np.concatenate([np.arange(n), near[0], near[1]])
+    pattern, _ = compress(n, n, [Places(row, np.concatenate([np.arange(n), near[1], near[0]]))])
+    order = paired_order(pattern)
+    assert sorted(order.tolist()) == list(range(n))
+    assert _filled(n, near, order) <= _filled(n, near, np.arange(n))
+    place, waits = np.argsort(order), np.zeros(n, dtype=int)
+    beside = [[] for _ in range(n)]
+    for a, b in near.T.tolist():
+        beside[a].append(b), beside[b].append(a)
+    for k in order.tolist():
+        waits[k] = 1 + max((waits[j] for j in beside[k] if place[j] < place[k]), default=0)
+    assert waits.max() <= n // 2 + 2 * reach
+
+
 def _filled(n, pairs, order):
     """Entries of the factor of a symmetric matrix by its graph, unknowns eliminated in this order."""
     beside = [set() for _ in range(n)]

@@ -14,6 +14,11 @@ void sd_linear_z_bad(const sd_linear_z *linear, int32_t *row, int32_t *column)
     *column = linear->bad_column;
 }
 
+double complex *sd_linear_z_values(sd_linear_z *linear)
+{
+    return linear->scaled;
+}
+
 void sd_linear_z_allow(sd_linear_z *linear, double null_pivot, const int32_t *idle)
 {
     linear->null_pivot = null_pivot;

@@ -15,7 +15,8 @@ int32_t *sd_linear_z_pivoted(sd_linear_z *linear);
 void sd_linear_z_paired(sd_linear_z *linear);
 /* as sd_linear_replayed */
 void sd_linear_z_replayed(sd_linear_z *linear);
-/* as sd_linear_factor */
+/* as sd_linear_factor; values may stand in sd_linear_z_values [entries], where they are scaled in place */
+double complex *sd_linear_z_values(sd_linear_z *linear);
 int sd_linear_z_factor(sd_linear_z *linear, const double complex *values, const double *scale);
 void sd_linear_z_solve(sd_linear_z *linear, double complex *x);
 /* null_pivot and idle of linear.h; the rank of the last factors */

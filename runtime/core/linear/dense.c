@@ -1,4 +1,5 @@
 #include "linear/dense.h"
+#include "linear/lanes.h"
 
 #include <float.h>
 #include <math.h>
@@ -103,6 +104,13 @@ void sd_factors(int32_t m, int32_t n, const double *a, const double *b, double *
     }
 }
 
+/* scale over the roots of the largest, four at a time */
+static SD_WIDE void over_roots(int32_t number, const double *restrict largest, double *restrict scale)
+{
+    for (int32_t k = 0; k < number; k++)
+        scale[k] *= 1.0 / sqrt(largest[k] > 0.0 ? largest[k] : 1.0);
+}
+
 void sd_sparse_factors(int32_t m, int32_t n, int32_t entries, const int32_t *row_of, const int32_t *column_of,
                        const double *size, double *row, double *column)
 {
@@ -119,12 +127,10 @@ void sd_sparse_factors(int32_t m, int32_t n, int32_t entries, const int32_t *row
         int32_t number = side % 2 ? n : m;
         memset(largest, 0, (size_t)number * sizeof *largest);
         for (int32_t e = 0; e < entries; e++) {
-            double scaled = size[e] * row[row_of[e]] * column[column_of[e]];
-            if (scaled > largest[of[e]])
-                largest[of[e]] = scaled;
+            double scaled = size[e] * row[row_of[e]] * column[column_of[e]], most = largest[of[e]];
+            largest[of[e]] = scaled > most ? scaled : most;
         }
-        for (int32_t k = 0; k < number; k++)
-            scale[k] *= root(largest[k]);
+        over_roots(number, largest, scale);
     }
     free(largest);
 }

@@ -22,7 +22,7 @@ void sd_sparse_free(sd_sparse *lu)
     free(lu);
 }
 
-sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const int32_t *row, const int32_t *order)
+sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const int32_t *order)
 {
     sd_sparse *lu = calloc(1, sizeof *lu);
     if (!lu)
@@ -31,7 +31,7 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     lu->n = n;
     lu->rows = rows;
     lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
-    lu->order = calloc(2 * m + 5 * all + 1, sizeof(int32_t));
+    lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
     lu->inverse = calloc(2 * m + all + 1, sizeof(sd_number));
     lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
@@ -44,15 +44,9 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     }
     lu->source = lu->order + m;
     lu->place = lu->source + m;
-    lu->stack = lu->place + all;
-    lu->head = lu->stack + all;
-    lu->mark = lu->head + all;
-    lu->count = lu->mark + all;
     lu->u_start = lu->l_start + m + 1;
     lu->x = lu->inverse + m;
     memcpy(lu->order, order, m * sizeof *order);
-    for (int32_t e = 0; e < column[n]; e++)
-        lu->count[row[e]]++;
     return lu;
 }
 
@@ -138,7 +132,8 @@ static void leave(sd_sparse *lu)
     lu->l_room = lu->u_room = 0;
 }
 
-int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
+/* with room for the search */
+static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
     int32_t n = lu->n, rows = lu->rows;
     int64_t nl = 0, nu = 0;
@@ -230,6 +225,23 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     }
     lu->pivoted = 1;
     return 0;
+}
+
+int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
+{
+    size_t rows = (size_t)lu->rows;
+    lu->stack = calloc(4 * rows + 1, sizeof(int32_t)); /* of a large one the room counts: it is not kept */
+    if (!lu->stack)
+        return 2;
+    lu->head = lu->stack + rows;
+    lu->mark = lu->head + rows;
+    lu->count = lu->mark + rows;
+    for (int32_t e = 0; e < column[lu->n]; e++)
+        lu->count[row[e]]++;
+    int failed = pivot_all(lu, column, row, value);
+    free(lu->stack);
+    lu->stack = lu->head = lu->mark = lu->count = NULL;
+    return failed;
 }
 
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)

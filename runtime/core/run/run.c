@@ -84,17 +84,23 @@ static void shares(const sd_stepper *stepper, double to, double *share)
     int high = stepper->nodes > 3, points = stepper->nodes + 1;
     double node[SD_NODES + 1] = {0.0};
     memcpy(node + 1, stepper->node, (size_t)stepper->nodes * sizeof *node);
+    for (int k = 0; k < points; k++)
+        share[k] = 0.0;
+    for (int p = 0; p < (high ? 4 : 2); p++) {
+        double s = to * (0.5 + gauss[high][p]), before = weight[high][p], behind[SD_NODES + 2];
+        behind[points] = 1.0;
+        for (int k = points - 1; k > 0; k--)
+            behind[k] = behind[k + 1] * (s - node[k]);
+        for (int k = 0; k < points; k++) {
+            share[k] += before * behind[k + 1];
+            before *= s - node[k];
+        }
+    }
     for (int k = 0; k < points; k++) {
-        double own = 1.0, sum = 0.0;
+        double own = 1.0;
         for (int j = 0; j < points; j++)
             own *= j == k ? 1.0 : node[k] - node[j];
-        for (int p = 0; p < (high ? 4 : 2); p++) {
-            double s = to * (0.5 + gauss[high][p]), value = weight[high][p];
-            for (int j = 0; j < points; j++)
-                value *= j == k ? 1.0 : s - node[j];
-            sum += value;
-        }
-        share[k] = to * sum / own;
+        share[k] *= to / own;
     }
 }
 
@@ -122,8 +128,9 @@ static void integrate_nodes(sd_run *run, double part)
         run->integral[k] += stepper->moves[k];
 }
 
-/* run->integral [audited]: of the powers from the start of the last step to `to`, within that step */
-static void integrate(sd_run *run, double to)
+/* run->integral [audited]: of the powers from the start of the last step to `to`, within that step; 1: aux, aux_d are the
+ * point there */
+static int integrate(sd_run *run, double to)
 {
     static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
     const sd_stepper *stepper = run->stepper;
@@ -131,10 +138,10 @@ static void integrate(sd_run *run, double to)
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
     run->sampled = 0;
     if (!run->audit || half == 0.0)
-        return;
+        return 0;
     if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {
         integrate_nodes(run, to == *stepper->t ? 1.0 : (to - from) / (*stepper->t - from));
-        return;
+        return 0;
     }
     if (stepper->part_y) {
         sample(run, to);
@@ -144,7 +151,7 @@ static void integrate(sd_run *run, double to)
         }
         for (int32_t k = 2; stepper->part_moves && k < run->audited; k++)
             run->integral[k] += stepper->part_moves[k];
-        return;
+        return 1;
     }
     memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
     weigh(run, half / 6.0);
@@ -155,6 +162,7 @@ static void integrate(sd_run *run, double to)
     sample(run, to);
     weigh(run, half / 6.0);
     run->sampled = to == *stepper->t;
+    return 1;
 }
 
 /* The same where an event ends the step at `to`: Gauss's rule of degree 5, after many nodes 9, on settled points.  Within
@@ -240,12 +248,18 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         memcpy(run->point, run->stepper->y, (size_t)run->stepper->n * sizeof(double));
         memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
     } else {
+        int there = 0;
         if (!at_step) {
-            integrate(run, t);
+            there = integrate(run, t);
             dissipated = run->integral[2];
             supplied = run->integral[3];
         }
-        run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+        if (there) {
+            memcpy(run->point, run->aux, (size_t)run->stepper->n * sizeof(double));
+            memcpy(run->point_d, run->aux_d, (size_t)run->stepper->n * sizeof(double));
+        } else {
+            run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+        }
     }
     int compared = !at_step && (int32_t)kind & SD_COMPARED && run->observe_rate;
     if (compared) {

@@ -58,9 +58,8 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
     radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
-    size_t apart = system->unknowns < SD_LARGE ? 1 : pairs; /* complex matrices that are made at once */
-    radau->gz = calloc(pairs * m + apart * nnz, sizeof(double complex));
-    if (!radau->memory || !radau->gz || !radau->gap) {
+    radau->right = calloc(pairs * m + 1, sizeof(double complex));
+    if (!radau->memory || !radau->right || !radau->gap) {
         sd_radau_free(radau);
         return NULL;
     }
@@ -75,7 +74,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     radau->jyd = radau->jy + nnz;
     radau->g = radau->jyd + nnz;
     for (size_t k = 0; k < pairs; k++) {
-        radau->w[k] = radau->gz + apart * nnz + k * m;
+        radau->w[k] = radau->right + k * m;
         radau->complex_linear[k] = complex_linear[k];
         if (complex_linear[k])
             sd_linear_z_replayed(complex_linear[k]);
@@ -98,7 +97,7 @@ void sd_radau_free(sd_radau *radau)
     if (!radau)
         return;
     free(radau->memory);
-    free(radau->gz);
+    free(radau->right);
     free(radau->gap);
     free(radau->beside);
     free(radau->point_y);
@@ -324,6 +323,7 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;
     radau->steps++;
     radau->taken++;
+    sd_radau_note_points(radau);
     radau->rejected = 0;
     /* the Jacobian lasts while Newton converges fast; the factors while the step hardly changes */
     if (radau->theta > GOOD)

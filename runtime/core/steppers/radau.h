@@ -88,8 +88,10 @@ typedef struct sd_radau {
     double *first;            /* [n] d[0] while a correction is tried */
     double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
+    double apart[SD_POINTS], bend[SD_POINTS]; /* of each of the last points x_i: the product of all 1 / (x_i - x_j), twice
+                                               * their sum */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
-    double complex *w[SD_PAIRS], *gz;
+    double complex *w[SD_PAIRS], *right; /* right sides and solutions; their memory */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
     sd_system *other;             /* its system */
     double *point_y, *point_rate; /* [n] */
@@ -113,8 +115,10 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle);
 /* 1: between the nodes of the step at hand, whose stages are z, a steep law is beyond all magnitudes: the step passes
  * over something that happens.  Works in y, rate, d[0] and terms. */
 int sd_radau_astray(sd_radau *radau);
-/* 1 / (node i - node j) of 0, c_1, ..., c_s */
+/* 1 / (node i - node j) of 0, c_1, ..., c_s; on the diagonal the product of the others in its row */
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1]);
+/* what values within the step just accepted take of its points */
+void sd_radau_note_points(sd_radau *radau);
 /* z [stages] of a step of size h from the last step's polynomial */
 void sd_radau_extrapolate(sd_radau *radau, double h);
 

@@ -9,65 +9,74 @@ void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
 {
     for (int k = 0; k < SD_METHODS; k++) {
         const sd_radau_method *method = &sd_radau_methods[k];
-        for (int i = 0; i <= method->stages; i++)
+        for (int i = 0; i <= method->stages; i++) {
+            gap[k][i][i] = 1.0;
             for (int j = 0; j <= method->stages; j++)
-                gap[k][i][j] = i == j ? 0.0 : 1.0 / ((i ? method->c[i - 1] : 0.0) - (j ? method->c[j - 1] : 0.0));
+                if (j != i) {
+                    gap[k][i][j] = 1.0 / ((i ? method->c[i - 1] : 0.0) - (j ? method->c[j - 1] : 0.0));
+                    gap[k][i][i] *= gap[k][i][j];
+                }
+        }
     }
 }
 
-/* Lagrange weights of the nodes 0, c_1, ..., c_s = 1 at x */
-static void lagrange_value(const sd_radau *radau, const sd_radau_method *method, double x, double *value)
-{
-    const double(*gap)[SD_STAGES + 1] = radau->gap[method - sd_radau_methods];
-    double far[SD_STAGES + 1] = {x};
-    for (int j = 0; j < method->stages; j++)
-        far[j + 1] = x - method->c[j];
-    for (int i = 0; i <= method->stages; i++) {
-        value[i] = 1.0;
-        for (int j = 0; j <= method->stages; j++)
-            value[i] *= j == i ? 1.0 : far[j] * gap[i][j];
-    }
-}
-
-/* the same, and their derivatives by x */
+/* Lagrange weights of the nodes 0, c_1, ..., c_s = 1 at x, and their derivatives by x: products of what lies before and
+ * behind each node */
 static void lagrange(const sd_radau *radau, const sd_radau_method *method, double x, double *value, double *slope)
 {
     const double(*gap)[SD_STAGES + 1] = radau->gap[method - sd_radau_methods];
-    double far[SD_STAGES + 1] = {x};
-    for (int j = 0; j < method->stages; j++)
+    double far[SD_STAGES + 1] = {x}, behind[SD_STAGES + 2], behind_d[SD_STAGES + 2], before = 1.0, before_d = 0.0;
+    int s = method->stages;
+    for (int j = 0; j < s; j++)
         far[j + 1] = x - method->c[j];
-    for (int i = 0; i <= method->stages; i++) {
-        double v = 1.0, d = 0.0;
-        for (int j = 0; j <= method->stages; j++) {
-            if (j == i)
-                continue;
-            d = (d * far[j] + v) * gap[i][j];
-            v *= far[j] * gap[i][j];
-        }
-        value[i] = v;
-        slope[i] = d;
+    behind[s + 1] = 1.0;
+    behind_d[s + 1] = 0.0;
+    for (int i = s; i > 0; i--) {
+        behind[i] = behind[i + 1] * far[i];
+        behind_d[i] = behind_d[i + 1] * far[i] + behind[i + 1];
+    }
+    for (int i = 0; i <= s; i++) {
+        value[i] = gap[i][i] * before * behind[i + 1];
+        slope[i] = gap[i][i] * (before_d * behind[i + 1] + before * behind_d[i + 1]);
+        before_d = before_d * far[i] + before;
+        before *= far[i];
     }
 }
 
-/* Hermite weights of values and derivatives at the points x[0..count) at t, and their derivatives:
- * value_i = (1 - 2 (t - x_i) l_i'(x_i)) l_i^2,  rate_i = (t - x_i) l_i^2 */
-static void hermite(int count, const double *x, double t, double *value, double *rate, double *value_d, double *rate_d)
+void sd_radau_note_points(sd_radau *radau)
 {
-    for (int i = 0; i < count; i++) {
-        double l = 1.0, dl = 0.0, own = 0.0;
-        for (int j = 0; j < count; j++) {
-            if (j == i)
-                continue;
-            double q = 1.0 / (x[i] - x[j]);
-            dl = (dl * (t - x[j]) + l) * q;
-            l *= (t - x[j]) * q;
-            own += q;
-        }
-        double far = t - x[i];
-        value[i] = (1.0 - 2.0 * far * own) * l * l;
-        value_d[i] = -2.0 * own * l * l + (1.0 - 2.0 * far * own) * 2.0 * l * dl;
-        rate[i] = far * l * l;
-        rate_d[i] = l * l + far * 2.0 * l * dl;
+    double from = radau->t - radau->h_used, x[SD_POINTS] = {radau->t, from, from - radau->h_before};
+    int points = radau->taken > 1 ? SD_POINTS : 2;
+    for (int i = 0; i < points; i++) {
+        double product = 1.0, sum = 0.0;
+        for (int j = 0; j < points; j++)
+            if (j != i) {
+                double q = 1.0 / (x[i] - x[j]);
+                product *= q;
+                sum += q;
+            }
+        radau->apart[i] = product;
+        radau->bend[i] = 2.0 * sum;
+    }
+}
+
+/* Hermite weights of values and derivatives at the last three points at t, and their derivatives:
+ * value_i = (1 - 2 (t - x_i) l_i'(x_i)) l_i^2,  rate_i = (t - x_i) l_i^2 */
+static void hermite(const sd_radau *radau, double t, double *value, double *rate, double *value_d, double *rate_d)
+{
+    double end = t - radau->t, begin = end + radau->h_used, old = begin + radau->h_before;
+    int points = radau->taken > 1 ? SD_POINTS : 2;
+    double far[SD_POINTS] = {end, begin, points > 2 ? old : 1.0};
+    double d2 = points > 2 ? 1.0 : 0.0;
+    double l[SD_POINTS] = {far[1] * far[2], far[0] * far[2], far[0] * far[1]};
+    double dl[SD_POINTS] = {far[2] + d2 * far[1], far[2] + d2 * far[0], far[0] + far[1]};
+    for (int i = 0; i < points; i++) {
+        double own = l[i] * radau->apart[i], own_d = dl[i] * radau->apart[i];
+        double square = own * own, square_d = 2.0 * own * own_d, lean = 1.0 - far[i] * radau->bend[i];
+        value[i] = lean * square;
+        value_d[i] = lean * square_d - radau->bend[i] * square;
+        rate[i] = far[i] * square;
+        rate_d[i] = square + far[i] * square_d;
     }
 }
 
@@ -101,9 +110,9 @@ static int led(const sd_radau *radau, int32_t i)
 /* the quintic through values and derivatives at the last three points, for the unknowns that it serves */
 static void between_points(const sd_radau *radau, double t, double *y, double *yd)
 {
-    double from = radau->t - radau->h_used, x[3] = {radau->t, from, from - radau->h_before}, a[3], b[3], ad[3], bd[3];
-    int points = radau->taken > 1 ? 3 : 2;
-    hermite(points, x, t, a, b, ad, bd);
+    double a[SD_POINTS], b[SD_POINTS], ad[SD_POINTS], bd[SD_POINTS];
+    int points = radau->taken > 1 ? SD_POINTS : 2;
+    hermite(radau, t, a, b, ad, bd);
     for (int32_t i = 0; i < radau->n; i++)
         if (led(radau, i)) {
             double base = radau->last[i]; /* differences against one value: no cancellation of large ones */
@@ -218,12 +227,12 @@ void sd_radau_extrapolate(sd_radau *radau, double h)
     const sd_radau_method *used = radau->used;
     int last = used->stages - 1;
     for (int s = 0; s < radau->method->stages; s++) {
-        double *z = radau->z[s], v[SD_STAGES + 1];
+        double *z = radau->z[s], v[SD_STAGES + 1], slope[SD_STAGES + 1];
         if (radau->taken == 0) {
             memset(z, 0, (size_t)radau->n * sizeof *z);
             continue;
         }
-        lagrange_value(radau, used, 1.0 + radau->method->c[s] * h / radau->h_used, v);
+        lagrange(radau, used, 1.0 + radau->method->c[s] * h / radau->h_used, v, slope);
         for (int32_t i = 0; i < radau->n; i++) {
             double sum = 0.0;
             for (int j = 0; j < last; j++)

@@ -54,7 +54,7 @@ static void factorise_one(void *context, int part)
         return;
     }
     double complex both = method->lambda[part - 1] / radau->h;
-    double complex *gz = radau->gz + (large(radau) ? (size_t)(part - 1) * ((size_t)entries + 1) : 0);
+    double complex *gz = sd_linear_z_values(radau->complex_linear[part - 1]);
     for (int32_t e = 0; e < entries; e++)
         gz[e] = radau->jy[e] + both * radau->jyd[e];
     all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, radau->scale);

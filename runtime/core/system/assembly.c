@@ -38,30 +38,33 @@ static void add_entries(sd_entries *block, const sd_frame *frame, int32_t n, con
         values[slot[e]] += v[e];
 }
 
+void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values)
+{
+    memset(values, 0, (size_t)system->entries * sizeof *values);
+    for (int32_t i = 0; i < system->kinematics; i++)
+        values[rate ? system->k_slot_q[i] : system->k_slot_f[i]] += rate ? system->k_scale[i] : -system->k_scale[i];
+    for (int32_t c = 0; c < system->calls; c++) {
+        const sd_call *call = &system->call[c];
+        add_entries(rate ? call->dyd : call->dy, &call->frame, rate ? call->n_dyd : call->n_dy,
+                    rate ? call->slot_dyd : call->slot_dy, t, y, yd, system->v, values);
+    }
+    for (int32_t i = 0; i < system->clear; i++)
+        values[system->cleared[i]] = 0.0;
+    for (int32_t i = 0; i < system->held; i++)
+        values[system->held_slot[i]] = (system->held_rate[i] != 0) == rate ? 1.0 : 0.0;
+}
+
 void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
 {
-    memset(jy, 0, (size_t)system->entries * sizeof *jy);
-    memset(jyd, 0, (size_t)system->entries * sizeof *jyd);
     system->jacobian_evaluations++;
     if (system->left) {
+        memset(jy, 0, (size_t)system->entries * sizeof *jy);
+        memset(jyd, 0, (size_t)system->entries * sizeof *jyd);
         system->left->jacobian(system->left, t, y, yd, jy, jyd);
         return;
     }
-    for (int32_t i = 0; i < system->kinematics; i++) {
-        jyd[system->k_slot_q[i]] += system->k_scale[i];
-        jy[system->k_slot_f[i]] -= system->k_scale[i];
-    }
-    for (int32_t c = 0; c < system->calls; c++) {
-        const sd_call *call = &system->call[c];
-        add_entries(call->dy, &call->frame, call->n_dy, call->slot_dy, t, y, yd, system->v, jy);
-        add_entries(call->dyd, &call->frame, call->n_dyd, call->slot_dyd, t, y, yd, system->v, jyd);
-    }
-    for (int32_t i = 0; i < system->clear; i++)
-        jy[system->cleared[i]] = jyd[system->cleared[i]] = 0.0;
-    for (int32_t i = 0; i < system->held; i++) {
-        jy[system->held_slot[i]] = system->held_rate[i] ? 0.0 : 1.0;
-        jyd[system->held_slot[i]] = system->held_rate[i] ? 1.0 : 0.0;
-    }
+    sd_slopes(system, t, y, yd, 0, jy);
+    sd_slopes(system, t, y, yd, 1, jyd);
 }
 
 /* s := magnitudes of the terms of steep rows, zero in others */

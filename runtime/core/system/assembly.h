@@ -63,6 +63,8 @@ struct sd_system {
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r);
 /* jy := dF/dy, jyd := dF/dyd */
 void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd);
+/* one of them, of a system that is not condensed; rate: dF/dyd */
+void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values);
 /* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one
  * holds.  rate [unknowns]: magnitudes of the derivatives, as the method makes them of values; s [rows]: work.
  * g [entries], scale [unknowns]: slopes, magnitudes of y; all: the other rows are judged too, by the terms |g y| of the

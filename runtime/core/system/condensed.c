@@ -117,10 +117,11 @@ static void jacobian(const sd_left *left, double t, const double *z, const doubl
 {
     const sd_condensed *condensed = (const sd_condensed *)left;
     place(condensed, z, zd);
-    sd_jacobian(condensed->full, t, condensed->y, condensed->yd, condensed->jy, condensed->jyd);
-    for (int64_t p = 0; p < condensed->products; p++) {
-        jz[condensed->to[p]] += condensed->share[p] * condensed->jy[condensed->from[p]];
-        jzd[condensed->to[p]] += condensed->share[p] * condensed->jyd[condensed->from[p]];
+    for (int rate = 0; rate < 2; rate++) { /* one room for both: of a large system it is long */
+        double *values = rate ? jzd : jz;
+        sd_slopes(condensed->full, t, condensed->y, condensed->yd, rate, condensed->slope);
+        for (int64_t p = 0; p < condensed->products; p++)
+            values[condensed->to[p]] += condensed->share[p] * condensed->slope[condensed->from[p]];
     }
 }
 
@@ -168,7 +169,7 @@ sd_system *sd_beside_as(sd_beside *beside, const sd_system *system)
         beside->condensed.y = beside->y;
         beside->condensed.yd = beside->yd;
         beside->condensed.r = beside->r;
-        beside->condensed.jy = beside->condensed.jyd = NULL;
+        beside->condensed.slope = NULL;
         beside->system.left = &beside->condensed.left;
     }
     return &beside->system;

@@ -10,7 +10,7 @@
  *   unknown, row: spans of kept places, one behind the other in both
  *   straight: eliminated unknowns in an order in which each reads kept ones and those before it
  *   from, to, share [products]: entry `to` of the kept matrix += share * entry `from` of the full one
- *   y, yd [room of the full system], r [full rows], jy, jyd [full entries]: work
+ *   y, yd [room of the full system], r [full rows], slope [full entries]: work
  */
 #ifndef SYSDYN_CONDENSED_H
 #define SYSDYN_CONDENSED_H
@@ -39,7 +39,7 @@ typedef struct sd_condensed {
     int64_t products;
     const int32_t *from, *to;
     const double *share;
-    double *y, *yd, *r, *jy, *jyd;
+    double *y, *yd, *r, *slope;
 } sd_condensed;
 
 /* the functions of assembly.h read `system` through it */

@@ -83,7 +83,7 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
                     const int32_t *place_y, const int32_t *place_yd, int32_t determined)
 {
     int32_t n = settle->unknowns + settle->rates;
-    settle->basis = sd_sparse_new(n, settle->rows, column, row, order);
+    settle->basis = sd_sparse_new(n, settle->rows, column, order);
     settle->lift = calloc((size_t)n + (size_t)column[settle->rows] + 1, sizeof(double));
     if (!settle->basis || !settle->lift)
         return 2;
@@ -368,12 +368,15 @@ static void put_near(const sd_settle *settle, double *y, double *yd)
             *(j < n ? &y[j] : &yd[settle->rate[j - n]]) = settle->met[j];
 }
 
-/* what the point makes of other unknowns, and its residuals */
-static void finish(sd_settle *settle, double t, double *y, double *yd, int done)
+/* what the point makes of other unknowns, and its residuals; measured: those of the point as it comes are known */
+static void finish(sd_settle *settle, double t, double *y, double *yd, int done, int measured)
 {
+    int derived = settle->kinematics > 0 && !settle->system->left;
+    if (measured && !derived && !(done && settle->system->held > 0))
+        return;
     for (int32_t i = 0; done && i < settle->system->held; i++)
         y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
-    for (int32_t i = 0; i < settle->kinematics && !settle->system->left; i++)
+    for (int32_t i = 0; i < settle->kinematics && derived; i++)
         yd[settle->k_q[i]] = y[settle->k_f[i]];
     measure(settle, t, y, yd);
 }
@@ -388,7 +391,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
         if (follow(settle, t, y, yd, &best)) {
             take(settle, y, yd, settle->met);
-            finish(settle, t, y, yd, 1);
+            finish(settle, t, y, yd, 1, 1);
             return 0;
         }
         put(settle, settle->x0, y, yd);
@@ -417,7 +420,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     else
         put(settle, settle->x0, y, yd);
     settle->failures += !done;
-    finish(settle, t, y, yd, done);
+    finish(settle, t, y, yd, done, 0);
     return !done;
 }
 

@@ -29,8 +29,7 @@ typedef struct sd_settle {
     const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
     const int32_t *slot_yd, *slot_yd_t;   /* [entries] the same of dF/dyd */
     const int32_t *slot_x, *slot_r;       /* [unknowns + rates], [rows] diagonal */
-    const double *weight;            /* [unknowns + rates]: 1 for the state, less for what has no inertia, almost
-                                        nothing for what follows from it */
+    const double *weight;            /* [unknowns + rates]: 1 for the state, almost nothing for what follows from it */
     double *scale;                   /* [unknowns + rates] magnitudes */
     const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
