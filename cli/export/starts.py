@@ -1,6 +1,6 @@
 """The tables by which an exported model finds a start at other parameters than those it was bound to.
 
-The problem is that of runtime/start: unknowns, rows, weights and stages are the starter's own at the known start; what
+The problem is that of runtime/start: unknowns, rows and weights are the starter's own at the known start; what
 is given anew are the initial values, by formulas.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 from sysdyn.cli.export.tables import Stage, Start, assembled
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.start import STAGES, ConsistentState
+from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Mask, Starter, problem_of
 
 LARGEST = 1500
@@ -40,21 +40,13 @@ def start_tables(system: System, state: ConsistentState) -> Start | None:
 
 
 def _stages(starter: Starter, t: float, x: Floats, free: Mask) -> list[Stage]:
-    """The stages of `runtime/start/start.py`, in their order."""
+    """Onto guessed expressions, then onto all rows: what follows from the state alone where that is enough."""
     follows = starter.following(t, x)
     found = []
     written = starter.guessed & ~starter.unsaid
     if written.any():
         rows = written | starter.groups("phi", "psi")
         found.append(Stage(((_places(rows), _places(free & (np.arange(free.size) < starter.n))),), guess=True))
-    for groups, moving in STAGES:
-        rows, may = starter.groups(*groups), free & starter.moves(moving)
-        trials = []
-        for use in (rows | starter.between(moving), rows):
-            if use.any() and may.any():
-                trials += [(_places(use), _places(may & follows)), (_places(use), _places(may))]
-        if trials:
-            found.append(Stage(tuple(trials)))
     every = _places(starter.every)
     found.append(Stage(((every, _places(free & follows)), (every, _places(free)))))
     return found

@@ -27,7 +27,6 @@ from sysdyn.runtime.structure.structure import Structure, structure
 from sysdyn.values import dataclass
 
 SOUGHT = {
-    "all_unknowns": "with all unknowns at once",
     "rows_as_written": "down steep laws, from the equations without their derivatives",
     "perturbed_guess": "from a point beside the guess",
     "largest_scales": "in the largest scales that the equations propose",

@@ -113,8 +113,10 @@ class Work:
 class Problem:
     """Rows `use` of residual(x) [number] in the unknowns `free` of x.
 
-    jacobian(x): values at (rows, columns); guess, scale, weight [unknowns]; work: what all problems of one search draw
-    on; core: the same rows and entries there, at an instant t [s], check: raises what a callback of them raised.
+    jacobian(x): values at (rows, columns); guess, scale, weight [unknowns]; levels: unknowns [masks] whose moves are
+    the least in this order, each with what stands before it held, the others then (of what is too large for full
+    matrices weights alone say so); work: what all problems of one search draw on; core: the same rows and entries
+    there, at an instant t [s], used where there are no levels; check: raises what a callback of them raised.
     """
 
     residual: Callable[[Floats], Floats]
@@ -127,15 +129,10 @@ class Problem:
     guess: Floats
     scale: Floats
     weight: Floats
+    levels: tuple[Mask, ...] = ()
     work: Work = field(default_factory=Work)
     core: tuple[lib.RowsOfStart, float] | None = None
     check: Callable[[], None] | None = None
-
-
-    def within(self, free: Mask) -> Problem:
-        """The same in other free unknowns."""
-        entries, sizes = (self.rows, self.columns, self.number, self.use), (self.guess, self.scale, self.weight)
-        return Problem(self.residual, self.jacobian, *entries, free, *sizes, self.work, self.core, self.check)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,13 +175,17 @@ class _Linear:
         return next(numbers)[rows], next(numbers)[columns], values
 
     def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
-        """The u of least norm with A u = A u_now - r; beside it, the step of least norm: its round-off is its own."""
+        """The least u with A u = A u_now - r; beside it, the least step: its round-off is its own."""
         i, j, v = self.entries
+        levels = [level[self.problem.free] for level in self.problem.levels]
+        ordered = any(level.any() for level in levels) and max(self.shape) <= DENSE
+        # what costs nothing stays where it is as far as it may
+        stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else np.zeros_like(u)
         aim = -r
-        if beside:
-            return u + least_norm(self.shape, (i, j, v), aim)
-        np.add.at(aim, i, v * u[j])
-        return least_norm(self.shape, (i, j, v), aim)
+        np.add.at(aim, i, v * (u - stays)[j])
+        if ordered:
+            return stays + in_order(self.shape, (i, j, v), aim, levels)
+        return stays + least_norm(self.shape, (i, j, v), aim)
 
 
 def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
@@ -223,6 +224,33 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
         tried.append((missed, found))
     least = min(tried, key=lambda item: item[0])
     return least[1] if least[0] < FAR * tried[0][0] else tried[0][1]
+
+
+def in_order(
+    shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, levels: Sequence[Mask]
+) -> Floats:
+    """The u with A u = aim of least norm within the first level, then within the next, each with what stands before it
+    held, at last of the others; A [rows, unknowns] by its entries, a full matrix.
+    """
+    i, j, v = entries
+    a = np.zeros(shape)
+    np.add.at(a, (i, j), v)
+    if not (np.isfinite(a).all() and np.isfinite(aim).all()):
+        raise NotFiniteError
+    row, column = factors(a)
+    a, aim, found = row[:, None] * a, row * aim, np.zeros(shape[1])
+    later = np.ones(shape[1], dtype=bool)
+    for level in levels:
+        later = later & ~level
+        left, sigma, _ = decomposed(a[:, later] * column[later])
+        only = left[:, count(sigma) :].T  # what rows say of the level whatever comes later
+        left, sigma, right = decomposed(only @ a[:, level])
+        k = int((sigma > RANK * np.abs(a[:, level]).max(initial=0.0)).sum())  # nothing may be left of a level
+        found[level] = right[:k].T @ ((left[:, :k].T @ (only @ aim)) / sigma[:k])
+        aim = aim - a[:, level] @ found[level]
+    i, j = np.nonzero(a[:, later])
+    found[later] = least_norm((shape[0], int(later.sum())), (i, j, a[:, later][i, j]), aim)
+    return found
 
 
 _Way = Callable[[tuple[int, int], tuple[Any, Any, Floats], Floats], Floats]
@@ -296,7 +324,7 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) 
 
     folds: iterations that are not counted while rows shrink as fast as their terms do.
     """
-    if problem.core is not None:
+    if problem.core is not None and not problem.levels:
         small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
         found = _in_core(problem, problem.core, x, (most, folds), measure=not small)
         if small or found.residual <= _ROUND_OFF:  # a large one that holds is not linearised
@@ -377,29 +405,13 @@ def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
     return best
 
 
-def in_order(problem: Problem, x: Floats, levels: Sequence[Mask]) -> Floats:
-    """The point nearest to problem.guess by the rows linearised at x, full matrices: moves of the first level are the
-    least, then those of the next, each with what stands before it held; others cost nothing and stay as in x.
-    """
-    linear, levels = _Linear(problem, x), [level[problem.free] for level in levels]
-    a = np.zeros(linear.shape)
-    i, j, v = linear.entries
-    np.add.at(a, (i, j), v)
-    u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
-    rest = np.any(levels, axis=0)
-    aim = a[:, rest] @ u[rest] - (problem.residual(x) * linear.row_scale)[problem.use]
-    row, column = factors(a)
-    a, aim = row[:, None] * a, row * aim
-    found, places = x.copy(), np.flatnonzero(problem.free)
-    below = ~rest
-    for level, later in zip(levels, (np.any(levels[k + 1 :], axis=0) | below for k in range(len(levels))), strict=True):
-        left, sigma, _ = decomposed(a[:, later] * column[later])
-        only = left[:, count(sigma) :].T
-        left, sigma, right = decomposed(only @ a[:, level])
-        k = int((sigma > RANK * np.abs(a[:, level]).max(initial=0.0)).sum())  # nothing may be left of a level
-        moved = right[:k].T @ ((left[:, :k].T @ (only @ aim)) / sigma[:k])
-        aim = aim - a[:, level] @ moved
-        found[places[level]] = problem.guess[places[level]] + moved * linear.unit[places[level]]
+def stepped(problem: Problem, x: Floats) -> Floats:
+    """The point one whole step from x.  NotFiniteError."""
+    linear, free = _Linear(problem, x), problem.free
+    u = (x - problem.guess)[free] / linear.unit[free]
+    r = (problem.residual(x) * linear.row_scale)[problem.use]
+    found = x.copy()
+    found[free] = problem.guess[free] + linear.nearest(u, r, beside=False) * linear.unit[free]
     return found
 
 

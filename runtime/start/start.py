@@ -1,10 +1,10 @@
 """A consistent state at t0 from fixed values and guesses.
 
-Unknowns and equations: see starter.py.  Fixed values never move.  Guesses move least: each step is the minimum-norm
-solution of the linearised rows around the *guess* (Gauss-Newton, in unknowns scaled by magnitude, rank-deficient rows
-tolerated).  Stages: positions onto phi and what else holds between them, then flows and momenta onto the first
-derivatives, then everything.  Globalisation is the list STRATEGIES, tried in order until the rows hold; the name of
-the one that found it stays with the state.
+Unknowns and equations: see starter.py.  Fixed values never move.  Guesses move least, those of the text first, then
+what no text says of stores, then displacements that hold nothing; what follows from these moves freely: each step is
+the least change from the *guess* on the linearised rows in this order (Gauss-Newton, in unknowns scaled by magnitude,
+rank-deficient rows tolerated; by weights where matrices are sparse).  Globalisation is the list STRATEGIES, tried in
+order until the rows hold; the name of the one that found it stays with the state.
 """
 
 from __future__ import annotations
@@ -23,39 +23,24 @@ from sysdyn.runtime.numerics.least_change import (
     OutOfTimeError,
     Solution,
     Work,
-    in_order,
     least_residual,
     solve,
+    stepped,
 )
 from sysdyn.runtime.numerics.points import distinct
-from sysdyn.runtime.start.starter import NOISE, STATE, WEIGHT, Mask, Starter, problem_of
+from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.values import dataclass
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
-_FEW = 3
-"""Iterations that show whether what follows from the state is enough: rows that are linear in it take one."""
-STAGES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
-    (("phi",), ("q",)),
-    (("phi_rate", "psi"), ("f",)),
-    (("momentum",), ("p",)),
-    (("phi", "phi_rate", "psi", "momentum"), STATE),
-)
-"""Groups of rows, and the kinds of unknowns that are moved onto them, one after the other."""
 HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi_rate", "gamma_rate")
 """Groups of rows that are derivatives of others."""
 EXACT = 1e-9
 OWN = 1e-6
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
-NEARER = 12
-"""Steps towards the least change of the state."""
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
-FLOOR = 1e-5
-"""Of the largest alike: below it rows hold to EXACT of that, ten times the round-off that full matrices make of it."""
-EVEN = 1.05
-"""Growth of the change of what is not written that a step may bring where nothing else moves less."""
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
 EXPLAINED = 0.1
@@ -110,26 +95,9 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return guess if moved is None else moved.x
 
 
-def _stages(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """Positions, flows, momenta one after the other, each the nearest to its guess with those before it held.
-
-    What follows from the state moves alone where that is enough.
-    """
-    for groups, moving in STAGES:
-        rows, may = starter.groups(*groups), free & starter.moves(moving)
-        for use in (rows | starter.between(moving), rows):
-            if not use.any() or not may.any():
-                continue
-            problem = problem_of(starter, t, x, guess, rows=use, free=may)
-            found = solve(problem.within(may & starter.following(t, x)), x, _FEW)
-            found = found if found.residual < EXACT else solve(problem, x)
-            if found.residual < EXACT:
-                x = starter.without_noise(found.x, problem.scale)
-                break
-    return x
-
-
-def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+def _rescaled(
+    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True
+) -> tuple[Solution, bool]:
     """Everything at once, and whether it holds.
 
     Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
@@ -141,7 +109,7 @@ def _rescaled(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) 
         if k and starter.work.done:
             break
         scale = starter.scale(t, at)
-        found = solve(problem_of(starter, t, at, guess, rows=starter.every, free=free), best.x)
+        found = solve(problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least), best.x)
         if empty is not None and found.residual >= EXACT and not found.residual < best.residual:
             if at is empty:
                 break
@@ -168,30 +136,17 @@ def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
 
 
 def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """X with everything else as the implicit unknowns at their guesses make it: of two roots of a gamma the iteration
-    then begins at that of the guess.
-
-    Left out are gammas that are not linear, held what their text guesses of implicit unknowns (all that stand in them,
-    where it guesses none).
+    """X with what follows as implicit unknowns at their guesses make it: of two roots of a gamma that is not linear the
+    iteration then begins at that of the guess.
     """
-    implicit = starter.moves(("e",))
-    gammas = starter.groups("gamma")
-    if not gammas.any() or not implicit.any():
-        return x
-    bent = _bent(starter, t, x) & gammas
-    own = bent[starter.rows] & implicit[starter.columns]
-    own_rows, own_columns = starter.rows[own], starter.columns[own]
-    said = np.zeros(starter.settled.rows, dtype=bool)
-    said[own_rows[starter.written[own_columns]]] = True
-    held = np.zeros(x.size, dtype=bool)
-    held[own_columns[starter.written[own_columns] | ~said[own_rows]]] = True
+    bent = _bent(starter, t, x) & starter.groups("gamma")
+    held = starter.moves(("e",)).copy()
+    held[held] = np.isin(np.flatnonzero(held), starter.columns[bent[starter.rows]])
     if not held.any():
         return x
-    rows = starter.every & ~bent & ~starter.groups("gamma_rate")
-    may = free & ~held & starter.following(t, x)
-    problem = problem_of(starter, t, x, guess, rows=rows, free=may)
-    found = solve(problem, x)
-    return starter.without_noise(found.x, problem.scale) if found.residual < EXACT else x
+    rows, may = starter.every & ~bent & ~starter.groups("gamma_rate"), free & ~held & starter.following(t, x)
+    found = _onto(starter, t, x, guess, rows=rows, free=may)
+    return x if found is None else starter.without_noise(found.x, starter.scale(t, x))
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -202,26 +157,22 @@ def _bent(starter: Starter, t: float, x: Floats) -> Mask:
     return bent
 
 
-def _steadied(starter: Starter, t: float, best: Solution, guess: Floats, free: Mask) -> Solution:
-    """The solution without what guesses of the state moved for the sake of what follows from it: that costs nothing.
-
-    The least change of contents under all rows, of what the text guesses first, then of the rest, by steps to the least
-    of the rows linearised; what follows from the state is free.  Positions in curved constraints are left alone, and
-    what is too large for full matrices.
+def _anew(
+    starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask
+) -> tuple[Solution, bool]:
+    """The solution with its state to round-off, in its own magnitudes, and what follows found from x as where no state
+    moves: neither depends on the way here; whether that holds.  What is too large for full matrices is left alone.
     """
-    if best.x.size > DENSE:
-        return best
-    clean = _without_noise(starter, t, best.x, guess, free)
-    best = best if clean is None else replace(best, x=clean)
-    last = np.inf
-    for _ in range(NEARER):
-        found, moved = _nearer(starter, t, best, guess, free)
-        if found is None or not moved < 0.5 * last:
-            break
-        best, last = found, moved
-        if moved < CLOSED:
-            break
-    return best
+    there = best.x
+    state = free & ~starter.following(t, there)
+    if best.residual >= EXACT or there.size > DENSE or not (there != guess)[state].any():
+        return best, False
+    near = stepped(problem_of(starter, t, there, guess, rows=starter.every, free=free, least=True), there)
+    largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
+    near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
+    near = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
+    found, holds = _rescaled(starter, t, np.where(state, near, x), guess, free & ~state, least=False)
+    return (found, True) if holds else (best, False)
 
 
 def _closed(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
@@ -230,51 +181,12 @@ def _closed(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
     """
     if best.residual <= CLOSED:
         return best
-    found = solve(problem_of(starter, t, best.x, best.x, rows=starter.every, free=free), best.x)
-    clean = _without_noise(starter, t, found.x, best.x, free) if found.residual < best.residual else None
+    found = solve(problem_of(starter, t, best.x, best.x, rows=starter.every, free=free, least=True), best.x)
+    if not found.residual < best.residual:
+        return best
+    stays = np.abs(found.x - best.x) <= NOISE * starter.largest_alike(best.x)
+    clean = _without_noise(starter, t, np.where(stays, best.x, found.x), best.x, free)
     return best if clean is None else replace(found, x=clean)
-
-
-def _nearer(
-    starter: Starter, t: float, best: Solution, guess: Floats, free: Mask
-) -> tuple[Solution | None, float]:
-    """One step of it, and how far it went in units of magnitudes; None where there is none."""
-    x = best.x
-    follows = starter.following(t, x) | starter.idle
-    follows[starter.carried()] = True
-    if not (x != guess)[free & ~follows].any():
-        return None, 0.0
-    curved = np.zeros(x.size, dtype=bool)
-    bent = _bent(starter, t, x) & starter.groups("phi")
-    curved[starter.columns[bent[starter.rows]]] = True
-    free = free & ~(curved & starter.moves(("q",)))
-    state = free & ~follows
-    if not (x != guess)[state].any():
-        return None, 0.0
-    problem = problem_of(starter, t, x, guess, rows=starter.every, free=free)
-    # rows of what is small beside the largest of its kind hold to the round-off that full matrices make of that
-    largest = starter.largest_alike(np.maximum(problem.scale, np.abs(x)))
-    scale = np.maximum(problem.scale, FLOOR * largest)
-    weight = np.where(state, starter.by_content(t, x, scale), WEIGHT["following"] * scale / largest)
-    problem = replace(problem, scale=scale, weight=weight)
-    levels = state & starter.written, state & ~starter.written
-    aim = in_order(problem, x, levels)
-    size = np.maximum(problem.scale, starter.scale(t, guess))
-
-    def change(z: Floats) -> list[float]:
-        moved = (z - guess) * problem.weight / problem.scale
-        return [float(np.linalg.norm(moved[level])) for level in levels]
-
-    said, unsaid = change(x)
-    for stays in (BACK * np.maximum(size, largest), NOISE * size):
-        near = np.where(np.abs(aim - guess) > stays, aim, guess)
-        found = solve(problem.within(free & ~state), np.where(state, near, x))
-        clean = _without_noise(starter, t, found.x, guess, free) if found.residual < EXACT else None
-        now = (np.inf, np.inf) if clean is None else change(clean)
-        less = now[0] < (1.0 - NOISE) * said or (now[0] <= (1.0 + BACK) * said and now[1] <= EVEN * unsaid)
-        if clean is not None and less:
-            return replace(found, x=clean), float((np.abs(clean - x)[state] / size[state]).max(initial=0.0))
-    return None, 0.0
 
 
 def _without_noise(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats | None:
@@ -287,12 +199,13 @@ def _without_noise(starter: Starter, t: float, x: Floats, guess: Floats, free: M
 
 
 Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool]]
-"""From t, a staged point x, the guess and the free unknowns: the best solution, and whether all rows hold."""
+"""From t, a point x to begin at, the guess and the free unknowns: the best solution, and whether all rows hold."""
 
 
 def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """The state stays as staged, what follows from it by Newton's method."""
-    return _rescaled(starter, t, x, guess, free & starter.following(t, x))
+    """What follows from the state alone, by Newton's method; where that is not enough everything, the least first."""
+    found, holds = _rescaled(starter, t, x, guess, free & starter.following(t, x), least=False)
+    return (found, holds) if holds else _rescaled(starter, t, x, guess, free)
 
 
 def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -336,7 +249,6 @@ def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, fre
 
 STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("newton", _newton),
-    ("all_unknowns", _rescaled),
     ("rows_as_written", _walked),
     ("perturbed_guess", _perturbed),
     ("largest_scales", _in_largest_scales),
@@ -345,18 +257,15 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
-    """The first strategy that holds from the staged state, and its name; the least residual and "" where none does."""
-    starter.plain = True
-    x = _stages(starter, t, guess.copy(), guess, free)
-    x = _beside_gammas(starter, t, x, guess, free)
+    """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
+    x = _beside_gammas(starter, t, guess.copy(), guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
-        starter.plain = name == "newton"
         found, holds = strategy(starter, t, x, guess, free)
-        if holds:
-            return found, name
-        # what follows alone is no point to explain a failure at
-        best = found if name == "all_unknowns" or found.residual < best.residual else best
+        again, sure = _anew(starter, t, found, x, guess, free)
+        if holds or sure:
+            return again, name
+        best = found if found.residual < best.residual else best
     return best, ""
 
 
@@ -473,7 +382,7 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     if not strategy:
         raise _explain(starter, t0, guess, free, best)
     starter.work = Work(EXPLAINED, until)
-    best = _closed(starter, t0, _steadied(starter, t0, best, guess, free), free)
+    best = _closed(starter, t0, best, free)
     y, yd = starter.expand(best.x)
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     if best.x.size > LARGE:

@@ -20,8 +20,8 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import Floats, Initial, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.model.inertia import inertia, own_unknown
-from sysdyn.runtime.model.scales import group_maximum, largest_of_group
+from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
+from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
 from sysdyn.runtime.numerics.rank import count, decomposed
@@ -31,8 +31,10 @@ from sysdyn.values import dataclass
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
 STATE = ("q", "f", "p", "s")
-WEIGHT = {"written": 1.0, "unwritten": 1e-3, "following": 1e-6}
+WEIGHT = {"unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
+FLOOR = 1e-5
+"""Of the largest alike: below it rows hold to EXACT of that, ten times the round-off that full matrices make of it."""
 EQUATIONS = "equations of the start"
 
 
@@ -113,7 +115,6 @@ class Starter:
         self.system = system
         self.here, self.known = (0.0, b""), dict[str, NDArray[Any]]()
         self.work = Work()  # of one search for a start
-        self.plain = True  # small problems are searched in the core, which has one way of least change
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         self.given = _given(system)
@@ -157,13 +158,8 @@ class Starter:
         return self._own_balance.core
 
     @functools.cached_property
-    def weight(self) -> Floats:
-        """Of what does not follow from the state [unknowns]."""
-        return np.where(self.written, WEIGHT["written"], WEIGHT["unwritten"])
-
-    @functools.cached_property
     def idle(self) -> Mask:
-        """Displacements that stand in constraints alone and move without inertia: they hold nothing."""
+        """Displacements that stand in constraints alone and move without inertia: they hold nothing [unknowns]."""
         form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
         inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
         inertial[self._flow] = True
@@ -237,12 +233,6 @@ class Starter:
         """Unknowns of these kinds [unknowns]; read-only."""
         return self.equations.moves(kinds)
 
-    def between(self, kinds: Sequence[str]) -> Mask:
-        """Rows that hold between unknowns of these kinds alone: initial conditions; balances between positions."""
-        mask = self.groups("initial", *(["dynamics"] if kinds == ("q",) else [])) & self.every
-        mask[self.rows[self._structural & ~self.moves(kinds)[self.columns]]] = False
-        return mask
-
     def _floating(self, unsettled: Places) -> _Sums | None:
         """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
 
@@ -277,26 +267,6 @@ class Starter:
         owners = {self.system.description.rows[family].owner for _, family, _ in self.system.form.groups}
         return all(f.owner in owners for f in self.system.description.families if f.kind == "f")
 
-    def by_content(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """Weights of guesses: contents of one unit are measured alike, flows by their momenta; in Kane's form, whose
-        balances are shared, by magnitudes.
-        """
-        if not self.balanced:
-            return self.weights(t, x, scale)
-        families, rows = self.system.description.families, self.system.description.rows
-        effort = {rows[k].owner: rows[k].unit for group, k, _ in self.system.form.groups if group == "dynamics"}
-        units = [effort.get(f.owner, "") if f.kind in ("f", "p") else f.unit for f in families]
-        own_units = np.array(units)[self.system.family_of[: self.n]]
-        names = np.concatenate([own_units, np.full(self.rates.size, ""), self.equations.units])
-        held = np.zeros(x.size)
-        matrix = inertia(self.system, *self.system.jacobian(t, *self.expand(x)))
-        held[np.flatnonzero(self.system.are("f"))] = np.abs(np.diag(matrix))
-        content = np.where(held > 0.0, held, 1.0)
-        _, unit = np.unique(names, return_inverse=True)
-        largest = np.zeros(int(unit.max()) + 1)
-        np.maximum.at(largest, unit, content * scale)
-        return np.asarray(self.weight * content * scale / largest[unit])
-
     @remembered
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
@@ -314,6 +284,7 @@ class Starter:
             carries[moved[inert[moved]]] = True
         carries &= ~self.measured
         carries |= self.given.written & state
+        carries[np.where(self.given.written[self._flow], self._momentum, self._flow)] = False
         found = np.ones(x.size, dtype=bool)
         found[: self.n] = ~carries
         found[self.first :] = False
@@ -321,15 +292,31 @@ class Starter:
 
     def weights(self, t: float, x: Floats, scale: Floats) -> Floats:
         """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
-        values.
+        values; those that hold what stores do by their contents, flows by their momenta.
         """
-        weight = np.where(self.following(t, x), WEIGHT["following"], self.weight)
-        weight[: self.n] *= scale[: self.n] / group_maximum(self.system, scale[: self.n])
-        return weight
+        weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
+        content = scale.copy()
+        if self.balanced:
+            inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))[: self.n]
+            content[: self.n] *= np.where(inert != 0.0, np.abs(inert), 1.0)
+        measured = content / largest_of_group(self.measures, content)
+        measured[self.n : self.first] = 1.0  # rates have magnitudes of their own each
+        return np.asarray(weight * measured)
 
-    def carried(self) -> Ints:
-        """Of flows with momenta: the momentum where the flow is written, else the flow."""
-        return np.where(self.given.written[self._flow], self._momentum, self._flow)
+    @functools.cached_property
+    def measures(self) -> Ints:
+        """Number of the measure of each unknown: contents of one unit have one, whatever gives them; momenta one with
+        the flows that make them.
+        """
+        rows, families = self.system.description.rows, self.system.description.families
+        groups = self.system.form.groups if self.balanced else ()
+        effort = {rows[k].owner: rows[k].unit for group, k, _ in groups if group == "dynamics"}
+        kinds = {"q": "", "s": "", "f": "p"}
+        named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
+        number: dict[str, int] = {}
+        of, missed = ([number.setdefault(s, len(number)) for s in names] for names in (named, self.equations.units))
+        of_y = np.array([*of, 0])[self.system.family_of[: self.n]]
+        return np.concatenate([of_y, np.full(self.rates.size, len(number)), missed]).astype(np.int32)
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
@@ -373,10 +360,20 @@ class Starter:
         return np.where(found > 1e-280, found, 1.0)
 
 
-def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Problem:
-    """The equations `rows` in the unknowns `free`, the others as in x; magnitudes and weights are those of x."""
+def problem_of(
+    starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask, least: bool = False
+) -> Problem:
+    """The equations `rows` in the unknowns `free`, the others as in x; magnitudes and weights are those of x.
+
+    least: the state moves least in the order of what is said of it, however much what follows has to; else by weights.
+    """
     scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
-    weight = starter.weights(t, x, scale)
+    levels: tuple[Mask, ...] = ()
+    if least:
+        state = free & ~starter.following(t, x)
+        unsaid = state & ~starter.written
+        levels = state & starter.written, unsaid & ~starter.idle, unsaid & starter.idle
+        scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),
@@ -387,9 +384,10 @@ def problem_of(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Ma
         free=free,
         guess=guess,
         scale=scale,
-        weight=weight,
+        weight=starter.weights(t, x, scale),
+        levels=levels,
         work=starter.work,
-        core=(starter.core, t) if starter.plain and not starter.summed else None,
+        core=None if starter.summed else (starter.core, t),
         check=starter.settled.failure.check,
     )
 

@@ -183,8 +183,8 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     for move in moves:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * np.append(move, np.zeros(x.size - move.size))
-            taken = {"rows": starter.groups("phi"), "free": starter.moves(("q",))}
-            problem = problem_of(starter, state.t, shaken, shaken, **taken)
+            rows, free = starter.groups("phi"), starter.moves(("q",))
+            problem = problem_of(starter, state.t, shaken, shaken, rows=rows, free=free)
             there = solve(problem, shaken)
             near = np.abs(there.x - x)[: size.size] <= NEAR * amplitude * size
             if there.residual < EXACT and near.all():

@@ -15,6 +15,7 @@ from sysdyn.runtime.numerics.least_change import (
     least_norm,
     least_residual,
     solve,
+    stepped,
 )
 
 
@@ -89,11 +90,32 @@ def test_weights_and_scales_say_who_moves():
 
 def test_light_unknowns_cost_nothing():
     """x + z = 1, y - z = 2: with z light, x and y share what x + y = 3 asks."""
-    made = problem(
-        lambda x: np.array([x[0] + x[2] - 1.0, x[1] - x[2] - 2.0]),
-        lambda x: [[1.0, 0.0, 1.0], [0.0, 1.0, -1.0]], [0.0, 0.0, 0.0],
-    )
-    assert in_order(made, np.zeros(3), (np.array([True, True, False]),)) == pytest.approx([1.5, 1.5, 0.0], rel=1e-12)
+    a = np.array([[1.0, 0.0, 1.0], [0.0, 1.0, -1.0]])
+    found = in_order(a.shape, entries(a), np.array([1.0, 2.0]), (np.array([True, True, False]),))
+    assert found == pytest.approx([1.5, 1.5, -0.5], rel=1e-12)
+
+
+def test_levels_move_in_their_order():
+    """x + y + z + w = 3, w = 2 + v: v and w alone meet both; where w is fixed by w = 1, z moves and x, y do not."""
+    a = np.array([[1.0, 1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0, -1.0], [0.0, 0.0, 0.0, 1.0, 0.0]])
+    levels = np.array([[1, 1, 0, 0, 0], [0, 0, 1, 0, 0]], bool)
+    free = in_order((2, 5), entries(a[:2]), np.array([3.0, 2.0]), levels)
+    assert free == pytest.approx([0.0, 0.0, 0.0, 3.0, 1.0], abs=1e-12)
+    bound = in_order((3, 5), entries(a), np.array([3.0, 2.0, 1.0]), levels)
+    assert bound == pytest.approx([0.0, 0.0, 2.0, 1.0, -1.0], abs=1e-12)
+
+
+def test_curved_rows_move_the_last_level_first():
+    """x^2 + y^2 = 25 from (3, 1): y goes to 4 while x stays; of one level both move along the radius."""
+    def made(*levels):
+        rows = problem(lambda x: np.array([x @ x - 25.0]), lambda x: [2.0 * x], [3.0, 1.0])
+        return replace(rows, levels=tuple(np.array(level) for level in levels))
+
+    assert solve(made([True, False]), np.array([3.0, 1.0])).x == pytest.approx([3.0, 4.0], rel=1e-12)
+    one = made([True, True])
+    both = solve(one, one.guess).x
+    assert both == pytest.approx(5.0 * np.array([3.0, 1.0]) / np.sqrt(10.0), rel=1e-7)
+    assert stepped(replace(one, guess=both), both) == pytest.approx(both, rel=1e-12)
 
 
 def test_rows_that_contradict_leave_the_least_residual():

@@ -5,9 +5,10 @@
 
 #define SWEEPS 8
 #define SMALL 1e-3      /* of the largest coefficient of its row and kind: it proposes much, and is asked last */
+#define DUST 1e-11      /* the same: what is left of a zero, and is never asked */
 #define NOTHING 1e-280  /* less is no magnitude */
 
-/* small [entries] := 1 where a coefficient is small beside the largest of its row and kind; line [rows]: room.  Entries of
+/* small [entries] := 1 where a coefficient is small beside the largest of its row and kind, 2 where it is none; line [rows]: room.  Entries of
  * a kind lie beside each other, for unknowns do. */
 static int find_small(const sd_balance *m, const double *size, char *small, double *line)
 {
@@ -41,7 +42,7 @@ static int find_small(const sd_balance *m, const double *size, char *small, doub
                     else if (pass == 1)
                         *leading = size[e] > *leading ? size[e] : *leading;
                     else
-                        small[e] = size[e] < SMALL * *leading;
+                        small[e] = size[e] < DUST * *leading ? 2 : size[e] < SMALL * *leading;
                 }
             }
     free(run);
@@ -107,7 +108,7 @@ int sd_propagate_beside(const sd_balance *m, const double *size, const char *sma
             int32_t c = m->column[e];
             if (!(size[e] > 0.0) || found[c] != 0.0 || !(line[m->row[e]] > 0.0) || (silent && silent[m->row[e]]))
                 continue;
-            if (leads && small[e])
+            if (small[e] == 2 || (leads && small[e]))
                 continue;
             double proposed = line[m->row[e]] / size[e];
             best[c] = flags & SD_LARGEST ? sd_larger(best[c], proposed) : sd_smaller(best[c], proposed);

@@ -37,7 +37,8 @@ enum { SD_LARGEST = 1, SD_CAPPED = 2 };
 int sd_propagate(const sd_balance *balance, const double *size, const double *excited, const int32_t *silent,
                  int32_t flags, double *found);
 
-/* small [entries]: 1 where a coefficient is small beside the largest of its row and kind; freed by the caller, NULL: no
+/* small [entries]: 1 where a coefficient is small beside the largest of its row and kind, 2 where that is what is left of a
+ * zero, which proposes nothing; freed by the caller, NULL: no
  * memory.  Several propagations with one `size` have it together. */
 char *sd_small(const sd_balance *balance, const double *size);
 int sd_propagate_beside(const sd_balance *balance, const double *size, const char *small, const double *excited,
