@@ -15,7 +15,7 @@ from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.verdict import About, Tolerance
-from sysdyn.runtime.integrate.accuracy import SHARE, TIMING
+from sysdyn.runtime.integrate.pairs import SHARE, TIMING
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.trace.trace import Trace
 

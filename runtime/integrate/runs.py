@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.kinks import LIVE
-from sysdyn.runtime.integrate import accuracy
-from sysdyn.runtime.integrate.accuracy import Sampled
+from sysdyn.runtime.integrate import accuracy, pairs
 from sysdyn.runtime.integrate.common_instants import Thinned, beside, common, joined, known
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.origin import Origin
+from sysdyn.runtime.integrate.pairs import Sampled
 from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.round_off import LeftOpen, left_open
 from sysdyn.runtime.model import core_library as lib
@@ -424,7 +424,7 @@ class Runs:
         self.compared_at = instants if instants is not None else self.common
         values = there[0] if there is not None and instants is None else self._sampled(rows, finished)
         sizes = np.append(self.sizes(finished.largest, finished.magnitude), [*map(self._turned_over, self.meters)])
-        noise = accuracy.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
+        noise = pairs.ROUND_OFF * self.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(self.meters)))
         jumps = np.unique([e.time for e in finished.events]) if finished.events else np.zeros(0)
         last, self.jumps = self.jumps, jumps
@@ -465,9 +465,9 @@ class Runs:
         """
         places, options = lib.ROW_HEAD + self.places, self.options
         asked = min((a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None), default=0.0)
-        tau = min(accuracy.TIMING, accuracy.SHARE * asked) * (options.t_end - options.t_start)
+        tau = min(pairs.TIMING, pairs.SHARE * asked) * (options.t_end - options.t_start)
         rates = rows[:, places + len(self.names)]
-        late = accuracy.lateness(rows[:, 0], rows[:, places], rates, tau) if steps else tau * np.abs(rates)
+        late = pairs.lateness(rows[:, 0], rows[:, places], rates, tau) if steps else tau * np.abs(rates)
         return np.hstack([late, np.zeros((len(rows), len(self.meters)))]) if self.meters else late
 
     @property
@@ -503,9 +503,9 @@ class Runs:
         assert self.compared_at is not None
         size = (one if one.tolerance < two.tolerance else two).largest
         with np.errstate(all="ignore"):
-            ratio = accuracy.apart(one, two) / (size * target)
+            ratio = pairs.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
-        ratio = np.where((one.own[0] == two.values) | accuracy.zero(one, two, target), 0.0, ratio)
+        ratio = np.where((one.own[0] == two.values) | pairs.zero(one, two, target), 0.0, ratio)
         ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)

@@ -10,7 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from sysdyn.runtime.integrate.accuracy import Achieved, difference
+from sysdyn.runtime.integrate.accuracy import Achieved
+from sysdyn.runtime.integrate.pairs import difference
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.integrate.runs import Runs, Way
 from sysdyn.runtime.model.description import Floats

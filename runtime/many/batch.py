@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.integrate import accuracy
+from sysdyn.runtime.integrate import pairs
 from sysdyn.runtime.integrate.accuracy import STRETCH, Achieved, Law
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
@@ -397,7 +397,7 @@ class Batch:
         many.unit, many.unit_of = self._kept(np.array(own, dtype=np.int32)), self._kept(of)
         many.units, many.known = len(units), int(runs.common is not None)
         asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
-        many.late = min(accuracy.TIMING, accuracy.SHARE * asked) * span
+        many.late = min(pairs.TIMING, pairs.SHARE * asked) * span
         many.power, many.credit, many.finest, many.far = law.power, law.credit, law.finest, law.far
         many.tolerance[0], many.tolerance[1] = draft, fine
         many.max_steps = min(options.max_steps or 2**62, 2**62)
@@ -479,7 +479,7 @@ class Batch:
         runs.done = finished, [], writer
         estimate = float(found.estimate[0])
         judgement = judge(self.options, runs.method, finished.balances, True, ())
-        close(runs, Achieved(estimate, estimate < accuracy.ROUND_OFF, True, 0, 0.0), judgement)
+        close(runs, Achieved(estimate, estimate < pairs.ROUND_OFF, True, 0, 0.0), judgement)
         return runs.held
 
 

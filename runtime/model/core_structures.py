@@ -231,6 +231,8 @@ class Bdf(c.Structure):
             )
         ],
         ("h_weighed", _D),
+        ("powered", _P),
+        ("powers", _I),
         ("error_next", _D),
         ("steps", _L),
         ("rejected_steps", _L),

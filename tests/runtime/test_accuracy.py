@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.integrate.accuracy import LAWS, ROUND_OFF, STEEP, Lighter, Sampled, control
+from sysdyn.runtime.integrate.accuracy import LAWS, STEEP, Lighter, control
+from sysdyn.runtime.integrate.pairs import ROUND_OFF, Sampled
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
 

@@ -327,6 +327,7 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
     if (!e->ready)
         return 0;
     sd_number *magnitudes = e->cell + magnitude(e, 0);
+#pragma GCC unroll 4
     for (int32_t k = 0; k < e->n; k++)
         magnitudes[k] = scale ? scale[e->pivot_column[k]] : 1.0;
     if (e->code)

@@ -117,10 +117,13 @@ static int choose_pivot(const sd_full *full, int32_t *row, int32_t *column)
     for (int32_t j = 0; j < full->open; j++) {
         int32_t c = full->column[j], others = full->column_left[c] - 1;
         const char *entry = full->entry + (size_t)c * (size_t)full->n;
-        for (int32_t i = 0; i < full->open && (int64_t)(fewest - 1) * others <= least; i++) {
+        if ((int64_t)(fewest - 1) * others > least)
+            continue;
+        for (int32_t i = 0, seen = 0; seen <= others; i++) {
             int32_t r = full->row[i];
             if (!entry[r])
                 continue;
+            seen++;
             int64_t fill = (int64_t)(full->row_left[r] - 1) * others;
             if (fill > least)
                 continue;

@@ -40,8 +40,9 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t m = (size_t)sd_whole_lanes(system->unknowns), nnz = (size_t)sd_whole_lanes(system->entries);
     bdf->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + 3 * nnz + 1, sizeof(double));
-    if (!bdf->memory) {
-        free(bdf);
+    bdf->powered = calloc(m + 1, sizeof *bdf->powered);
+    if (!bdf->memory || !bdf->powered) {
+        sd_bdf_free(bdf);
         return NULL;
     }
     double *next = bdf->memory;
@@ -75,6 +76,7 @@ void sd_bdf_free(sd_bdf *bdf)
     if (!bdf)
         return;
     free(bdf->memory);
+    free(bdf->powered);
     free(bdf);
 }
 
@@ -82,8 +84,9 @@ void sd_bdf_free(sd_bdf *bdf)
 static void set_scales(sd_bdf *bdf)
 {
     const double power[3] = {1.0, 1.0 / bdf->h, 1.0 / (bdf->h * bdf->h)};
-    for (int32_t i = 0; i < bdf->n; i++)
-        bdf->scale[i] = bdf->magnitude[i] * power[bdf->power[i]];
+    memcpy(bdf->scale, bdf->magnitude, (size_t)bdf->n * sizeof *bdf->scale);
+    for (int32_t k = 0; k < bdf->powers; k++)
+        bdf->scale[bdf->powered[k]] *= power[bdf->power[bdf->powered[k]]];
 }
 
 void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h)
@@ -98,7 +101,7 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
     memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
     memset(bdf->ee, 0, (size_t)bdf->n * sizeof *yd);
     bdf->h = 1.0;
-    bdf->h_weighed = 0.0;
+    sd_bdf_begin_powers(bdf);
     sd_bdf_weights(bdf);
     sd_bdf_step_weights(bdf);
     bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, bdf->t_end - t);

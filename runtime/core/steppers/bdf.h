@@ -39,6 +39,7 @@ typedef struct sd_bdf {
     double *y, *yd, *ee, *weight, *newton_weight, *test_weight, *delta, *moved, *moved_d, *scale;
     double *terms, *rate, *jy, *jyd, *g, *memory;
     double *newton_power, *test_power, h_weighed; /* powers of h by which unknowns count, and of which h */
+    int32_t *powered, powers; /* [powers] unknowns that do not count alike at every h */
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations;
@@ -63,6 +64,7 @@ void sd_bdf_coefficients(sd_bdf *bdf, double *ck);
 void sd_bdf_restore(sd_bdf *bdf);
 /* bdf_passes.c */
 void sd_bdf_weights(sd_bdf *bdf);
+void sd_bdf_begin_powers(sd_bdf *bdf);
 void sd_bdf_step_weights(sd_bdf *bdf);
 void sd_bdf_predict(sd_bdf *bdf);
 void sd_bdf_matrix(sd_bdf *bdf);

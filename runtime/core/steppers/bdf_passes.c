@@ -3,6 +3,7 @@
 #include "linear/lanes.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 /* a pass for each order: the differences of an order that is known stay in registers */
@@ -24,7 +25,7 @@ static inline __attribute__((always_inline)) void predict(sd_bdf *bdf, const int
         phi[k] = bdf->phi[k];
         gamma[k] = bdf->gamma[k];
     }
-    for (int32_t i = 0; i < n; i += SD_LANES) {
+    for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes y = SD_FROM(phi[0], i), yd = {0.0};
         for (int32_t k = 1; k <= order; k++) {
             sd_lanes difference = SD_FROM(phi[k], i);
@@ -50,7 +51,7 @@ SD_WIDE double sd_bdf_move(sd_bdf *bdf)
     const double cj = bdf->cj, *const delta = bdf->delta, *const weight = bdf->newton_weight;
     double *const y = bdf->y, *const yd = bdf->yd, *const ee = bdf->ee;
     sd_lanes sum = {0.0};
-    for (int32_t i = 0; i < n; i += SD_LANES) {
+    for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes d = SD_FROM(delta, i), v = d * SD_FROM(weight, i);
         sum += v * v;
         SD_AT(ee, i) -= d;
@@ -66,7 +67,7 @@ SD_WIDE void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const doub
     const int32_t n = bdf->n;
     for (int32_t k = first; k <= last; k++) {
         double *const phi = bdf->phi[k], by = beta[k];
-        for (int32_t i = 0; i < n; i += SD_LANES)
+        for (ptrdiff_t i = 0; i < n; i += SD_LANES)
             SD_AT(phi, i) *= by;
     }
 }
@@ -77,7 +78,7 @@ static inline __attribute__((always_inline)) void shift(sd_bdf *bdf, const int32
     double *phi[SD_MAX_ORDER + 2], *const ee = bdf->ee;
     for (int32_t k = 0; k <= order + 1; k++)
         phi[k] = bdf->phi[k];
-    for (int32_t i = 0; i < n; i += SD_LANES) {
+    for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes above = SD_FROM(ee, i);
         if (order < SD_MAX_ORDER)
             SD_AT(phi[order + 1], i) = above;
@@ -99,7 +100,7 @@ SD_WIDE void sd_bdf_orders(const sd_bdf *bdf, double *norm)
     const int32_t n = bdf->n, k = bdf->order;
     const double *const ee = bdf->ee, *const one = bdf->phi[k], *const two = bdf->phi[k - 1], *const weight = bdf->test_weight;
     sd_lanes sum[3] = {{0.0}, {0.0}, {0.0}};
-    for (int32_t i = 0; i < n; i += SD_LANES) {
+    for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes w = SD_FROM(weight, i), a = SD_FROM(ee, i), b = a + SD_FROM(one, i), c = b + SD_FROM(two, i);
         sum[0] += a * w * (a * w);
         sum[1] += b * w * (b * w);
@@ -115,7 +116,7 @@ SD_WIDE double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *min
     const int32_t n = bdf->n;
     const double *const weight = bdf->test_weight;
     sd_lanes sum = {0.0};
-    for (int32_t i = 0; i < n; i += SD_LANES) {
+    for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes v = (SD_FROM(x, i) - SD_FROM(minus, i)) * SD_FROM(weight, i);
         sum += v * v;
     }
@@ -126,11 +127,25 @@ SD_WIDE double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *min
 static void set_powers(sd_bdf *bdf)
 {
     const double power[3] = {1.0, bdf->h, bdf->h * bdf->h}, test[3] = {0.0, 1.0, bdf->h};
-    for (int32_t i = 0; i < bdf->n; i++) {
+    const int32_t *const powered = bdf->powered, powers = bdf->powers;
+    for (int32_t k = 0; k < powers; k++) {
+        int32_t i = powered[k];
         bdf->newton_power[i] = power[bdf->power[i]];
         bdf->test_power[i] = test[bdf->test[i] + 1];
     }
     bdf->h_weighed = bdf->h;
+}
+
+/* powers at the h of the moment, and which unknowns have others at another */
+void sd_bdf_begin_powers(sd_bdf *bdf)
+{
+    for (bdf->powers = 0; bdf->powers < bdf->n; bdf->powers++)
+        bdf->powered[bdf->powers] = bdf->powers;
+    set_powers(bdf);
+    bdf->powers = 0;
+    for (int32_t i = 0; i < bdf->n; i++)
+        if (bdf->power[i] > 0 || bdf->test[i] > 0)
+            bdf->powered[bdf->powers++] = i;
 }
 
 /* newton_weight, test_weight := weight times the powers of this step */
@@ -141,9 +156,10 @@ SD_WIDE void sd_bdf_step_weights(sd_bdf *bdf)
     const int32_t n = bdf->n;
     const double *const weight = bdf->weight, *const newton_power = bdf->newton_power, *const test_power = bdf->test_power;
     double *const newton_weight = bdf->newton_weight, *const test_weight = bdf->test_weight;
-    for (int32_t i = 0; i < n; i += SD_LANES) {
-        SD_AT(newton_weight, i) = SD_FROM(weight, i) * SD_FROM(newton_power, i);
-        SD_AT(test_weight, i) = SD_FROM(weight, i) * SD_FROM(test_power, i);
+    for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
+        sd_lanes w = SD_FROM(weight, i);
+        SD_AT(newton_weight, i) = w * SD_FROM(newton_power, i);
+        SD_AT(test_weight, i) = w * SD_FROM(test_power, i);
     }
 }
 
@@ -151,8 +167,9 @@ SD_WIDE void sd_bdf_step_weights(sd_bdf *bdf)
 SD_WIDE void sd_bdf_weights(sd_bdf *bdf)
 {
     const int32_t n = bdf->n;
-    const double rtol = bdf->rtol, *restrict const y = bdf->phi[0];
-    double *restrict const met = bdf->met, *restrict const magnitude = bdf->magnitude, *restrict const weight = bdf->weight;
+    const double rtol = bdf->rtol, *const y = bdf->phi[0];
+    double *const met = bdf->met, *const magnitude = bdf->magnitude, *const weight = bdf->weight;
+#pragma GCC ivdep
     for (int32_t i = 0; i < n; i++) {
         double size = fabs(y[i]);
         met[i] = size > met[i] ? size : met[i];
@@ -170,6 +187,7 @@ SD_WIDE void sd_bdf_matrix(sd_bdf *bdf)
     const int32_t entries = bdf->system->entries;
     const double cj = bdf->cj, *const jy = bdf->jy, *const jyd = bdf->jyd;
     double *const g = bdf->g;
-    for (int32_t e = 0; e < entries; e += SD_LANES)
+#pragma GCC unroll 4
+    for (ptrdiff_t e = 0; e < entries; e += SD_LANES)
         SD_AT(g, e) = SD_FROM(jy, e) + cj * SD_FROM(jyd, e);
 }

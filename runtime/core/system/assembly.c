@@ -4,6 +4,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #define FAINT 1e-9 /* of the magnitude of an unknown that happens to be zero */
@@ -19,10 +20,13 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
         return;
     }
     memset(r, 0, (size_t)system->rows * sizeof *r);
-    for (int32_t i = 0; i < system->kinematics; i++)
-        r[system->k_row[i]] = system->k_scale[i] * (yd[system->k_q[i]] - y[system->k_f[i]]);
-    for (int32_t c = 0; c < system->calls; c++)
-        system->call[c].rows(&system->call[c].frame, t, y, yd, r);
+    const int32_t *const row = system->k_row, *const q = system->k_q, *const f = system->k_f, kinematics = system->kinematics;
+    const double *const scale = system->k_scale;
+#pragma GCC unroll 4
+    for (int32_t i = 0; i < kinematics; i++)
+        r[row[i]] = scale[i] * (yd[q[i]] - y[f[i]]);
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++)
+        call->rows(&call->frame, t, y, yd, r);
     for (int32_t i = 0; i < system->held; i++)
         r[system->held_row[i]] = (system->held_rate[i] ? yd : y)[system->held_unknown[i]];
 }
@@ -128,7 +132,7 @@ SD_WIDE int32_t sd_first_bad(int32_t n, const double *x)
 {
     sd_lanes sums = {0.0}; /* x - x is 0 for a finite number and not a number otherwise */
     int32_t whole = n - n % SD_LANES;
-    for (int32_t i = 0; i < whole; i += SD_LANES) {
+    for (ptrdiff_t i = 0; i < whole; i += SD_LANES) {
         sd_lanes v = SD_FROM(x, i);
         sums += v - v;
     }

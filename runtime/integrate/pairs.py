@@ -1,0 +1,138 @@
+"""Two runs of one simulation beside each other: how far apart they are, at instants they share.
+
+Receives what each run hands over (`Sampled`); returns the difference of every quantity, relative to the finer run's
+sizes, and that beside the accuracy asked.  No difference counts: within the time tolerance, of round-off, and at once
+beside a jump.  What both did unseen between the instants, or where they ran away alike, is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
+
+UNSEEN, ALIKE = 100.0, 0.3
+"""A quantity that was so many times larger than at any instant of comparison did something between them: two runs must
+agree on how large it was within this part."""
+TIMING, SHARE = 1e-9, 1e-3
+"""Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
+LOST = 0.01
+"""Of what it is: where two runs differ by more they hardly share a digit."""
+FALLS, FAINT = 0.3, 100.0
+"""Of a quantity that is zero: of its largest in the run before at most; times what is round-off beside its unit."""
+PARTED, MUCH = 10.0, 0.3
+"""Of all that a quantity was before, times; and of what it is: a difference by more is of runs that parted."""
+LOOSE = 1e-5
+"""Tolerances above, with which two runs may run away alike (Robertson's falls through zero)."""
+BEND = 4.0
+"""Of the slopes between steps beside a row: rates beyond are of what relaxes at once."""
+ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
+"""Relative errors below this are those of the numbers themselves."""
+LARGEST = float(np.finfo(np.float64).max)
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
+    [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
+    is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants]:
+    between an event of this run and the same one of the run before it; late [instants, quantities]: what the dense
+    output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
+    and late at instants of its own, for the run behind it (None: those are the same); strained: Newton failed so often
+    that the tolerance says little of its steps.
+    """
+
+    tolerance: float
+    values: Floats
+    largest: Floats
+    steps: int
+    noise: Floats | float = 0.0
+    left_open: Callable[[], Floats] | None = None
+    between: NDArray[np.bool_] | None = None
+    late: Floats | float = 0.0
+    there: tuple[Floats, Floats | float] | None = None
+    strained: bool = False
+
+    @property
+    def own(self) -> tuple[Floats, Floats | float]:
+        """Values and late at its own instants."""
+        return (self.values, self.late) if self.there is None else self.there
+
+
+def apart(coarse: Sampled, fine: Sampled) -> Floats:
+    """How far two runs' values are from each other [instants, quantities], within the time tolerance."""
+    values, late = coarse.own
+    late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
+    return np.asarray(np.fmax(np.abs(fine.values - values) - late, 0.0 * fine.values * values))
+
+
+def lateness(time: Floats, values: Floats, rates: Floats, tolerance: float) -> Floats:
+    """What values at steps [rows, quantities] move by within a time tolerance (s): as their rates say, but no faster
+    than BEND times what the steps beside them show; a motion that relaxes at once makes of any error a rate without
+    bound.
+    """
+    if len(time) < 2:
+        return tolerance * np.abs(rates)
+    with np.errstate(all="ignore"):
+        slopes = np.abs(np.diff(values, axis=0) / np.diff(time)[:, None])
+    slopes = np.vstack([slopes[:1], np.fmin(slopes[:-1], slopes[1:]), slopes[-1:]])
+    return tolerance * np.fmin(np.abs(rates), BEND * slopes)
+
+
+def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
+    """Quantities [quantities] of which both runs have round-off alone, by symmetry or a balance: it is nobody's error.
+
+    Beside others of their unit they are seen at once, also where they fall with the tolerance: then they are errors of
+    what cancels.  Where two runs miss the target the equations are asked.
+    """
+    before, now = (np.abs(values).max(axis=0) for values in (coarse.own[0], fine.values))
+    seen = np.maximum(before, now)
+    found = (seen <= fine.noise) | ((now <= FALLS * before) & (now <= FAINT * np.asarray(fine.noise)))
+    if fine.left_open is not None:
+        far = apart(coarse, fine).max(axis=0)
+        lost = ~found & (far > target * fine.largest) & (far > LOST * seen)
+        if lost.any():
+            found |= lost & (seen <= fine.left_open())
+    return np.asarray(found)
+
+
+def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
+    """(largest relative difference, the same over the accuracy wanted) of two runs, in the finer one's sizes."""
+    size = fine.largest
+    use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
+    if not use.any() or not fine.values.size:
+        return 0.0, 0.0
+    before = coarse.own[0]
+    if before.shape != fine.values.shape:
+        return np.inf, np.inf
+    use &= ~zero(coarse, fine, target)
+    if not use.any():
+        return 0.0, 0.0
+    there = ... if fine.between is None else ~fine.between
+    seen = np.maximum(np.abs(before), np.abs(fine.values)).max(axis=0)[use]
+    with np.errstate(all="ignore"):
+        unlike = (size[use] > UNSEEN * seen) & (np.abs(size - coarse.largest)[use] > ALIKE * size[use])
+        relative = apart(coarse, fine)[there][:, use].max(axis=0, initial=0.0) / size[use]
+    relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
+    return float(relative.max()), float((relative / target[use]).max())
+
+
+def parted(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
+    """Whether two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it
+    is: then they ran away, and that both end alike, beside what has become of them, says little.  At fine tolerances a
+    front that begins at next to nothing looks alike, and nothing runs away.
+    """
+    before, values = coarse.own[0], fine.values
+    if fine.tolerance <= LOOSE or before.shape != values.shape or len(values) < 2:
+        return False
+    with np.errstate(all="ignore"):
+        most = np.maximum.accumulate(np.abs(values), axis=0)[:-1]
+        now = np.maximum(np.abs(values), np.abs(before))[1:]
+        away = apart(coarse, fine)[1:] > np.maximum(PARTED * most, MUCH * now)
+    if fine.between is not None:
+        away[fine.between[1:]] = False
+    away &= np.abs(values[0]) > fine.noise
+    return bool(away.any()) and bool((away & ~zero(coarse, fine, target)).any())
