@@ -24,7 +24,6 @@ from sysdyn.compiler.network.primal.index_classes import (
     Key,
     Link,
     Option,
-    climbed,
     foremost_way,
 )
 from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, reduction, sub, substitute
@@ -92,14 +91,18 @@ class IndexForest(IndexClasses):
             axis, offset = self.axis(end.item, d)
             moved = own.plus(offset).node
             change[coordinate(axis)] = moved if k is None else add(index(f"#k{k}"), moved)
-        return substitute(add(self._position(cell)[1], more or const(0.0)), change)
+        return substitute(add(self._position(cell), more or const(0.0)), change)
 
-    def _position(self, cell: Cell) -> tuple[Cell, Node]:
-        """The root of its tree, and the position over it in the coordinates of the axes."""
-        return climbed(self._over, cell, const(0.0), add)
+    def _position(self, cell: Cell) -> Node:
+        """The position over the root of its tree, in the coordinates of the axes."""
+        steps = []
+        while cell in self._over:
+            cell, step = self._over[cell]
+            steps.append(step)
+        return add(*steps)
 
     def _root(self, cell: Cell) -> Cell:
-        return self._position(cell)[0]
+        return self.find(cell)[0]
 
     # -- joining ------------------------------------------------------------------------------------------------
 
@@ -134,9 +137,9 @@ class IndexForest(IndexClasses):
             for k, stretch in trees.items()
         )
         if whole and not (moving - one.keys()) & other.keys():
-            self._hang(link, box, ends, 0, one)
+            self._join_trees(link, box, ends, 0, one)
         elif whole and not (moving - other.keys()) & one.keys():
-            self._hang(link, box, ends, 1, other)
+            self._join_trees(link, box, ends, 1, other)
         else:
             self._left.append((link, box))
 
@@ -152,14 +155,14 @@ class IndexForest(IndexClasses):
         opened = {d: (axis, k) for d, axis, k in self.extended(cell)}
         return {end.at[d][0]: stretch for d, stretch in opened.items()}
 
-    def _hang(self, link: Link, box: Box, ends: Ends, n: int, trees: Trees) -> None:
+    def _join_trees(self, link: Link, box: Box, ends: Ends, n: int, trees: Trees) -> None:
         """The tree of one end at that of the other, by the first of links where several join the two."""
         keep = tuple(i if k in trees else Interval(i.first, i.first) for k, i in enumerate(box))
         step = sub(self._contents[link.owner], self._around(link, ends))
         root, above = self._root(ends[n]), self._root(ends[1 - n])
         both = {axis for _, axis, _ in self.extended(ends[1 - n])}
         self._over[root] = above, self._placed(step if n == 0 else neg(step), link, n, keep)
-        self._rerooted(root, above)
+        self._hang(root, above, 1)
         self._collapsed |= {(above, axis, k) for axis, k in trees.values() if axis not in both}
         for rest in without(box, keep):
             self._close(link, rest, ends)
@@ -176,7 +179,7 @@ class IndexForest(IndexClasses):
         body = substitute(step, {coordinate(axis): index(name)})
         first = self.interval(*stretch).first.plus(1).node
         self._over[root] = new, reduction("sum", name, first, coordinate(axis), body)
-        self._rerooted(root, new)
+        self._hang(root, new, 1)
         self._collapsed.add((new, *stretch))
         for rest in without(box, keep):
             self._close(link, rest, ends)

@@ -13,10 +13,8 @@ Received: items, links.  Returned: a IndexClasses; links that this method cannot
 from __future__ import annotations
 
 import itertools
-import operator
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, between, number
 from sysdyn.values import dataclass
@@ -24,7 +22,6 @@ from sysdyn.values import dataclass
 Key = tuple[int, int]  # item, dimension
 Cut = tuple[int, int, Bound]  # item, dimension, first index behind the cut
 Cell = tuple[int, tuple[int, ...]]  # item, interval number on the axis of each dimension
-Weight = TypeVar("Weight")
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,15 +191,20 @@ class IndexClasses:
 
     def find(self, cell: Cell) -> tuple[Cell, int]:
         """The group's representative, and the sense relative to it."""
-        return climbed(self._parent, cell, 1, operator.mul)
+        path = []
+        while cell in self._parent:
+            above, step = self._parent[cell]
+            path.append((cell, step))
+            cell = above
+        sign = 1
+        for below, step in reversed(path):
+            sign *= step
+            self._parent[below] = cell, sign
+        return cell, sign
 
     def collapsed(self, cell: Cell, axis: Key, k: int) -> bool:
         """Whether all elements along an axis' interval are tied together in the cell's group."""
-        return (self._root(cell), axis, k) in self._collapsed
-
-    def _root(self, cell: Cell) -> Cell:
-        """What stands for the cell's group."""
-        return self.find(cell)[0]
+        return (self.find(cell)[0], axis, k) in self._collapsed
 
     def groups(self) -> dict[Cell, list[tuple[Cell, int]]]:
         """Representative -> members with their senses, in the order of the items."""
@@ -218,10 +220,11 @@ class IndexClasses:
         if left != right:
             if (right[0], right[1]) < (left[0], left[1]):
                 left, right = right, left
-            self._parent[right] = left, of_left * of_right * sign
-            self._rerooted(right, left)
+            self._hang(right, left, of_left * of_right * sign)
 
-    def _rerooted(self, old: Cell, new: Cell) -> None:
+    def _hang(self, old: Cell, new: Cell, sign: int) -> None:
+        """A root under another."""
+        self._parent[old] = new, sign
         if self._collapsed:
             self._collapsed = {(new if root == old else root, axis, k) for root, axis, k in self._collapsed}
 
@@ -294,21 +297,6 @@ class IndexClasses:
             axis, offset = self.axis(end.item, d)
             at.append(self._numbers[axis][own.plus(offset).value] if index is None else chosen[index])
         return end.item, tuple(at)
-
-
-def climbed(
-    above: dict[Cell, tuple[Cell, Weight]], cell: Cell, unit: Weight, through: Callable[[Weight, Weight], Weight]
-) -> tuple[Cell, Weight]:
-    """The root of a cell, and its weight relative to it; what was climbed hangs at the root then."""
-    path = []
-    while cell in above:
-        path.append(cell)
-        cell = above[cell][0]
-    weight = unit
-    for below in reversed(path):
-        weight = through(weight, above[below][1])
-        above[below] = cell, weight
-    return cell, weight
 
 
 def _without_points(link: Link) -> Link:
