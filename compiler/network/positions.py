@@ -1,8 +1,9 @@
 """Displacements in the complementary family: quadratures of what is read, and what initial positions say of stores.
 
 A displacement that no potential store holds has no place there; where it is traced, its quadrature q' = f is added.
-The contents of stores between common-flow nodes are differences of positions: along every loop of stores, quadratures
-and fixed positions they add up to zero at the start, which the least change of guesses must meet.
+The contents of stores between common-flow nodes are differences of positions x, c = B x: around every loop of stores,
+quadratures and fixed positions they add up to zero at the start.  A spanning forest of the nodes (`primal/forest.py`)
+tells these loops, and the positions of what stores hold to the ground or apart.
 """
 
 from __future__ import annotations
@@ -11,29 +12,24 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import Box, Sizes, box_size, without
 from sysdyn.compiler.network.primal.contents import held_at
-from sysdyn.compiler.network.primal.overlaps import (
-    Ranges,
-    beside,
-    common,
-    count,
-    initially,
-    meeting,
-    narrowed,
-    ranges_of,
-    untold,
-)
+from sysdyn.compiler.network.primal.forest import IndexForest
+from sysdyn.compiler.network.primal.incidence import counters, indices, loops_over
+from sysdyn.compiler.network.primal.index_classes import Cell, Cut, End, Link
+from sysdyn.compiler.network.primal.overlaps import Ranges, initially, meeting, narrowed, ranges_of, untold
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, State, Terminal
+from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, NodeFamily, State, Terminal
 from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
-from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.dsl.text.diagnostics import ModelError, Place
+from sysdyn.values import dataclass
 
 Wanted = tuple[str, str]
 """Name and kind (nq, bq) of a displacement."""
-_Point = tuple[str, tuple[int | Node, ...]] | None
-"""A node by its name and indices, or the ground."""
+UNWRITTEN = 1e-6
+"""Weight (of squares) of a guess that the text does not write, as the consistent start has it."""
+_GROUND = Terminal(None, ())
 
 
 # -- traced positions --------------------------------------------------------------------------------------
@@ -41,16 +37,11 @@ _Point = tuple[str, tuple[int | Node, ...]] | None
 
 def from_stores(network: Network) -> Network:
     """Traced positions of points that stores hold to the ground, as displacements of these stores."""
-    forest = _SpanningForest()
-    for b in network.branches:
-        single = b.kind == "potential" and b.domain.common == "flow" and not b.loops
-        if single and b.plus is not None and b.minus is not None:
-            plus, minus = (None if t.node is None else (t.node, t.at) for t in (b.plus, b.minus))
-            forest.join(plus, minus, ex.var(b.name, "bq", *b.at))
+    points = _Points(network, [[s for s in _springs(network, frozenset()) if not s.loops]])
 
     def read(root: Node) -> Node:
         read = [n for n in ex.topological([root]) if n.op == "var" and n.data[1:] == ("nq", 0)]
-        change = {n: path for n in read if (path := forest.over_ground((n.data[0], n.args))) is not None}
+        change = {n: path for n in read if (path := points.over_ground(n)) is not None}
         return ex.substitute(root, change) if change else root
 
     return rewritten(network, read, TRACED)
@@ -126,15 +117,14 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
 def massive(network: Network) -> frozenset[str]:
     """Families of common-flow nodes on each of which a mass stands."""
     sizes = Sizes(network)
-    found: dict[str, list[Ranges]] = {}
+    found: dict[str, list[Box]] = {}
     for b in network.branches:
         alone = b.minus is None or b.minus.node is None
         if b.kind == "kinetic" and alone and b.plus is not None and b.plus.node is not None:
-            within = ranges_of(b.loops, sizes, b.place)
-            places = [sizes.affine(a, within, b.place) for a in b.plus.at]
-            found.setdefault(b.plus.node, []).append({f"{k}": a.over(within) for k, a in enumerate(places)})
-    boxes = {n.name: {f"{k}": i for k, i in enumerate(sizes.box(n.shape, n.place))} for n in network.nodes}
-    return frozenset(name for name, holes in found.items() if not list(beside(boxes[name], holes)))
+            reach = sizes.reach(b.plus.at, ranges_of(b.loops, sizes, b.place), b.place)
+            found.setdefault(b.plus.node, []).append(reach)
+    boxes = {n.name: sizes.box(n.shape, n.place) for n in network.nodes}
+    return frozenset(name for name, holes in found.items() if not without(boxes[name], *holes))
 
 
 def _stores(network: Network) -> frozenset[str]:
@@ -151,8 +141,81 @@ def _quadrature(name: str, at: Sequence[Node], order: int = 0) -> Node:
 
 # -- contents ----------------------------------------------------------------------------------------------
 
-UNWRITTEN = 1e-6
-"""Weight (of squares) of a guess that the text does not write, as the consistent start has it."""
+
+@dataclass(frozen=True, slots=True)
+class _Join:
+    """Points of a family joined with others: the position of plus over minus; branch: whose displacement it is."""
+
+    plus: Terminal
+    minus: Terminal
+    content: Node
+    loops: tuple[Loop, ...]
+    place: Place
+    branch: Branch | None = None
+
+
+def _springs(network: Network, wanted: frozenset[Wanted]) -> list[_Join]:
+    """Branches between common-flow nodes whose displacement is an unknown of the start."""
+    found = []
+    for b in network.branches:
+        stores = b.kind == "potential"
+        if b.domain.common == "flow" and b.plus and b.minus and (stores or (b.name, "bq") in wanted):
+            content = ex.var(b.name, "bq", *b.at) if stores else _quadrature(b.name, b.at)
+            found.append(_Join(b.plus, b.minus, content, b.loops, b.place, b))
+    return found
+
+
+class _Points:
+    """The common-flow nodes of a network in a forest, joined in stages; item 0 is the ground.
+
+    What indices do not tell (no i + c) joins nothing.
+    """
+
+    def __init__(self, network: Network, stages: Sequence[Sequence[_Join]], about: Sequence[Initial] = ()) -> None:
+        """Cells are cut where a statement about nodes begins or ends."""
+        self.sizes = Sizes(network)
+        self.nodes = [n for n in network.nodes if n.domain.common == "flow"]
+        self._item = {n.name: k for k, n in enumerate(self.nodes, 1)}
+        self._joins = [j for stage in stages for j in stage]
+        items = [(), *(self.sizes.box(n.shape, n.place) for n in self.nodes)]
+        number = itertools.count()
+        links = [[link for j in stage if (link := self._link(j, next(number)))] for stage in stages]
+        self.forest = IndexForest(items, links, [cut for i in about for cut in self._cuts(i)])
+
+    def _link(self, join: _Join, owner: int) -> tuple[Link, Node] | None:
+        try:
+            within = ranges_of(join.loops, self.sizes, join.place)
+            plus, minus = (self._end(t, within, join.place) for t in (join.plus, join.minus))
+        except (ModelError, KeyError):
+            return None
+        box = tuple(within.values())
+        over = dict(zip(map(ex.index, within), indices(box), strict=True))
+        return (Link(box, plus, minus, owner=owner), ex.substitute(join.content, over)) if box_size(box) else None
+
+    def _end(self, terminal: Terminal, within: Ranges, place: Place | None) -> End:
+        number, item = {name: k for k, name in enumerate(within)}, self._item[terminal.node] if terminal.node else 0
+        at = (self.sizes.affine(a, within, place) for a in terminal.at)
+        return End(item, tuple((None if a.loop is None else number[a.loop], a.offset) for a in at))
+
+    def _cuts(self, initial: Initial) -> Iterator[Cut]:
+        within = ranges_of(initial.loops, self.sizes, initial.place)
+        for d, i in enumerate(self.sizes.reach(initial.target.args, within, initial.place)):
+            yield from ((self._item[initial.target.data[0]], d, cut) for cut in (i.first, i.last.plus(1)))
+
+    def over_ground(self, node: Node) -> Node | None:
+        """The position of a single point; None where nothing joins it to the ground."""
+        try:
+            return self.forest.between(self._end(Terminal(node.data[0], node.args), {}, None), End(0, ()))
+        except (ModelError, KeyError):
+            return None
+
+    def loops(self) -> Iterator[tuple[_Join, tuple[Loop, ...], Node]]:
+        """Who closes loops, where, and the position of plus over minus that others tell."""
+        for owner, box, around in self.forest.loops:
+            join = self._joins[owner]
+            names = [loop.index for loop in join.loops]
+            back = dict(zip(indices(box), map(ex.index, names), strict=True))
+            yield join, narrowed(join.loops, dict(zip(names, box, strict=True))), ex.substitute(around, back)
 
 
 def with_contents(network: Network, wanted: frozenset[Wanted]) -> Network:
@@ -160,153 +223,101 @@ def with_contents(network: Network, wanted: frozenset[Wanted]) -> Network:
     found = _Contents(network, wanted)
     stores = _stores(network)
     kept = tuple(i for i in network.initials if not _is_position(i.target, stores))
-    return replace(network, initials=(*found.guesses(), *kept, *found.fixed(), *found.loops()))
+    return replace(network, initials=(*found.guesses(), *kept, *found.loops()))
 
 
 class _Contents:
     """What the initial positions of one network say."""
 
     def __init__(self, network: Network, wanted: frozenset[Wanted]) -> None:
-        self.sizes = Sizes(network)
-        self.wanted = wanted
+        self.network, self.wanted, self.sizes = network, wanted, Sizes(network)
         self.said: dict[Wanted, list[Initial]] = {}
         for initial in network.initials:
             if initial.target.op == "var" and not initial.target.data[2]:
                 kind = "bq" if initial.target.data[1] == "be" else initial.target.data[1]
                 self.said.setdefault((initial.target.data[0], kind), []).append(initial)
-        branches = [(b, b.plus, b.minus) for b in network.branches if b.domain.common == "flow" and self._holds(b)]
-        self.branches = [(b, plus, minus) for b, plus, minus in branches if plus is not None and minus is not None]
-        self.single = [(b, self._point(plus), self._point(minus)) for b, plus, minus in self.branches if not b.loops]
-        ends = [end for b, *both in self.branches if not b.loops for end in both]
-        self.terminals = {self._point(t): t for t in ends if t.node is not None}
-
-    def _holds(self, b: Branch) -> bool:
-        """Whether the branch's displacement is an unknown of the start."""
-        return b.kind == "potential" or (b.name, "bq") in self.wanted
-
-    def _content(self, b: Branch) -> Node:
-        return ex.var(b.name, "bq", *b.at) if b.kind == "potential" else _quadrature(b.name, b.at)
-
-    def _point(self, terminal: Terminal) -> _Point:
-        if terminal.node is None:
-            return None
-        return terminal.node, tuple(self.sizes.bound(a, None).value for a in terminal.at)
+        self.about = [i for n in network.nodes for i in self.said.get((n.name, "nq"), ())]
+        self.known = [_Join(_at(i), _GROUND, i.value, i.loops, i.place) for i in self.about if i.fixed]
+        self.springs = _springs(network, wanted)
 
     def guesses(self) -> Iterator[Initial]:
         """Contents that nothing is written of, by the positions of their ends, of which something is."""
-        moved = self._moved()
-        for b, *terminals in self.branches:
-            within = ranges_of(b.loops, self.sizes, b.place)
-            ends = [self._start(t, within) for t in terminals]
-            if not b.loops:
-                ends = [moved.get(self._point(t), end) for t, end in zip(terminals, ends, strict=True)]
-            if ends == [None, None]:
+        for moved in tuple(self._moved()):
+            self.said.setdefault((moved.target.data[0], "nq"), []).append(moved)
+        for j in self.springs:
+            within = ranges_of(j.loops, self.sizes, j.place)
+            ends = [self._start(t, within) for t in (j.plus, j.minus)]
+            if ends == [None, None] or j.branch is None:
                 continue
             value = ex.sub(*(end or ex.const(0.0) for end in ends))
-            for rest in untold(self.said.get((b.name, "bq"), ()), b.at, within, self.sizes):
-                yield Initial(self._content(b), value, False, narrowed(b.loops, rest), b.place)
+            for rest in untold(self.said.get((j.branch.name, "bq"), ()), j.branch.at, within, self.sizes):
+                yield Initial(j.content, value, False, narrowed(j.loops, rest), j.place)
 
-    def _moved(self) -> dict[_Point, Node]:
-        """Positions of points that fixed contents join to others: guesses moved least, written ones less."""
-        forest = self._known_points(constant=True)
-        for b, plus, minus in self.single:
-            for i in self.said.get((b.name, "bq"), ()) if b.kind == "potential" else ():
-                if i.fixed and not ex.variables(i.value) and meeting(i, b.at, {}, self.sizes) is not None:
-                    content = held_at(b, i.target.data[1], i.value)
-                    if content is not None:
-                        forest.join(plus, minus, content)
-        moved: dict[_Point, Node] = {}
-        for points in (points for points in forest.trees.values() if len(points) > 1):
-            over = {p: forest.over[p][1] for p in points}
-            if None in over:
-                shift = ex.neg(over[None])
-            else:
-                guess = {p: self._start(self.terminals[p], {}) for p in points}
-                weights = [UNWRITTEN if g is None else 1.0 for g in guess.values()]
-                apart = [ex.sub(g or ex.const(0.0), over[p]) for p, g in guess.items()]
-                shift = ex.add(*(ex.scale(w / sum(weights), a) for w, a in zip(weights, apart, strict=True)))
-            moved |= {p: ex.add(over[p], shift) for p in points if p is not None}
-        return moved
-
-    def _start(self, terminal: Terminal, within: Ranges) -> Node | None:
-        """The initial position of a terminal over the branch's loops, as far as it is written."""
-        return initially(self.said.get((str(terminal.node), "nq"), ()), terminal.at, within, self.sizes)
-
-    def fixed(self) -> Iterator[Initial]:
-        """Contents of the elements of loops between places whose positions are known."""
-        for b, plus, minus in self.branches:
-            within = ranges_of(b.loops, self.sizes, b.place)
-            left = count(within) if b.loops else 0
-            for (here, one), (there, other) in itertools.product(self._known(plus, within), self._known(minus, within)):
-                both = {name: common(here[name], there[name]) for name in within}
-                if left > 0 and count(both):
-                    left -= count(both)
-                    yield self._equal(b, ex.sub(one, other), narrowed(b.loops, both))
+    def _start(self, point: Terminal, within: Ranges) -> Node | None:
+        """The initial position of points over ranges, as far as it is written."""
+        return initially(self.said.get((str(point.node), "nq"), ()), point.at, within, self.sizes)
 
     def loops(self) -> Iterator[Initial]:
-        """Equations around the loops that fixed positions, quadratures and single stores close."""
-        forest = self._known_points(constant=False)
-        for b, plus, minus in self.single:
-            around = forest.join(plus, minus, self._content(b))
-            if around is not None:
-                yield self._equal(b, around, ())
+        """Contents around the loops that fixed positions, quadratures and stores close: what they must be."""
+        read = [_read(n, self.sizes) for n in self.network.nodes if (n.name, "nq") in self.wanted]
+        for join, loops, around in _Points(self.network, [self.known, read, self.springs]).loops():
+            if join.branch is not None:
+                told = not ex.variables(around)
+                target, value = (join.content, around) if told else (ex.sub(join.content, around), ex.const(0.0))
+                yield Initial(target, value, True, loops, join.place)
 
-    def _equal(self, b: Branch, value: Node, loops: tuple[Loop, ...]) -> Initial:
-        """What a branch holds is fixed at a value, which may read other contents."""
-        content = self._content(b)
-        if ex.variables(value):
-            content, value = ex.sub(content, value), ex.const(0.0)
-        return Initial(content, value, True, loops, b.place)
+    # -- moved guesses --------------------------------------------------------------------------------------
 
-    def _known(self, terminal: Terminal, within: Ranges) -> Iterator[tuple[Ranges, Node]]:
-        """Where the position of a terminal is known, and what it is there: fixed, then its quadrature."""
-        if terminal.node is None:
-            yield within, ex.const(0.0)
+    def _told(self, *, fixed: bool) -> Iterator[_Join]:
+        """Contents that the text says, as numbers."""
+        for j in self.springs:
+            within, b = ranges_of(j.loops, self.sizes, j.place), j.branch
+            if b is None or b.kind != "potential":
+                continue
+            for i in self.said.get((b.name, "bq"), ()):
+                found = meeting(i, b.at, within, self.sizes) if i.fixed == fixed else None
+                value = None if found is None or ex.variables(i.value) else held_at(b, i.target.data[1], found[1])
+                if found is not None and value is not None:
+                    yield replace(j, loops=narrowed(j.loops, found[0]), content=value)
+
+    def _moved(self) -> Iterator[Initial]:
+        """Positions of points that contents join to others: guesses moved least, written ones less."""
+        told = [tuple(self._told(fixed=fixed)) for fixed in (True, False)]
+        if not any(told):
             return
-        for initial in self.said.get((terminal.node, "nq"), ()):
-            found = meeting(initial, terminal.at, within, self.sizes) if initial.fixed else None
-            if found is not None:
-                yield found
-        if (terminal.node, "nq") in self.wanted:
-            yield within, _quadrature(terminal.node, terminal.at)
+        numbers = [j for j in self.known if not ex.variables(j.content)]
+        points = _Points(self.network, [numbers, *told], self.about)
+        for cells in points.forest.trees():
+            shift = self._shift(points, cells)
+            for cell in cells:
+                if cell[0]:
+                    node, box = points.nodes[cell[0] - 1], points.forest.box(cell)
+                    value = points.forest.along(cell, shift)
+                    target = ex.var(node.name, "nq", *indices(box))
+                    yield Initial(target, value, False, loops_over(box), node.place)
 
-    def _known_points(self, *, constant: bool) -> _SpanningForest:
-        """The ends of single branches, joined to the ground where their positions are known; constant: as numbers."""
-        forest = _SpanningForest()
-        for point, terminal in self.terminals.items():
-            values = (value for _, value in self._known(terminal, {}) if not (constant and ex.variables(value)))
-            known = next(values, None)
-            if known is not None:
-                forest.join(point, None, known)
-        return forest
+    def _shift(self, points: _Points, cells: Sequence[Cell]) -> Node:
+        """What is added to the positions of a tree: the ground stands at zero, others have the guessed mean."""
+        forest, terms, weights = points.forest, [], []
+        for cell in cells:
+            if not cell[0]:
+                return ex.neg(forest.along(cell))
+            box = forest.box(cell)
+            within = dict(zip(counters(box), box, strict=True))
+            guess = self._start(Terminal(points.nodes[cell[0] - 1].name, indices(box)), within)
+            weight = UNWRITTEN if guess is None else 1.0
+            total, number = forest.summed(cell, ex.sub(guess or ex.const(0.0), forest.along(cell)))
+            terms.append((weight, total))
+            weights.append((weight, number))
+        return ex.div(ex.linear(0.0, terms), ex.linear(0.0, weights))
 
 
-class _SpanningForest:
-    """Points joined by displacements: the position of each over the root of its tree."""
+def _at(initial: Initial) -> Terminal:
+    return Terminal(initial.target.data[0], initial.target.args)
 
-    def __init__(self) -> None:
-        self.over: dict[_Point, tuple[_Point, Node]] = {}
-        self.trees: dict[_Point, list[_Point]] = {}
 
-    def join(self, plus: _Point, minus: _Point, content: Node) -> Node | None:
-        """Join two points; where they are joined already, the position of the first over the second."""
-        (root, one), (other_root, other) = self._at(plus), self._at(minus)
-        if root == other_root:
-            return ex.sub(one, other)
-        # the first tree hangs at the second: position of its root over the other's
-        shift = ex.add(other, content, ex.neg(one))
-        for point in self.trees.pop(root):
-            self.over[point] = other_root, ex.add(self.over[point][1], shift)
-            self.trees[other_root].append(point)
-        return None
-
-    def over_ground(self, point: _Point) -> Node | None:
-        """The position of a point; None where nothing joins it to the ground."""
-        (root, position), (origin, ground) = self._at(point), self._at(None)
-        return ex.sub(position, ground) if root == origin else None
-
-    def _at(self, point: _Point) -> tuple[_Point, Node]:
-        if point not in self.over:
-            self.over[point] = point, ex.const(0.0)
-            self.trees[point] = [point]
-        return self.over[point]
+def _read(node: NodeFamily, sizes: Sizes) -> _Join:
+    """Nodes at their quadratures over the ground."""
+    box = sizes.box(node.shape, node.place)
+    at = indices(box)
+    return _Join(Terminal(node.name, at), _GROUND, _quadrature(node.name, at), loops_over(box), node.place)

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 from sysdyn.compiler.network.primal.balances import ZERO, Effort, balances
 from sysdyn.compiler.network.primal.bounds import Sizes, parts
-from sysdyn.compiler.network.primal.incidence import Incidence, counters, ground, indices
+from sysdyn.compiler.network.primal.incidence import Incidence, ground, indices, loops_over
 from sysdyn.compiler.network.primal.series import series
 from sysdyn.dsl.model.expression import var
-from sysdyn.dsl.model.network import Constraint, Loop, Network
+from sysdyn.dsl.model.network import Constraint, Network
 from sysdyn.dsl.text.diagnostics import ModelError
 
 
@@ -35,6 +35,5 @@ def _constraints(free: list[Effort]) -> Iterator[Constraint]:
     labels = parts([(f"{e.node}.reference", e.box) for e in free])
     for effort, label in zip(free, labels, strict=True):
         at, box = indices(effort.box), effort.box
-        loops = tuple(Loop(n, i.first.node, i.last.node) for n, i in zip(counters(box), box, strict=True))
         domain, place = effort.cell.domain, effort.cell.place
-        yield Constraint("psi", label.name, at, var(effort.node, "ne", *at), loops, domain.effort, place)
+        yield Constraint("psi", label.name, at, var(effort.node, "ne", *at), loops_over(box), domain.effort, place)

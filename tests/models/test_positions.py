@@ -121,6 +121,51 @@ def test_positions_and_contents_of_families(tmp_path, formulation):
         assert trace[name].values == pytest.approx(reference[name].values, abs=2e-5), name
 
 
+CHAIN = """S[1]: potential(e = 10 N/m*q) ground -> x[1]
+  for i in 2..n {{ S[i]: potential(e = 10 N/m*q) x[i - 1] -> x[i] }}
+  W: potential(e = 10 N/m*q) x[n] -> {end}
+  init S[3].q {sign} 0.1 m"""
+MESH = """for i in 2..n { S[i]: potential(e = 10 N/m*q) x[i - 1] -> x[i] }
+  for i in 1..n { P[i]: potential(e = 7 N/m*q) x[i] -> y[i] }
+  for i in 2..n { Q[i]: potential(e = 3 N/m*q) y[i - 1] -> y[i] }
+  G: potential(e = 1 N/m*q) x[1] -> ground
+  init Q[3].q = 0.1 m
+  init P[4].q = 0.2 m"""
+LOOPS = {
+    "a chain between walls": (CHAIN.format(end="ground", sign="="), {"S[2].q": -0.05, "S[3].q": 0.1, "S[4].q": -0.05}),
+    "a ring": (CHAIN.format(end="x[1]", sign="="), {"S[2].q": -0.05, "S[3].q": 0.1, "W.q": 0.0}),
+    "a guessed content": (CHAIN.format(end="ground", sign="~"), {"S[2].q": -0.05, "S[3].q": 0.1, "W.q": 0.0}),
+    "a mesh": (MESH, {"S[3].q": 0.0, "P[2].q": -0.05, "P[3].q": 0.05, "S[4].q": -0.1, "Q[4].q": 0.05}),
+}
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+@pytest.mark.parametrize("case", LOOPS)
+def test_springs_of_families_in_loops(tmp_path, case, formulation):
+    """Masses of which nothing is said move least; around each loop of springs the stretches add up to nothing."""
+    body, start = LOOPS[case]
+    text = f"""
+    model loops {{
+      param n = 5
+      node x[1..n], y[1..n]: translation
+      for i in 1..n {{
+        M[i]: kinetic(p = 1 kg*f) x[i]
+        N[i]: kinetic(p = 2 kg*f) y[i]
+      }}
+      {body}
+    }}
+    scene go of loops {{
+      time 0 s to 0.5 s
+      trace {", ".join(start)} every 0.1 s
+    }}
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    reference = trace_of(tmp_path, text, formulation="lagrangian")
+    for name, value in start.items():
+        assert trace[name].values[0] == pytest.approx(value, abs=1e-6), name
+        assert trace[name].values == pytest.approx(reference[name].values, abs=2e-5), name
+
+
 ISLAND = """
 model island {
   node a, b, c, d: electrical

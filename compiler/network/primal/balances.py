@@ -18,14 +18,14 @@ from sysdyn.compiler.network.primal.incidence import (
     Element,
     Incidence,
     NodeCell,
-    counters,
     ground,
     indices,
+    loops_over,
     unrolled,
 )
 from sysdyn.compiler.network.primal.index_classes import Cell, End, IndexClasses, Link
 from sysdyn.dsl.model.expression import Node, index, linear, reduction, var
-from sysdyn.dsl.model.network import Constraint, Loop
+from sysdyn.dsl.model.network import Constraint
 from sysdyn.values import dataclass
 
 MULTIPLIER, ZERO, WALK = "multiplier", "zero", "walk"
@@ -200,6 +200,6 @@ def _row(effort: Effort) -> Constraint:
         for name in reversed(touch.free):
             flow = reduction("sum", f"#s {name}", ranges[name].first.node, ranges[name].last.node, flow)
         terms.append((1.0 if touch.end == MINUS else -1.0, flow))
-    loops_ = tuple(Loop(n, i.first.node, i.last.node) for n, i in zip(counters(effort.box), effort.box, strict=True))
+    loops_ = loops_over(effort.box)
     unit = effort.cell.domain.flow
     return Constraint("psi", effort.label, at, linear(0.0, terms), loops_, unit, effort.cell.place)

@@ -58,6 +58,11 @@ class Interval:
         """The interval moved back."""
         return Interval(self.first.minus(offset), self.last.minus(offset))
 
+    def common(self, other: Interval) -> Interval:
+        """What lies in both."""
+        first = self.first if self.first.value >= other.first.value else other.first
+        return Interval(first, self.last if self.last.value <= other.last.value else other.last)
+
     def holds(self, other: Interval) -> bool:
         """Whether the other lies inside."""
         return self.first.value <= other.first.value and other.last.value <= self.last.value
@@ -100,14 +105,25 @@ def _ends(interval: Interval) -> tuple[int, int]:
     return interval.first.value, interval.last.value
 
 
-def without(box: Box, hole: Box) -> Iterator[Box]:
-    """The parts of a box outside a box inside it."""
-    for k, (whole, inner) in enumerate(zip(box, hole, strict=True)):
-        before = Interval(whole.first, inner.first.minus(1))
-        behind = Interval(inner.last.plus(1), whole.last)
+def without(box: Box, *holes: Box) -> list[Box]:
+    """The parts of a box outside others."""
+    left = [box]
+    for hole in holes:
+        left = [part for rest in left for part in _around(rest, hole)]
+    return left
+
+
+def _around(box: Box, hole: Box) -> Iterator[Box]:
+    inner = tuple(a.common(b) for a, b in zip(box, hole, strict=True))
+    if not box_size(inner):
+        yield box
+        return
+    for k, (whole, cut) in enumerate(zip(box, inner, strict=True)):
+        before = Interval(whole.first, cut.first.minus(1))
+        behind = Interval(cut.last.plus(1), whole.last)
         for part in (before, behind):
             if part.size:
-                yield (*hole[:k], part, *box[k + 1 :])
+                yield (*inner[:k], part, *box[k + 1 :])
 
 
 def between(cuts: dict[int, Bound]) -> list[Interval]:
@@ -175,6 +191,10 @@ class Sizes:
                 return Affine(counters[0][1].data, self.bound(rest, place))
         text = f"index {to_text(node)} is not affine: i + c with whole c is meant"
         raise ModelError([Diagnostic("E806", text, place)])
+
+    def reach(self, at: Sequence[Node], within: dict[str, Interval], place: Place | None) -> Box:
+        """All values of indices over the ranges of loop variables."""
+        return tuple(self.affine(node, within, place).over(within) for node in at)
 
     def _leaf(self, node: Node) -> float:
         if node.op != "param" or node.data not in self._parameters:

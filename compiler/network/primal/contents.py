@@ -18,12 +18,12 @@ from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union
+from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union, without
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
 from sysdyn.compiler.network.primal.integrals import line
-from sysdyn.compiler.network.primal.overlaps import cut_off, initially, inside, ranges_of
+from sysdyn.compiler.network.primal.overlaps import initially, inside, ranges_of
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
@@ -146,7 +146,7 @@ class Contents:
         self._pinned: set[Node] = set()
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
-            box = tuple(reader.sizes.affine(a, within, initial.place).over(within) for a in initial.target.args)
+            box = reader.sizes.reach(initial.target.args, within, initial.place)
             self._given.setdefault(initial.target.data[0], []).append((initial, box))
         followers: dict[int, list[Member]] = {}
         for m in members:
@@ -199,11 +199,7 @@ class Contents:
 
     def _fixed(self, name: str, box: Box) -> bool:
         """Whether the text fixes the contents of all these elements."""
-        left = [box]
-        for initial, said in self._given.get(name, ()):
-            if initial.fixed:
-                left = [part for rest in left for part in cut_off(rest, said)]
-        return not left
+        return not without(box, *(said for initial, said in self._given.get(name, ()) if initial.fixed))
 
     # -- initial conditions -------------------------------------------------------------------------------------
 

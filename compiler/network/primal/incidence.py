@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Sizes, between, box_holds, box_size
 from sysdyn.dsl.model.expression import Node, index, sub
-from sysdyn.dsl.model.network import Branch, Domain, Network, NodeFamily, Terminal
+from sysdyn.dsl.model.network import Branch, Domain, Loop, Network, NodeFamily, Terminal
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 from sysdyn.values import dataclass
 
@@ -201,3 +201,8 @@ def counters(box: Box) -> tuple[str, ...]:
 def indices(box: Box) -> tuple[Node, ...]:
     """The loop variables over a box."""
     return tuple(index(name) for name in counters(box))
+
+
+def loops_over(box: Box) -> tuple[Loop, ...]:
+    """The loops over a box."""
+    return tuple(Loop(name, i.first.node, i.last.node) for name, i in zip(counters(box), box, strict=True))

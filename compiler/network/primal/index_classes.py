@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, between, number
 from sysdyn.values import dataclass
@@ -33,22 +34,31 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """a(k) and b(k) belong together for every k of the box, with equal (+1) or opposite (-1) sense."""
+    """a(k) and b(k) belong together for every k of the box, with equal (+1) or opposite (-1) sense.
+
+    owner: whose link it is, in the numbering of who asks.
+    """
 
     box: Box
     a: End
     b: End
     sign: int = 1
+    owner: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class _Option:
+class Option:
     """What a link does along one of its indices, in one place: intervals of both ends, and how they are tied."""
 
     how: str  # zero self cross free
     a: int
     b: int
     axis: Key | None
+
+
+def foremost_way(choice: Sequence[Option]) -> str:
+    """What a link does along the first of its indices that does not tie equals."""
+    return next((o.how for o in choice if o.how != "zero"), "zero")
 
 
 class IndexClasses:
@@ -95,16 +105,8 @@ class IndexClasses:
 
     def _shift(self, link: Link, k: int) -> tuple[Key, int] | None:
         """The axis of link index k and u_a - u_b there; None where only one end moves with it."""
-        places = [
-            (axis, offset.plus(own))
-            for end in (link.a, link.b)
-            for d, (index, own) in enumerate(end.at)
-            if index == k
-            for axis, offset in (self.axis(end.item, d),)
-        ]
-        if len(places) < 2:
-            return None
-        return places[0][0], places[0][1].value - places[1][1].value
+        places = self._places(link, k)
+        return (places[0][1], places[0][2].value - places[1][2].value) if len(places) == 2 else None
 
     def _followed(self, link: Link) -> bool:
         """Whether the link is one that ties equals, or neighbours along one axis."""
@@ -218,19 +220,19 @@ class IndexClasses:
         if left != right:
             if (right[0], right[1]) < (left[0], left[1]):
                 left, right = right, left
-            self._parent[right] = left, of_left * of_right * sign
-            if self._collapsed:
-                self._collapsed = {(left if root == right else root, axis, k) for root, axis, k in self._collapsed}
+            self._hang(right, left, of_left * of_right * sign)
+
+    def _hang(self, old: Cell, new: Cell, sign: int) -> None:
+        """A root under another."""
+        self._parent[old] = new, sign
+        if self._collapsed:
+            self._collapsed = {(new if root == old else root, axis, k) for root, axis, k in self._collapsed}
 
     def _unite(self, links: Sequence[Link]) -> None:
         """Equals first, then runs inside cells, then what reaches from cell to cell."""
         applied = [(link, choice) for link in links for choice in self._choices(link)]
-
-        def how(choice: tuple[_Option, ...]) -> str:
-            return next((o.how for o in choice if o.how != "zero"), "zero")
-
         for link, choice in applied:
-            if how(choice) == "zero":
+            if foremost_way(choice) == "zero":
                 self._join(*self._ends(link, choice), link.sign)
         for link, choice in applied:
             a, b = self._ends(link, choice)
@@ -246,7 +248,7 @@ class IndexClasses:
             a, b = self._ends(link, choice)
             crossing = [o for o in choice if o.how == "cross" and o.axis is not None]
             if all(self._tied(a, o.axis, o.a) and self._tied(b, o.axis, o.b) for o in crossing):
-                if how(choice) in ("cross", "free"):
+                if foremost_way(choice) in ("cross", "free"):
                     self._join(a, b, link.sign)
             else:
                 self._refuse(link)
@@ -259,33 +261,34 @@ class IndexClasses:
         if link not in self.refused:
             self.refused.append(link)
 
-    def _choices(self, link: Link) -> Iterator[tuple[_Option, ...]]:
+    def _choices(self, link: Link) -> Iterator[tuple[Option, ...]]:
         return itertools.product(*(self._options(link, k) for k in range(len(link.box))))
 
-    def _options(self, link: Link, k: int) -> list[_Option]:
-        places: list[tuple[int, Key, Interval]] = []
-        for n, end in enumerate((link.a, link.b)):
-            for d, (index, own) in enumerate(end.at):
-                if index == k:
-                    axis, offset = self.axis(end.item, d)
-                    places.append((n, axis, link.box[k].plus(own.plus(offset))))
+    def _places(self, link: Link, k: int) -> list[tuple[int, Key, Bound]]:
+        """The ends that move with link index k, their axes, and u - k there."""
+        ends = ((n, d, own) for n, end in enumerate((link.a, link.b)) for d, (i, own) in enumerate(end.at) if i == k)
+        found = ((n, own, self.axis((link.a, link.b)[n].item, d)) for n, d, own in ends)
+        return [(n, axis, own.plus(offset)) for n, own, (axis, offset) in found]
+
+    def _options(self, link: Link, k: int) -> list[Option]:
+        places = [(n, axis, link.box[k].plus(moved)) for n, axis, moved in self._places(link, k)]
         if not places:
-            return [_Option("zero", -1, -1, None)]
+            return [Option("zero", -1, -1, None)]
         if len(places) == 1:
             n, axis, stretch = places[0]
             inside = self._inside(axis, stretch)
-            return [_Option("free", i if n == 0 else -1, i if n == 1 else -1, axis) for i in inside]
+            return [Option("free", i if n == 0 else -1, i if n == 1 else -1, axis) for i in inside]
         (_, axis, at_a), (_, _, at_b) = places
         shift = at_a.first.value - at_b.first.value
         if shift == 0:
-            return [_Option("zero", i, i, axis) for i in self._inside(axis, at_a)]
+            return [Option("zero", i, i, axis) for i in self._inside(axis, at_a)]
         low, high = (at_b, at_a) if shift > 0 else (at_a, at_b)
         inside = self._inside(axis, Interval(low.first, high.last))
-        found = [_Option("self", i, i, axis) for i in inside if self._intervals[axis][i].size > 1]
+        found = [Option("self", i, i, axis) for i in inside if self._intervals[axis][i].size > 1]
         pairs = ((i + 1, i) if shift > 0 else (i, i + 1) for i in inside[:-1])
-        return found + [_Option("cross", a, b, axis) for a, b in pairs]
+        return found + [Option("cross", a, b, axis) for a, b in pairs]
 
-    def _ends(self, link: Link, choice: tuple[_Option, ...]) -> tuple[Cell, Cell]:
+    def _ends(self, link: Link, choice: tuple[Option, ...]) -> tuple[Cell, Cell]:
         return self._cell(link.a, [o.a for o in choice]), self._cell(link.b, [o.b for o in choice])
 
     def _cell(self, end: End, chosen: list[int]) -> Cell:
@@ -303,4 +306,4 @@ def _without_points(link: Link) -> Link:
     def fixed(end: End) -> End:
         return End(end.item, tuple((None, points[k].plus(c)) if k in points else (k, c) for k, c in end.at))
 
-    return Link(link.box, fixed(link.a), fixed(link.b), link.sign)
+    return replace(link, a=fixed(link.a), b=fixed(link.b))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, without
+from sysdyn.compiler.network.primal.bounds import Interval, Sizes, without
 from sysdyn.dsl.model.expression import Node, both, compare, conditional, const, index, sub, substitute
 from sysdyn.dsl.model.network import Initial, Loop
 from sysdyn.dsl.text.diagnostics import ModelError, Place
@@ -46,7 +46,7 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
                 if not reach.holds(Interval(b.offset, b.offset)):
                     return None
                 continue
-            shared = common(found[b.loop], reach.minus(b.offset))
+            shared = found[b.loop].common(reach.minus(b.offset))
             if not shared.size:
                 return None
             found[b.loop] = shared
@@ -58,7 +58,8 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
 def untold(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Iterator[Ranges]:
     """The parts of the ranges in which no statement is about elements `at`."""
     found = (meeting(initial, at, within, sizes) for initial in initials)
-    return beside(within, [m[0] for m in found if m is not None])
+    holes = (tuple(m[0].values()) for m in found if m is not None)
+    yield from (dict(zip(within, box, strict=True)) for box in without(tuple(within.values()), *holes))
 
 
 def initially(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Node | None:
@@ -79,31 +80,3 @@ def inside(part: Ranges, within: Ranges, value: Node, other: Node) -> Node:
     low = [compare("<=", i.first.node, k) for k, i in named]
     high = [compare("<=", k, i.last.node) for k, i in named]
     return conditional(both(*low, *high), value, other) if named else value
-
-
-def common(a: Interval, b: Interval) -> Interval:
-    """What lies in both."""
-    first = a.first if a.first.value >= b.first.value else b.first
-    return Interval(first, a.last if a.last.value <= b.last.value else b.last)
-
-
-def beside(within: Ranges, holes: Sequence[Ranges]) -> Iterator[Ranges]:
-    """The ranges without the holes in them, as ranges."""
-    left: list[Box] = [tuple(within.values())]
-    for hole in holes:
-        left = [part for box in left for part in cut_off(box, tuple(hole.values()))]
-    yield from (dict(zip(within, box, strict=True)) for box in left)
-
-
-def cut_off(box: Box, hole: Box) -> Iterator[Box]:
-    """The parts of a box outside a hole that may reach beyond it."""
-    inner = tuple(common(a, b) for a, b in zip(box, hole, strict=True))
-    if all(i.size for i in inner):
-        yield from without(box, inner)
-    else:
-        yield box
-
-
-def count(ranges: Ranges) -> int:
-    """Number of iterations."""
-    return box_size(tuple(ranges.values()))

@@ -72,7 +72,7 @@ class _Statements:
         """The least and the greatest of each index; all there is where a range follows another index."""
         try:
             within = ranges_of(initial.loops, self.sizes, initial.place)
-            box = [self.sizes.affine(a, within, initial.place).over(within) for a in initial.target.args]
+            box = self.sizes.reach(initial.target.args, within, initial.place)
         except ModelError:
             return (), (math.inf,)
         return tuple(i.first.value for i in box), tuple(i.last.value for i in box)

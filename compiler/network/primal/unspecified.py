@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes
 from sysdyn.compiler.network.primal.contents import TELLING, held_at, meet
-from sysdyn.compiler.network.primal.overlaps import Ranges, beside, meeting, narrowed, ranges_of
+from sysdyn.compiler.network.primal.overlaps import meeting, narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
 from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
@@ -41,7 +41,7 @@ def measured(
                 continue
             for node in read:
                 others = held.setdefault((node.data[0], node.data[1]), [])
-                box = _over(node, loops, sizes, b)
+                box = sizes.reach(node.args, ranges_of(loops, sizes, b.place), b.place)
                 shared |= {node.data[0]} if any(meet(box, other) for other in others) else set()
                 others.append(box)
         for part in () if b.name in known else _parts(b, initials, sizes):
@@ -53,28 +53,21 @@ def measured(
     return kept, frozenset(i.store for i in kept if i.said)
 
 
-def _over(node: Node, loops: Sequence[Loop], sizes: Sizes, b: Branch) -> Box:
-    """The elements of a family that a statement reads."""
-    within = ranges_of(loops, sizes, b.place)
-    return tuple(sizes.affine(at, within, b.place).over(within) for at in node.args)
-
-
 def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """Guesses of the contents of a statement's elements: by the text, and zero where it guesses nothing.
 
     Left out is what it guesses in words that tell no content; what is fixed is guessed as well.
     """
-    within, told = ranges_of(b.loops, sizes, b.place), list[Ranges]()
-    for initial in (i for i in initials if _tells(i, b)):
+    within, telling = ranges_of(b.loops, sizes, b.place), [i for i in initials if _tells(i, b)]
+    for initial in telling:
         found = meeting(initial, b.at, within, sizes)
         if found is None:
             continue
-        told.append(found[0])
         content, fixed = held_at(b, initial.target.data[1], found[1]), initial.fixed
         if content is not None:
             yield replace(initial, value=content, loops=narrowed(b.loops, found[0]), fixed=False, said=not fixed)
     zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
-    yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in beside(within, told))
+    yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in untold(telling, b.at, within, sizes))
 
 
 def _tells(i: Initial, b: Branch) -> bool:
