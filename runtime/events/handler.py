@@ -340,8 +340,8 @@ class Handler:
                     self.contacts.turn(k, values)
             self.contacts.apply()
             found = self.determined.fit(t, y, yd, restart.struck, touched)
-            if self.contacts.state() == stood and self._tied(t, found, touched):
-                found = self._ahead(t, found, stood) or found
+            if self._tied(t, found, touched if self.contacts.state() == stood else ()):
+                found = self._ahead(t, found, self.contacts.state()) or found
             if not self._impacts:
                 self._follows[stood, tuple(touched)] = self.contacts.state()
         except NoActiveSetError as error:
@@ -380,10 +380,14 @@ class Handler:
         return None
 
     def _tied(self, t: float, point: Point, touched: Sequence[int]) -> bool:
-        """Whether something touched may hold or not at this instant: a gap that has not bounced, and all else."""
-        values = self.observer(t, *point)
+        """Whether something touched may hold or not at this instant, but a gap that has bounced; or friction that is
+        at its bound while others hold what it joins.
+        """
+        values, zero = self.observer(t, *point), self.observer.zero
         contacts = [self.contacts.contacts[k] for k in touched]
-        return any(c.kind != "phi" or abs(values[c.rate]) <= self.observer.zero(c.rate) for c in contacts)
+        slips = [c for k, c in enumerate(self.contacts.contacts) if c.kind == "friction" and not self.contacts.active[k]]
+        idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)
+        return idle or any(c.kind != "phi" or abs(values[c.rate]) <= zero(c.rate) for c in contacts)
 
     def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
         """The gaps that an impact opened."""
