@@ -167,7 +167,11 @@ def _judged(
         floating(elaborator, reader.observations, report)
     found = _result(elaborator, reader, read_scene)
     laws.run(found, known, report)
-    return None if report.failed or _incomplete(report) else found
+    if report.failed or _incomplete(report):
+        return None
+    if elaborator.left_out and not list(report):
+        raise RuntimeError("a statement was left out, and nothing says why")
+    return found
 
 
 def _elaborated(

@@ -11,6 +11,7 @@ from functools import partial
 from itertools import groupby
 
 from sysdyn.dsl.elaborate.declarations import DECLARED
+from sysdyn.dsl.elaborate.elements import Pending
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.head import Body
 from sysdyn.dsl.elaborate.instances import Instances
@@ -19,7 +20,7 @@ from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State
 from sysdyn.dsl.model.units import Dimension, si
-from sysdyn.dsl.names.context import Failed, SeveralError
+from sysdyn.dsl.names.context import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.symbols import Definition, Scope, Space, Typed
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.tree import syntax
@@ -76,21 +77,28 @@ class Elaborator(Instances):
             own = list(group)
             with self.entering(own[0].space):
                 for pending in own:
-                    try:
-                        pending.resolve()
-                    except SeveralError as several:
-                        self.resolver.spread(several, pending.span)
-                    except Failed:
-                        continue
+                    self._resolve(pending)
         for space, _ in self.bodies:
             if space.ends.keys() - space.laws.keys():
                 with self.entering(space):
                     self.lawless(space)
 
+    def _resolve(self, pending: Pending) -> None:
+        """A law; one that reads a constraint waits for it."""
+        try:
+            pending.resolve()
+        except SeveralError as several:
+            self.resolver.spread(several, pending.span)
+        except NotYetError as early:
+            self.postpone(early, partial(self._resolve, pending))
+        except Failed:
+            self.left_out = True
+
     def statements(self) -> None:
         """Resolve what the model and its instances say: constraints first, which others may read."""
         self.resolver.complete = True
         self._said(syntax.Constraint, self.constraint)
+        self.postponed()
         for space, body in self.bodies:
             kinds = {type(s) for s, _ in body.of(_STATED)}
             if not kinds and all(type(s) is not Definition for s in space.scope.symbols.values()):
@@ -136,4 +144,4 @@ class Elaborator(Instances):
                         if not symbol.at and symbol.dimension is not None:
                             self._speed(symbol, value.node, symbol.dimension)
                 except Failed:
-                    continue
+                    self.left_out = True

@@ -33,7 +33,7 @@ from sysdyn.dsl.model.network import (
     Work,
 )
 from sysdyn.dsl.model.units import Unit
-from sysdyn.dsl.names.context import Failed, SeveralError
+from sysdyn.dsl.names.context import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol
 from sysdyn.dsl.names.unit_reading import read_unit
@@ -113,6 +113,8 @@ class ElaborationContext:
         self.resolver.branches = self.parts.branches
         self.scope = Scope()
         self.current = Space("", self.scope, self.scope, self.resolver.source)
+        self.left_out = False
+        self._postponed: list[tuple[Space, NotYetError, Callable[[], None]]] = []
 
     def entering(self, space: Space) -> _Entered:
         """Work inside a space."""
@@ -127,13 +129,33 @@ class ElaborationContext:
                         self.in_parts(partial(do, statement), statement.span)
                 else:
                     self.in_parts(partial(do, statement), statement.span)
+            except NotYetError as early:
+                self.postpone(early, partial(self.each, [(statement, loops)], do))
             except Failed:  # what it would have declared is not reported again where it is used
+                self.left_out = True
                 for decl in declared(statement):
                     if decl.name not in self.scope.symbols:
                         self.scope.broken.add(decl.name)
             except budget.SpentError as spent:
                 spent.place = spent.place or self.place(statement.span)
                 raise
+
+    def postpone(self, early: NotYetError, do: Callable[[], None]) -> None:
+        """To be carried out in the present space, once the constraint that it reads is there."""
+        self._postponed.append((self.current, early, do))
+
+    def postponed(self) -> None:
+        """Carry out what had to wait; E105 where one waits for itself."""
+        waiting = 0
+        while self._postponed and len(self._postponed) != waiting:
+            now, self._postponed = self._postponed, []
+            waiting = len(now)
+            for space, _, do in now:
+                with self.entering(space):
+                    do()
+        for space, early, _ in self._postponed if not self.report.failed else ():
+            place = Place(space.source, early.span)
+            self.report.error("E105", f"'{early.name}' is read by what it reads itself", place)
 
     def in_parts(self, do: Callable[[], None], span: syntax.Span) -> None:
         """Carry out a statement; for each part of a loop that runs over several statements of one label."""

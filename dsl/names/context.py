@@ -72,6 +72,14 @@ class Part:
     last: Node
 
 
+class NotYetError(Failed):
+    """A constraint is read that has not been resolved: what reads it is tried again when it has."""
+
+    def __init__(self, name: str, span: syntax.Span) -> None:
+        super().__init__(name)
+        self.name, self.span = name, span
+
+
 class SeveralError(Failed):
     """A loop runs over several statements of one label: whoever owns the loop cuts it into these parts."""
 

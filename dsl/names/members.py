@@ -16,7 +16,7 @@ from sysdyn.dsl.model.network import Branch, Constraint, Domain
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.context import Failed, Part, Quadrature, SeveralError, Use, Value
+from sysdyn.dsl.names.context import Failed, NotYetError, Part, Quadrature, SeveralError, Use, Value
 from sysdyn.dsl.names.names import Names
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
@@ -488,7 +488,7 @@ class Members(Names):
         """The constraint of a label (its element `at`) and left - right there."""
         found = self.constraints.get(symbol.family.name, [])
         if not found:
-            raise Failed
+            raise NotYetError(symbol.name, span)
         if len(found[0].at) != len(at):
             raise self.index_count(symbol.name, len(found[0].at), len(at), span)
         for constraint in found:

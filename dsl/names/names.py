@@ -11,7 +11,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, known
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.context import Context, Failed, SeveralError, Use, Value
+from sysdyn.dsl.names.context import Context, Failed, NotYetError, SeveralError, Use, Value
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
     BundleNode,
@@ -231,6 +231,9 @@ class Names(Context):
             del self._values[key]  # where it is read, the range is known
             if any(several.loop == n.node.data for n in placeholders.values()):
                 raise self.spread(several, symbol.span) from None
+            raise
+        except NotYetError:
+            del self._values[key]
             raise
         except budget.SpentError as spent:
             spent.place = spent.place or Place(symbol.space.source, symbol.span)

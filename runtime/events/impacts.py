@@ -5,7 +5,8 @@
 of all gaps that are closed and of all one-way flows at once.  That is the least change of the flows in the metric of
 the inertia under flow+ >= aim; the active set grows by what is violated most and gives up what would pull (Lawson and
 Hanson 1974, chapter 23), so that it never says anything twice.  Aims that contradict each other, in a closed chain of
-contacts, are zero.  Dry friction gives way: a finite effort has no impulse, unless a reaction tells its bound.
+contacts, are zero.  Dry friction gives way: a finite effort has no impulse, unless a reaction tells its bound.  Then it
+has one within the bound that the impulses tell (Coulomb's law).
 """
 
 from __future__ import annotations
@@ -30,13 +31,14 @@ Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]
 
 class _Struck(NamedTuple):
     """What impulses of some contacts make: y and values behind them, the impulses [contacts], how far the flows are
-    from their aims, in zeros of theirs, and which impulses pull.
+    from their aims, in zeros of theirs, and which impulses pull; whole: all impulses [unknowns].
     """
 
     struck: list[int]
     y: Floats
     values: Floats
     impulses: Floats
+    whole: Floats
     off: dict[int, float]
     pulls: list[int]
 
@@ -49,6 +51,14 @@ class _Struck(NamedTuple):
     def fits(self) -> bool:
         """Whether all impulses push and their aims are met."""
         return not self.pulls and not self.contradicts
+
+
+class _Blow(NamedTuple):
+    """An instant: t, y, yd before it, how impulses are found, and the aims of the flows of the contacts that take part."""
+
+    point: tuple[float, Floats, Floats]
+    strike: Strike
+    aim: dict[int, float]
 
 
 class Impacts:
@@ -77,11 +87,11 @@ class Impacts:
         for k in contacts.finite(t, y, yd):
             if contacts.active[k]:
                 contacts.slip(k, 0.0)
-        y, values = self._struck(t, y, yd, strike, aim)
+        found = self._among_frictions(_Blow((t, y, yd), strike, aim))
         for k in near:
-            contacts.active[k] = aim[k] == 0.0 and values[self._flow(k)] <= zero(self._flow(k))
+            contacts.active[k] = aim[k] == 0.0 and found.values[self._flow(k)] <= zero(self._flow(k))
         contacts.apply()
-        return y
+        return found.y
 
     def _near(self, k: int, values: Floats) -> bool:
         """Whether an impulse may come of a contact: a gap that is closed, whatever flow an inequality may stop."""
@@ -94,13 +104,40 @@ class Impacts:
         contact = self.contacts.contacts[k]
         return contact.rate if contact.kind == "phi" else contact.value
 
-    def _struck(
-        self, t: float, y: Floats, yd: Floats, strike: Strike, aim: dict[int, float]
-    ) -> tuple[Floats, Floats]:
-        """Y and values behind the impulses; aim: of the flow of each contact that may have one."""
+    def _among_frictions(self, blow: _Blow) -> _Struck:
+        """Behind the impulses, those of friction among them whose bound they tell (Coulomb's law): it stops what it
+        would turn back, and slides where holding needs more than its bound.
+        """
+        contacts = self.contacts
+        told = [k for k, c in enumerate(contacts.contacts) if c.kind == "friction"]
+        told = [k for k in told if k not in contacts.finite(*blow.point)]
+        for _ in range(TRIALS * (1 + len(told))):
+            found = self._struck(blow)
+            k = next((k for k in told if self._gives_wrong(k, found, blow)), None)
+            if k is None:
+                return found
+            held = contacts.active[k]
+            contacts.slip(k, float(np.sign(found.whole[contacts.multiplier[k]])) if held else 0.0)
+            contacts.active[k] = not held
+        raise NoActiveSetError(tuple(contacts.contacts[k].name for k in told))
+
+    def _gives_wrong(self, k: int, found: _Struck, blow: _Blow) -> bool:
+        """Whether a friction that holds has more than its bound, or one that slides has turned back."""
+        contacts, (t, y, yd) = self.contacts, blow.point
+        contact, sense = contacts.contacts[k], float(contacts.p[contacts.contacts[k].sense])
+        if not contacts.active[k]:
+            return bool(sense * found.values[contact.value] < -contacts.observer.zero(contact.value))
+        reactions = contacts.system.are("kappa", "mu", "e")[: y.size]
+        bounds = (contacts.system.observe(t, np.where(reactions, given, y), yd) for given in (found.whole, 0.0 * y))
+        bound = np.subtract(*(values[contact.bound] for values in bounds))
+        return bool(abs(found.whole[contacts.multiplier[k]]) > bound + contacts.impulse(contact))
+
+    def _struck(self, blow: _Blow) -> _Struck:
+        """Behind the impulses of inequalities, with the frictions that hold as they are."""
+        aim = blow.aim
 
         def of(struck: list[int]) -> _Struck:
-            return self._of((t, y, yd), strike, aim, struck)
+            return self._of(blow, struck)
 
         now, seen = of([]), list[set[int]]()
         had = now.impulses
@@ -114,7 +151,7 @@ class Impacts:
             had = np.maximum(now.impulses, 0.0)
             worst = max(now.off, key=now.off.__getitem__)
             if now.off[worst] <= 1.0:
-                return now.y, now.values
+                return now
             before, now = now, of([*now.struck, worst])
             if now.contradicts:  # what is said by others already takes the place of one of them
                 instead = {j: of([*(k for k in before.struck if k != j), worst]) for j in before.struck}
@@ -122,14 +159,13 @@ class Impacts:
                 now = next((one for one in instead.values() if one.fits and set(one.struck) not in seen), now)
                 seen.append(set(now.struck))
                 if now.contradicts and any(aim[k] > 0.0 for k in jammed):  # a closed chain: nothing can part there
-                    return self._struck(t, y, yd, strike, aim | dict.fromkeys(jammed, 0.0))
+                    return self._struck(blow._replace(aim=aim | dict.fromkeys(jammed, 0.0)))
         raise NoActiveSetError(tuple(self.contacts.contacts[k].name for k in aim))
 
-    def _of(
-        self, point: tuple[float, Floats, Floats], strike: Strike, aim: dict[int, float], struck: list[int]
-    ) -> _Struck:
+    def _of(self, blow: _Blow, struck: list[int]) -> _Struck:
         """What impulses of these alone make."""
         contacts, zero = self.contacts, self.contacts.observer.zero
+        point, strike, aim = blow
         for k in aim:
             contacts.active[k] = k in struck
         contacts.apply()
@@ -137,7 +173,8 @@ class Impacts:
         values, now = contacts.observer(point[0], y, point[2]), impulses[contacts.multiplier]
         off = {k: (aim[k] - values[self._flow(k)]) / zero(self._flow(k)) for k in aim}
         pulls = [k for k in struck if now[k] < -contacts.impulse(contacts.contacts[k])]
-        return _Struck(struck, y, values, np.where(np.isin(np.arange(now.size), struck), now, 0.0), off, pulls)
+        own = np.where(np.isin(np.arange(now.size), struck), now, 0.0)
+        return _Struck(struck, y, values, own, impulses, off, pulls)
 
     def _aims(self, aim: dict[int, float], struck: list[int]) -> Floats:
         """What the rows phi_rate shall be: -value' there."""

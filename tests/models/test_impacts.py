@@ -208,3 +208,77 @@ def test_a_puck_is_pulled_from_rest(tmp_path, formulation):
     for name, part in (("x", np.cos(2.1)), ("y", np.sin(2.1))):
         assert np.abs(trace[name].values - part * 0.5 * since**3).max() < 3e-8
         assert np.abs(trace[name + "'"].values - part * 1.5 * since**2).max() < 1e-7
+
+
+BALL = """\
+model ball {
+  param mu = 0.3
+  coord x: translation = 0 m
+  coord y: translation = 1 m
+  energy T* = 1/2*(2 kg)*(x'^2 + y'^2)
+  work -(2 kg)*g0 on y
+  phi floor: y >= 0 m restitution 0.5
+  rub: dissipator(e = mu*floor.multiplier*setsign(f)) on x
+  init x' = 2.5 m/s
+  init y' = 0 m/s
+}
+scene bounce of ball {
+  time 0 s to 2 s
+  trace x', y every 0.02 s
+  accuracy 1e-8
+}
+"""
+
+
+@FORMULATIONS
+@pytest.mark.parametrize("mu", [0.1, 0.3, 0.9])
+def test_a_bounce_rubs_by_its_impulse(tmp_path, formulation, mu):
+    """Coulomb's law for impulses: each bounce takes mu of its impulse along the floor, at most what turns back; what is
+    left when the ball rests slides on by its weight.
+    """
+    trace = run(tmp_path, BALL.replace("mu = 0.3", f"mu = {mu}"), formulation)
+    g, t, speed, down = 9.80665, np.sqrt(2 / 9.80665), 2.5, np.sqrt(2 * 9.80665)
+    expected = np.full(trace.time.shape, speed)
+    while down > 1e-12:
+        speed = max(speed - mu * 1.5 * down, 0.0)
+        expected[trace.time > t] = speed
+        down *= 0.5
+        t += 2 * down / g
+    expected = np.where(trace.time > t, np.maximum(speed - mu * g * (trace.time - t), 0.0), expected)
+    instants = np.array([event.time for event in trace.events])
+    between = np.abs(trace.time[:, None] - instants).min(axis=1) > 1e-6
+    assert np.abs(trace["x'"].values - expected)[between].max() < 3e-6 * 2.5
+
+
+READ = """\
+model read {
+  coord x: translation = 0 m
+  coord y: translation = 0 m
+  energy T* = 1/2*(2 kg)*(x'^2 + y'^2)
+  work 3 N on y
+  LAW
+  phi rail: y = 0 m
+  init x' = 2 m/s
+  init y' = 0 m/s
+}
+scene slow of read {
+  time 0 s to 3 s
+  trace x' every 0.1 s
+  accuracy 1e-8
+}
+"""
+
+
+@FORMULATIONS
+@pytest.mark.parametrize(
+    "law",
+    [
+        "drag: dissipator(e = 0.4*rail.multiplier*f/(1 m/s)) on x",
+        "let load = 0.4*rail.multiplier\n  drag: dissipator(e = load*f/(1 m/s)) on x",
+        "implicit F: N ~ 1 N\n  gamma rub: F = 0.4*rail.multiplier*x'/(1 m/s)\n  work -F on x",
+    ],
+)
+def test_a_law_reads_the_reaction_of_a_constraint_behind_it(tmp_path, formulation, law):
+    """The order of statements does not matter: an element whose law read a later constraint was left out in silence."""
+    trace = run(tmp_path, READ.replace("LAW", law), formulation)
+    assert np.abs(trace["x'"].values - 2 * np.exp(-0.4 * 3 / 2 * trace.time)).max() < 1e-7
