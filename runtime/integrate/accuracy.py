@@ -37,7 +37,7 @@ WORTH = 0.3
 SHORT, SHORT_CREDIT = 60, 0.75
 """Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
 FIRST_DROP = 1e-2
-AIM, LEFT, LITTLE = 2.0, 0.3, 0.1
+AIM, LEFT, LITTLE = 2.0, 0.3, 0.02
 """How far below what was asked the next run aims, and the most that is left of its tolerance: LITTLE where no power is
 measured yet, for a miss behind it costs a run."""
 SLOWEST = 0.75
@@ -53,8 +53,8 @@ BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
 """The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
 steps of a run behind which none is shortened."""
 TAME = 1e-6
-"""Tolerance of the next run at most where the first two ran away alike (Robertson's falls through zero), or where
-Newton's failures say so before."""
+"""Tolerance of the next run at most where the first two ran away alike (Robertson's falls through zero), and of a
+draft where Newton's failures say so before."""
 TINY = 1e-30
 """An estimate beside what was asked below which it counts as none."""
 QUIET, AGREE = 1.35, 2.0
@@ -176,15 +176,17 @@ def _limited(failure: SolverFailure) -> bool:
 
 
 def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
-    """The first run; where it fails, once more with smaller tolerances."""
-    longest = STRETCH * LONGEST
-    for smaller in RETRIED[:-1]:
+    """The first run; where it fails, once more with smaller tolerances, where it is strained with a tame one."""
+    tried = 0
+    while True:
         try:
-            return run(min(max(smaller * tolerance, law.finest) / law.ratio, law.loosest), longest)
+            return run(min(max(RETRIED[tried] * tolerance, law.finest) / law.ratio, law.loosest), STRETCH * LONGEST)
         except SolverFailure as failure:
-            if _limited(failure) or failure.cause == "stiff":
+            tried += 1
+            if tried == len(RETRIED) or _limited(failure) or failure.cause == "stiff":
                 raise
-    return run(max(RETRIED[-1] * tolerance, law.finest) / law.ratio, longest)
+            if failure.cause == "strained":
+                tolerance = min(tolerance, TAME * law.ratio / RETRIED[tried])
 
 
 class _Estimate:
@@ -248,7 +250,7 @@ def _agreed(run: Run, draft: Sampled, lighter: Lighter, target: Floats, wanted: 
     """What a run of the lighter method is worth behind a draft in which little happens: a pair of two methods, whose
     errors have nothing in common.  None where much happens, or where it fails or misses: the method before goes on.
     """
-    if draft.strained or not _quiet(draft):
+    if not _quiet(draft):
         return None
     lighter.take()
     try:
@@ -290,7 +292,6 @@ def control(
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
     tolerance = max(min(tolerance, law.ratio * last.tolerance), law.far * last.tolerance, law.finest)
-    tolerance = min(tolerance, TAME) if last.strained else tolerance
     usual = first is None and LIGHTLY <= wanted < 1.0 and not doubted
     light = _agreed(run, last, lighter, target, wanted) if lighter is not None and usual else None
     if light is not None:
