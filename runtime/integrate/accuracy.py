@@ -37,9 +37,8 @@ WORTH = 0.3
 SHORT, SHORT_CREDIT = 60, 0.75
 """Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
 FIRST_DROP = 1e-2
-AIM, LEFT, LITTLE = 2.0, 0.3, 0.02
-"""How far below what was asked the next run aims, and the most that is left of its tolerance: LITTLE where no power is
-measured yet, for a miss behind it costs a run."""
+AIM, LEFT = 2.0, 0.3
+"""How far below what was asked the next run aims, and the most that is left of its tolerance."""
 SLOWEST = 0.75
 """The least power with which errors are taken to fall when the next tolerance is chosen."""
 STRETCH = 1.5
@@ -75,7 +74,8 @@ class Law:
     run's error is believed to be smaller; finest: the smallest tolerance that makes sense; growth: power of the steps
     that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors;
     ratio: of the tolerances of the first two runs; loosest: tolerance of a draft; most: steps with which the gain
-    grows; far: of the tolerance of the run before, beyond which nothing more is credited.
+    grows; far: of the tolerance of the run before, beyond which nothing more is credited; little: the most that is left
+    of a tolerance that missed where no power is measured yet, for another miss costs a run.
     """
 
     gain: float
@@ -87,6 +87,7 @@ class Law:
     loosest: float = LOOSEST
     most: int = MANY_STEPS
     far: float = FAR
+    little: float = 0.1
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
@@ -97,8 +98,9 @@ class Law:
 LAWS = {
     # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
-    # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3
-    "radau": Law(5.0, 0.9, 0.65, 1e-17, ratio=0.05),
+    # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3;
+    # with more stages a hundredth of a tolerance costs it a third of a run
+    "radau": Law(5.0, 0.9, 0.65, 1e-17, ratio=0.05, little=0.02),
     # of order 8 a tolerance a quarter as large costs a sixth of a run, a miss costs one: a gain of 40 left a third run
     # to one model in five, 160 to one in fifty; the credit of a wider ratio pays for the looser draft
     "dopri": Law(160.0, 1.0, 0.9, 2e-14, ratio=0.05),
@@ -232,7 +234,7 @@ class _Estimate:
         """
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
         drop = max(AIM * self.over, TINY) ** (-1.0 / power)
-        least, most = (FIRST_DROP, LITTLE) if self._power is None else (1e-3, LEFT)
+        least, most = (FIRST_DROP, self.law.little) if self._power is None else (1e-3, LEFT)
         return max(float(np.clip(drop, least, most)) * tolerance, self.law.finest)
 
 
