@@ -22,6 +22,8 @@ from sysdyn.values import dataclass
 AHEAD = (0.0, 1e-9, 1e-6, 1e-3, 1e-2, 1e-1)
 """Times ahead at which rows are evaluated, of the time passed so far (and multiples of the step)."""
 STEPS = (1.0, 10.0, 100.0)
+BESIDE = (-1e-9, 1e-9, -1e-6, 1e-6, -1e-3, 1e-3)
+"""Of the unknowns, and of one: how far beside the last good point rows are evaluated at last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +44,11 @@ def culprit(prepared: Prepared, system: System, error: SolverFailure) -> Culprit
     oracle = Oracle(prepared.compiled.form, prepared.binding)
     blocks = [b for b in prepared.compiled.form.blocks if b.name not in (*WITHOUT_ENTRIES, "initial")]
     rates = np.where(np.isfinite(yd), yd, 0.0)
-    for ahead in (*(s * error.step for s in STEPS), *(a * max(abs(t), error.step) for a in AHEAD)):
-        point = t + ahead, y + ahead * rates, yd
+    times = (*(s * error.step for s in STEPS), *(a * max(abs(t), error.step) for a in AHEAD))
+    points = [(t + ahead, y + ahead * rates, yd) for ahead in times]
+    if error.cause == "nonfinite":  # it has been met: by an iterate, if no rate leads there
+        points += [(t, y + side * np.maximum(np.abs(y), 1.0), yd) for side in BESIDE]
+    for point in points:
         for block in blocks:
             found = oracle.undefined(block.name, *point, infinite=error.cause == "nonfinite")
             if found is not None:

@@ -37,9 +37,8 @@ WORTH = 0.3
 SHORT, SHORT_CREDIT = 60, 0.75
 """Steps of a run below which its error does not follow its tolerance as theory says, and the credit that is left."""
 FIRST_DROP = 1e-2
-AIM, LEFT, LITTLE = 2.0, 0.3, 0.1
-"""How far below what was asked the next run aims, and the most that is left of its tolerance: LITTLE where no power is
-measured yet, for a miss behind it costs a run."""
+AIM, LEFT = 2.0, 0.3
+"""How far below what was asked the next run aims, and the most that is left of its tolerance."""
 SLOWEST = 0.75
 """The least power with which errors are taken to fall when the next tolerance is chosen."""
 STRETCH = 1.5
@@ -53,8 +52,8 @@ BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
 """The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
 steps of a run behind which none is shortened."""
 TAME = 1e-6
-"""Tolerance of the next run at most where the first two ran away alike (Robertson's falls through zero), or where
-Newton's failures say so before."""
+"""Tolerance of the next run at most where the first two ran away alike (Robertson's falls through zero), and of a
+draft where Newton's failures say so before."""
 TINY = 1e-30
 """An estimate beside what was asked below which it counts as none."""
 QUIET, AGREE = 1.35, 2.0
@@ -75,7 +74,8 @@ class Law:
     run's error is believed to be smaller; finest: the smallest tolerance that makes sense; growth: power of the steps
     that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors;
     ratio: of the tolerances of the first two runs; loosest: tolerance of a draft; most: steps with which the gain
-    grows; far: of the tolerance of the run before, beyond which nothing more is credited.
+    grows; far: of the tolerance of the run before, beyond which nothing more is credited; little: the most that is left
+    of a tolerance that missed where no power is measured yet, for another miss costs a run.
     """
 
     gain: float
@@ -87,6 +87,7 @@ class Law:
     loosest: float = LOOSEST
     most: int = MANY_STEPS
     far: float = FAR
+    little: float = 0.1
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
@@ -97,8 +98,9 @@ class Law:
 LAWS = {
     # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
-    # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3
-    "radau": Law(5.0, 0.9, 0.65, 1e-17, ratio=0.05),
+    # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3;
+    # with more stages a hundredth of a tolerance costs it a third of a run
+    "radau": Law(5.0, 0.9, 0.65, 1e-17, ratio=0.05, little=0.02),
     # of order 8 a tolerance a quarter as large costs a sixth of a run, a miss costs one: a gain of 40 left a third run
     # to one model in five, 160 to one in fifty; the credit of a wider ratio pays for the looser draft
     "dopri": Law(160.0, 1.0, 0.9, 2e-14, ratio=0.05),
@@ -176,15 +178,17 @@ def _limited(failure: SolverFailure) -> bool:
 
 
 def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
-    """The first run; where it fails, once more with smaller tolerances."""
-    longest = STRETCH * LONGEST
-    for smaller in RETRIED[:-1]:
+    """The first run; where it fails, once more with smaller tolerances, where it is strained with a tame one."""
+    tried = 0
+    while True:
         try:
-            return run(min(max(smaller * tolerance, law.finest) / law.ratio, law.loosest), longest)
+            return run(min(max(RETRIED[tried] * tolerance, law.finest) / law.ratio, law.loosest), STRETCH * LONGEST)
         except SolverFailure as failure:
-            if _limited(failure) or failure.cause == "stiff":
+            tried += 1
+            if tried == len(RETRIED) or _limited(failure) or failure.cause == "stiff":
                 raise
-    return run(max(RETRIED[-1] * tolerance, law.finest) / law.ratio, longest)
+            if failure.cause == "strained":
+                tolerance = min(tolerance, TAME * law.ratio / RETRIED[tried])
 
 
 class _Estimate:
@@ -230,7 +234,7 @@ class _Estimate:
         """
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
         drop = max(AIM * self.over, TINY) ** (-1.0 / power)
-        least, most = (FIRST_DROP, LITTLE) if self._power is None else (1e-3, LEFT)
+        least, most = (FIRST_DROP, self.law.little) if self._power is None else (1e-3, LEFT)
         return max(float(np.clip(drop, least, most)) * tolerance, self.law.finest)
 
 
@@ -248,7 +252,7 @@ def _agreed(run: Run, draft: Sampled, lighter: Lighter, target: Floats, wanted: 
     """What a run of the lighter method is worth behind a draft in which little happens: a pair of two methods, whose
     errors have nothing in common.  None where much happens, or where it fails or misses: the method before goes on.
     """
-    if draft.strained or not _quiet(draft):
+    if not _quiet(draft):
         return None
     lighter.take()
     try:
@@ -290,7 +294,6 @@ def control(
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
     tolerance = max(min(tolerance, law.ratio * last.tolerance), law.far * last.tolerance, law.finest)
-    tolerance = min(tolerance, TAME) if last.strained else tolerance
     usual = first is None and LIGHTLY <= wanted < 1.0 and not doubted
     light = _agreed(run, last, lighter, target, wanted) if lighter is not None and usual else None
     if light is not None:

@@ -42,6 +42,9 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, null_place
 
 CHUNK_SECONDS = 0.05
+WINDOW, STRAINED = 32, 0.5
+"""Steps, with a quarter of those before, in which Newton may fail in this part of them: beyond, the tolerance says
+little of what a run finds."""
 CHUNK_STEPS = 1 << 20
 PROJECTED = ("1", "0")
 """Forms whose rows let the constraints drift: accepted points are moved onto them."""
@@ -495,10 +498,13 @@ class Integration:
             self.pieces.aim(segment_end)
         request, method = self.request, self.method.contents
         marked, at = method.steps, method.t
+        most, failed = CHUNK_STEPS, method.newton_failures
         while True:
             left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
+            if request.unstrained:
+                most, failed = WINDOW + method.steps // 4, method.newton_failures
             before = time.process_time()
-            state = lib.core.sd_run_advance(self.run_, min(CHUNK_STEPS, max(left, 1)), CHUNK_SECONDS)
+            state = lib.core.sd_run_advance(self.run_, min(most, max(left, 1)), CHUNK_SECONDS)
             self.cpu += time.process_time() - before
             self.drain(sink)
             self.system.failure.check()
@@ -509,6 +515,8 @@ class Integration:
                 raise self._placed(self._failure(lib.CAUSES[method.cause]))
             if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
                 raise self._failure("max_steps")
+            if request.unstrained and state == 0 and method.newton_failures - failed > STRAINED * most:
+                raise self._failure("strained")
             late = request.max_wall is not None and time.monotonic() - began > request.max_wall
             if late and method.t < request.t_end:
                 raise self._failure("max_wall")

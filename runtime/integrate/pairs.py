@@ -41,8 +41,7 @@ class Sampled:
     is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants]:
     between an event of this run and the same one of the run before it; late [instants, quantities]: what the dense
     output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
-    and late at instants of its own, for the run behind it (None: those are the same); strained: Newton failed so often
-    that the tolerance says little of its steps.
+    and late at instants of its own, for the run behind it (None: those are the same).
     """
 
     tolerance: float
@@ -54,7 +53,6 @@ class Sampled:
     between: NDArray[np.bool_] | None = None
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
-    strained: bool = False
 
     @property
     def own(self) -> tuple[Floats, Floats | float]:

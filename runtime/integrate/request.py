@@ -36,6 +36,7 @@ class Request:
     audit's members too;
     condense: what constant sums define leaves the system (condense/);
     stages: of radau, in the first step and at most, None: chosen;
+    unstrained: it is given up where Newton fails in every second step (cause strained);
     apart: part of a step; instants within it that are nearer to the row before are passed over.
     """
 
@@ -64,6 +65,7 @@ class Request:
     apart: float = 0.0
     condense: bool = True
     stages: tuple[int, int] | None = None
+    unstrained: bool = False
 
     @property
     def tolerance(self) -> float:

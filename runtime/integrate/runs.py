@@ -33,8 +33,6 @@ from sysdyn.values import dataclass
 
 LONG = 1000
 """Steps of the bdf after which method auto tries radau."""
-STRAINED = 0.5
-"""Part of its steps in which Newton may fail; of steep laws it does at any tolerance."""
 HELD = 100
 """Steps that a dopri which stability holds may still have to take before method auto tries another."""
 STIFF = 1e5
@@ -220,6 +218,8 @@ class Runs:
             stiff_steps=HELD if options.method == "auto" else STIFF,
             settled_to=ROUGH * rtol if self.controlled else 0.0,
             draft=draft,
+            # of steep laws Newton fails at any tolerance
+            unstrained=draft and rtol > 1.01 * accuracy.TAME and not self.system.form.scales,
             audited=bool(self.meters),
             apart=APART if draft and self.open else 0.0,
             events=options.events or None,
@@ -432,10 +432,9 @@ class Runs:
         assert self.compared_at is not None
         between = beside(self.compared_at, jumps if last is None else last, jumps, span)
         counted = finished.statistics
-        strained = counted.newton_failures > STRAINED * counted.steps and not self.system.form.scales
         late = self._late(rows) if instants is not None else 0.0
         open_ = cache(lambda: self._open_quantities(finished))
-        found = Sampled(tolerance, values, sizes, counted.steps, noise, open_, between, late, there, strained)
+        found = Sampled(tolerance, values, sizes, counted.steps, noise, open_, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.integrate.accuracy import LAWS, STEEP, Lighter, control
+from sysdyn.runtime.integrate.accuracy import LAWS, STEEP, TAME, Lighter, control
 from sysdyn.runtime.integrate.pairs import ROUND_OFF, Sampled
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
@@ -87,6 +87,21 @@ def test_a_finer_run_that_fails_is_tried_half_the_way(wall, half):
     assert achieved.tolerance == min(done) >= wall
     assert len(done) == (3 if half else 2)
     assert achieved.error_estimate >= 100.0 * achieved.tolerance
+
+
+def test_behind_a_strained_draft_comes_a_tame_one():
+    """Robertson's equations at loose tolerances: the run fell through zero, and no comparison with it says anything."""
+    tried = []
+
+    def run(tolerance, longest):
+        tried.append(tolerance)
+        if tolerance > 2.0 * TAME:
+            raise SolverFailure("strained", 0.5, 1e-3)
+        return sampled(tolerance, [1.0, 0.5 + 0.1 * tolerance])
+
+    achieved = control(run, np.array([1e-2]), LAWS["radau"])
+    assert achieved.met
+    assert tried[1:] == pytest.approx([TAME, LAWS["radau"].ratio * TAME])
 
 
 def test_what_only_one_run_did_between_the_instants_is_not_believed():
