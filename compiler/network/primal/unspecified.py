@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Box, Sizes
-from sysdyn.compiler.network.primal.contents import TELLING, held_at, meet
+from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
+from sysdyn.compiler.network.primal.contents import TELLING, held_at
 from sysdyn.compiler.network.primal.overlaps import meeting, narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
