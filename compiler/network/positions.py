@@ -14,7 +14,7 @@ from dataclasses import replace
 from sysdyn.compiler.network.primal.bounds import Sizes, box_size
 from sysdyn.compiler.network.primal.contents import held_at
 from sysdyn.compiler.network.primal.forest import IndexForest
-from sysdyn.compiler.network.primal.incidence import indices, loops_over, ranges_over
+from sysdyn.compiler.network.primal.incidence import indices, loops_over, ranges_over, unrolled
 from sysdyn.compiler.network.primal.index_classes import Cell, Cut, End, Link
 from sysdyn.compiler.network.primal.overlaps import Ranges, initially, meeting, narrowed, ranges_of, untold
 from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature, stores_of
@@ -109,6 +109,10 @@ class _Points:
         except (ModelError, KeyError):
             return None
 
+    def left(self) -> list[_Join]:
+        """What joins nodes in a pattern that index classes cannot hold."""
+        return [self._joins[link.owner] for link in self.forest.refused]
+
     def loops(self) -> Iterator[tuple[_Join, tuple[Loop, ...], Node]]:
         """Who closes loops, where, and the position of plus over minus that others tell."""
         for owner, box, around in self.forest.loops:
@@ -160,10 +164,15 @@ class _Contents:
     def loops(self) -> Iterator[Initial]:
         """Contents around the loops that fixed positions, quadratures and stores close: what they must be."""
         read = [_read(n, self.sizes) for n in self.network.nodes if (n.name, "nq") in self.wanted]
-        for join, loops, around in _Points(self.network, [self.known, read, self.springs]).loops():
+        points = _Points(self.network, [self.known, read, self.springs])
+        told = any((j.branch.name, "bq") in self.said for j in self.springs if j.branch is not None)
+        for j in points.left() if told or self.about else ():
+            (found,) = unrolled("a loop in which contents are said joins nodes along two offsets", j.place).diagnostics
+            raise ModelError([replace(found, help="formulation lagrangian, hamiltonian")])
+        for join, loops, around in points.loops():
             if join.branch is not None:
-                told = not ex.variables(around)
-                target, value = (join.content, around) if told else (ex.sub(join.content, around), ex.const(0.0))
+                known = not ex.variables(around)
+                target, value = (join.content, around) if known else (ex.sub(join.content, around), ex.const(0.0))
                 yield Initial(target, value, True, loops, join.place)
 
     # -- moved guesses --------------------------------------------------------------------------------------

@@ -2,9 +2,12 @@
 over differences.
 """
 
+import os
+
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
+from random_positions import judged
 
 MASSES = """
 model masses {{
@@ -164,6 +167,12 @@ def test_springs_of_families_in_loops(tmp_path, case, formulation):
     for name, value in start.items():
         assert trace[name].values[0] == pytest.approx(value, abs=1e-6), name
         assert trace[name].values == pytest.approx(reference[name].values, abs=2e-5), name
+
+
+def test_random_springs_partly_said_begin_with_the_stretches_of_the_closed_form():
+    verdicts = {seed: judged(seed) for seed in range(500 if os.environ.get("SYSDYN_LONG") else 12)}
+    assert not {seed: verdict for seed, verdict in verdicts.items() if verdict not in {"agree", "contradicting"}}
+    assert [*verdicts.values()].count("agree") >= len(verdicts) // 3
 
 
 ISLAND = """
