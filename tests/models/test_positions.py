@@ -138,6 +138,13 @@ LOOPS = {
     "a chain between walls": (CHAIN.format(end="ground", sign="="), {"S[2].q": -0.05, "S[3].q": 0.1, "S[4].q": -0.05}),
     "a ring": (CHAIN.format(end="x[1]", sign="="), {"S[2].q": -0.05, "S[3].q": 0.1, "W.q": 0.0}),
     "a guessed content": (CHAIN.format(end="ground", sign="~"), {"S[2].q": -0.05, "S[3].q": 0.1, "W.q": 0.0}),
+    "guesses of a family that others join in places": (
+        """for i in 1..4 { D[i]: potential(e = 5 N/m*q) x[i] -> y[i + 1] }
+  W: potential(e = 3 N/m*q) x[1] -> y[4]
+  init x[4].q ~ -0.3 m
+  for i in 2..4 { init y[i].q ~ 0.1 m*i }""",
+        {"D[1].q": -0.2, "D[2].q": -0.3, "D[3].q": -0.4, "D[4].q": -0.3, "W.q": -0.4},
+    ),
     "a mesh": (MESH, {"S[3].q": 0.0, "P[2].q": -0.05, "P[3].q": 0.05, "S[4].q": -0.1, "Q[4].q": 0.05}),
 }
 
