@@ -44,7 +44,7 @@ ROOT = HERE.parents[1]
 ROOMS = ("dsl", "compiler", "runtime", "cli", "api", "models")
 LOWERING = (
     "forms/lowering.py", "forms/efforts.py", "forms/kane.py", "forms/momenta.py", "forms/integration.py",
-    "forms/audit.py",
+    "forms/meters/audit.py",
     "model/mirror.py", "network/reflection.py", "network/positions.py",
     "network/primal/balances.py", "network/primal/choices.py", "network/primal/laws.py", "network/primal/series.py",
     "network/primal/potentials.py", "network/primal/reading.py", "network/primal/contents.py",
