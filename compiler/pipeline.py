@@ -23,16 +23,16 @@ from sysdyn.compiler.binding.columns import Columns, Floats
 from sysdyn.compiler.binding.counts import check_counts
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.conjugates import with_book_signs
+from sysdyn.compiler.forms.corners.frozen import frozen
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.forms.frozen import frozen
 from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.legendre import transformed
+from sysdyn.compiler.forms.meters.untraced import with_coordinates_observed
 from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates
 from sysdyn.compiler.forms.steepness import scaled
-from sysdyn.compiler.forms.untraced import with_coordinates_observed
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.mirror import refusal, word

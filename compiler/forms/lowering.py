@@ -16,12 +16,12 @@ import random
 from collections.abc import Iterable, Sequence
 
 from sysdyn.compiler.forms.assembly import Assembly
-from sysdyn.compiler.forms.audit import add_audit
 from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
 from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.forms.efforts import Effort, efforts
+from sysdyn.compiler.forms.meters.audit import add_audit
+from sysdyn.compiler.forms.meters.observing import add_initials, add_observations, observed, pins_and_equations
 from sysdyn.compiler.forms.momenta import given, inertial, resolved
-from sysdyn.compiler.forms.observing import add_initials, add_observations, observed, pins_and_equations
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.expression import (

@@ -1,6 +1,5 @@
-"""Displacements in the complementary family: quadratures of what is read, and what initial positions say of stores.
+"""Positions in the complementary family: what stores tell of them, and what initial positions tell of stores.
 
-A displacement that no potential store holds has no place there; where it is traced, its quadrature q' = f is added.
 The contents of stores between common-flow nodes are differences of positions x, c = B x: around every loop of stores,
 quadratures and fixed positions they add up to zero at the start.  A spanning forest of the nodes (`primal/forest.py`)
 tells these loops, and the positions of what stores hold to the ground or apart.
@@ -12,27 +11,23 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Box, Sizes, box_size, without
+from sysdyn.compiler.network.primal.bounds import Sizes, box_size
 from sysdyn.compiler.network.primal.contents import held_at
 from sysdyn.compiler.network.primal.forest import IndexForest
-from sysdyn.compiler.network.primal.incidence import counters, indices, loops_over
+from sysdyn.compiler.network.primal.incidence import indices, loops_over, ranges_over, unrolled
 from sysdyn.compiler.network.primal.index_classes import Cell, Cut, End, Link
 from sysdyn.compiler.network.primal.overlaps import Ranges, initially, meeting, narrowed, ranges_of, untold
+from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature, stores_of
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Initial, Loop, Network, NodeFamily, State, Terminal
-from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
+from sysdyn.dsl.model.network import Branch, Initial, Loop, Network, NodeFamily, Terminal
+from sysdyn.dsl.model.rewriting import TRACED, rewritten
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.values import dataclass
 
-Wanted = tuple[str, str]
-"""Name and kind (nq, bq) of a displacement."""
 UNWRITTEN = 1e-6
 """Weight (of squares) of a guess that the text does not write, as the consistent start has it."""
 _GROUND = Terminal(None, ())
-
-
-# -- traced positions --------------------------------------------------------------------------------------
 
 
 def from_stores(network: Network) -> Network:
@@ -45,101 +40,6 @@ def from_stores(network: Network) -> Network:
         return ex.substitute(root, change) if change else root
 
     return rewritten(network, read, TRACED)
-
-
-def from_masses(network: Network) -> Network:
-    """Momenta of points, and their rates, as those of the kinetic stores that move with them."""
-    whole = massive(network)
-    held: dict[str, list[tuple[float, Branch, tuple[Node, ...]]]] = {}
-    for b in network.branches:
-        for terminal, sign in ((b.plus, 1.0), (b.minus, -1.0)):
-            if b.kind == "kinetic" and terminal is not None and terminal.node is not None:
-                held.setdefault(terminal.node, []).append((sign, b, terminal.at))
-
-    def stores(node: Node) -> Node:
-        """A store stands at all points of a family, or at one of them."""
-        terms = []
-        for sign, b, at in held.get(node.data[0], ()):
-            if not b.loops and at == node.args:
-                terms.append((sign, ex.var(b.name, "bp", *b.at, order=node.data[2])))
-            elif b.loops and node.data[0] in whole and at == tuple(ex.index(loop.index) for loop in b.loops):
-                here = dict(zip(at, node.args, strict=True))
-                own = (ex.substitute(a, here) for a in b.at)
-                terms.append((sign, ex.var(b.name, "bp", *own, order=node.data[2])))
-        return ex.linear(0.0, terms) if terms else node
-
-    def read(root: Node) -> Node:
-        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[1] == "np"]
-        return ex.substitute(root, {n: stores(n) for n in found}) if found else root
-
-    return rewritten(network, read, (*TRACED, "dynamics"))
-
-
-# -- quadratures -------------------------------------------------------------------------------------------
-
-
-def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
-    """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of: a dynamic
-    variable NAME.q each, which begins as the displacement is written to begin.
-    """
-    stores = _stores(network)
-    roots = ex.topological(expressions(network, "observations", "dynamics", "expectations"))
-    wanted = dict.fromkeys((n.data[0], n.data[1]) for n in roots if _is_position(n, stores))
-
-    def read(root: Node) -> Node:
-        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] in wanted]
-        return ex.substitute(root, {n: _quadrature(n.data[0], n.args, n.data[2]) for n in found}) if found else root
-
-    families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
-    for n in network.nodes:
-        loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(n.shape))
-        families[n.name, "nq"] = [(loops, tuple(ex.index(x.index) for x in loops), n.domain, n.place)]
-    for b in network.branches:
-        families.setdefault((b.name, "bq"), []).append((b.loops, b.at, b.domain, b.place))
-    states, dynamics = [], []
-    for name, kind in wanted:
-        for loops, at, domain, place in families[name, kind]:
-            shape = tuple((loop.first, loop.last) for loop in loops)
-            states.append(State(f"{name}.q", shape, domain.displacement, place))
-            dynamics.append(Dynamic(_quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
-    starts = (i for i in network.initials if i.target.op == "var" and i.target.data in {(*w, 0) for w in wanted})
-    begun = (replace(i, target=_quadrature(i.target.data[0], i.target.args)) for i in starts)
-    network = rewritten(network, read, (*TRACED, "dynamics"))
-    found = replace(
-        network,
-        states=(*network.states, *states),
-        dynamics=(*network.dynamics, *dynamics),
-        initials=(*network.initials, *begun),
-    )
-    return found, frozenset(wanted)
-
-
-def massive(network: Network) -> frozenset[str]:
-    """Families of common-flow nodes on each of which a mass stands."""
-    sizes = Sizes(network)
-    found: dict[str, list[Box]] = {}
-    for b in network.branches:
-        alone = b.minus is None or b.minus.node is None
-        if b.kind == "kinetic" and alone and b.plus is not None and b.plus.node is not None:
-            reach = sizes.reach(b.plus.at, ranges_of(b.loops, sizes, b.place), b.place)
-            found.setdefault(b.plus.node, []).append(reach)
-    boxes = {n.name: sizes.box(n.shape, n.place) for n in network.nodes}
-    return frozenset(name for name, holes in found.items() if not without(boxes[name], *holes))
-
-
-def _stores(network: Network) -> frozenset[str]:
-    return frozenset(b.name for b in network.branches if b.kind == "potential")
-
-
-def _is_position(node: Node, stores: frozenset[str]) -> bool:
-    return node.op == "var" and (node.data[1] == "nq" or (node.data[1] == "bq" and node.data[0] not in stores))
-
-
-def _quadrature(name: str, at: Sequence[Node], order: int = 0) -> Node:
-    return ex.var(f"{name}.q", "s", *at, order=order)
-
-
-# -- contents ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +60,7 @@ def _springs(network: Network, wanted: frozenset[Wanted]) -> list[_Join]:
     for b in network.branches:
         stores = b.kind == "potential"
         if b.domain.common == "flow" and b.plus and b.minus and (stores or (b.name, "bq") in wanted):
-            content = ex.var(b.name, "bq", *b.at) if stores else _quadrature(b.name, b.at)
+            content = ex.var(b.name, "bq", *b.at) if stores else quadrature(b.name, b.at)
             found.append(_Join(b.plus, b.minus, content, b.loops, b.place, b))
     return found
 
@@ -209,6 +109,10 @@ class _Points:
         except (ModelError, KeyError):
             return None
 
+    def left(self) -> list[_Join]:
+        """What joins nodes in a pattern that index classes cannot hold."""
+        return [self._joins[link.owner] for link in self.forest.refused]
+
     def loops(self) -> Iterator[tuple[_Join, tuple[Loop, ...], Node]]:
         """Who closes loops, where, and the position of plus over minus that others tell."""
         for owner, box, around in self.forest.loops:
@@ -221,8 +125,8 @@ class _Points:
 def with_contents(network: Network, wanted: frozenset[Wanted]) -> Network:
     """Initial positions as initial displacements between them; wanted: displacements with quadratures."""
     found = _Contents(network, wanted)
-    stores = _stores(network)
-    kept = tuple(i for i in network.initials if not _is_position(i.target, stores))
+    stores = stores_of(network)
+    kept = tuple(i for i in network.initials if not is_position(i.target, stores))
     return replace(network, initials=(*found.guesses(), *kept, *found.loops()))
 
 
@@ -260,10 +164,15 @@ class _Contents:
     def loops(self) -> Iterator[Initial]:
         """Contents around the loops that fixed positions, quadratures and stores close: what they must be."""
         read = [_read(n, self.sizes) for n in self.network.nodes if (n.name, "nq") in self.wanted]
-        for join, loops, around in _Points(self.network, [self.known, read, self.springs]).loops():
+        points = _Points(self.network, [self.known, read, self.springs])
+        told = any((j.branch.name, "bq") in self.said for j in self.springs if j.branch is not None)
+        for j in points.left() if told or self.about else ():
+            (found,) = unrolled("a loop in which contents are said joins nodes along two offsets", j.place).diagnostics
+            raise ModelError([replace(found, help="formulation lagrangian, hamiltonian")])
+        for join, loops, around in points.loops():
             if join.branch is not None:
-                told = not ex.variables(around)
-                target, value = (join.content, around) if told else (ex.sub(join.content, around), ex.const(0.0))
+                known = not ex.variables(around)
+                target, value = (join.content, around) if known else (ex.sub(join.content, around), ex.const(0.0))
                 yield Initial(target, value, True, loops, join.place)
 
     # -- moved guesses --------------------------------------------------------------------------------------
@@ -303,8 +212,7 @@ class _Contents:
             if not cell[0]:
                 return ex.neg(forest.along(cell))
             box = forest.box(cell)
-            within = dict(zip(counters(box), box, strict=True))
-            guess = self._start(Terminal(points.nodes[cell[0] - 1].name, indices(box)), within)
+            guess = self._start(Terminal(points.nodes[cell[0] - 1].name, indices(box)), ranges_over(box))
             weight = UNWRITTEN if guess is None else 1.0
             total, number = forest.summed(cell, ex.sub(guess or ex.const(0.0), forest.along(cell)))
             terms.append((weight, total))
@@ -320,4 +228,4 @@ def _read(node: NodeFamily, sizes: Sizes) -> _Join:
     """Nodes at their quadratures over the ground."""
     box = sizes.box(node.shape, node.place)
     at = indices(box)
-    return _Join(Terminal(node.name, at), _GROUND, _quadrature(node.name, at), loops_over(box), node.place)
+    return _Join(Terminal(node.name, at), _GROUND, quadrature(node.name, at), loops_over(box), node.place)

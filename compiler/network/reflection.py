@@ -6,7 +6,7 @@ and Lagrange's equations of the reflection are the co-Lagrangian equations of th
 
 Signs carry over: a branch a -> b has e = e(a) - e(b) at common-effort and f = f(a) - f(b) at common-flow nodes.
 Energies and contents that are written over nodes and branches become elements first (`stated`).  Displacements
-that no potential store holds, and initial positions: see `positions`.
+that no potential store holds, and initial positions: see `quadratures`, `positions`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
-from sysdyn.compiler.network.positions import from_masses, from_stores, massive, with_contents, with_quadratures
+from sysdyn.compiler.network.positions import from_stores, with_contents
 from sysdyn.compiler.network.primal.reading import KINDS
+from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadratures
 from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as ex

@@ -1,6 +1,6 @@
 """Laws whose branch follows the sign of a switching function: which branch holds from an instant on.
 
-The branch stands in p (compiler/forms/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero.  A
+The branch stands in p (forms/corners/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero.  A
 branch fits where its function has that sign, or is zero and does not move to the other side; where both branches drive
 it back, the law slides between them (Filippov 1988), and leaves by the side whose sense reaches 1.
 """

@@ -7,7 +7,7 @@ from networks import ELECTRICAL, TRANSLATION, Net, compiled, matched, of, poles
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.dead_branches import dead_branches
 from sysdyn.compiler.network.influence import links, reached
-from sysdyn.compiler.network.positions import massive
+from sysdyn.compiler.network.quadratures import massive
 from sysdyn.compiler.network.skeleton import filled, shaped
 from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.ungrounded import grounded

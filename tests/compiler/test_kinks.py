@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from sysdyn.compiler.forms.broken import broken
-from sysdyn.compiler.forms.kinks import JUMPS, KINK, SMOOTH, side, smoothness
+from sysdyn.compiler.forms.corners.broken import broken
+from sysdyn.compiler.forms.corners.kinks import JUMPS, KINK, SMOOTH, side, smoothness
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Table

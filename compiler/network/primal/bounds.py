@@ -84,6 +84,11 @@ def box_holds(outer: Box, inner: Box) -> bool:
     return all(a.holds(b) for a, b in zip(outer, inner, strict=True))
 
 
+def meet(a: Box, b: Box) -> bool:
+    """Whether boxes have elements in common."""
+    return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))
+
+
 def shape_of(box: Box) -> Shape:
     """The box as a family's shape."""
     return tuple((i.first.node, i.last.node) for i in box)

@@ -13,15 +13,24 @@ nothing is said of it.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, shape_of, union, without
+from sysdyn.compiler.network.primal.bounds import Box, Interval, meet, shape_of, union, without
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
-from sysdyn.compiler.network.primal.incidence import PLUS, Element, Incidence, NodeCell, Touch
+from sysdyn.compiler.network.primal.incidence import (
+    PLUS,
+    Element,
+    Incidence,
+    NodeCell,
+    Touch,
+    counters,
+    indices,
+    loops_over,
+    ranges_over,
+)
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.overlaps import initially, inside, ranges_of
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
@@ -39,7 +48,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
-from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Loop, Network, Parameter, State
+from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Network, Parameter, State
 
 TELLING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 """What tells what a store holds: by its law its effort or flow, and its displacement or momentum itself."""
@@ -132,17 +141,16 @@ class Contents:
     ) -> None:
         self.reader = reader
         self.initials = initials
-        joining = [e for e in elements if len(e.ends) == 2]
-        series = [e for e in joining if e.branch.domain.common == "effort"]
-        between = [e for e in joining if e.branch.domain.common == "flow"] if reflected else []
-        between = [e for e in between if e.branch.kind == "potential"]
-        self.looped = in_loops([*(e for e in series if e.branch.kind in ("potential", "effort")), *between])
+        joining = [(e, e.branch.kind, e.branch.domain.common) for e in elements if len(e.ends) == 2]
+        series = [e for e, kind, common in joining if common == "effort" and kind in ("potential", "effort")]
+        between = [e for e, kind, common in joining if reflected and common == "flow" and kind == "potential"]
+        self.looped = in_loops([*series, *between])
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box]]] = {}
         self._leaders: dict[str, list[Member]] = {}
-        self._names: set[str] = set()
+        self._stems: list[str] = []
         self._pinned: set[Node] = set()
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
@@ -165,7 +173,7 @@ class Contents:
 
     def _follower(self, element: Element, members: Sequence[Member]) -> None:
         """The constant of stores in series with others, unless it is zero by the text."""
-        at, whole = _own_indices(element)
+        at, whole = indices(element.named), ranges_over(element.named)
         value: Node = const(0.0)
         for m in members:
             part = dict(zip(whole, m.box, strict=True))
@@ -178,24 +186,24 @@ class Contents:
         """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
         given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
         for e in looped if given else ():
-            self._constant(e, self.start(e.name, *_own_indices(e)) if e.number in given else None)
+            value = self.start(e.name, indices(e.named), ranges_over(e.named))
+            self._constant(e, value if e.number in given else None)
 
     def _constant(self, element: Element, value: Node | None) -> None:
         """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
         if value is not None and is_const(value, 0.0):
             return
-        at, _ = _own_indices(element)
-        stem, place = f"{element.name}.content", element.branch.place
-        name = next(n for k in itertools.count(1) if (n := stem if k == 1 else f"{stem}.{k}") not in self._names)
-        self._names.add(name)
-        unit, shape = element.branch.domain.displacement, shape_of(element.named)
+        box, place = element.named, element.branch.place
+        self._stems.append(f"{element.name}.content")
+        name, number = self._stems[-1], self._stems.count(self._stems[-1])
+        name = name if number == 1 else f"{name}.{number}"
+        unit, shape = element.branch.domain.displacement, shape_of(box)
         self.reader.book.contents[element.number] = name, value is not None
         if value is not None:
-            self.parameters.append(Parameter(name, shape, unit, (value,), tuple(a.data for a in at), place))
-            return
-        loops = tuple(Loop(a.data, low, high) for a, (low, high) in zip(at, shape, strict=True))
-        self.states.append(State(name, shape, unit, place))
-        self.dynamics.append(Dynamic(var(name, "s", *at), const(0.0), loops, place))
+            self.parameters.append(Parameter(name, shape, unit, (value,), counters(box), place))
+        else:
+            self.states.append(State(name, shape, unit, place))
+            self.dynamics.append(Dynamic(var(name, "s", *indices(box)), const(0.0), loops_over(box), place))
 
     def _fixed(self, name: str, box: Box) -> bool:
         """Whether the text fixes the contents of all these elements."""
@@ -220,17 +228,13 @@ class Contents:
                     yield replace(initial, target=target, value=value, loops=loops)
                 elif kind == "class" and target not in self._pinned:
                     self._pinned.update(() if target.args else (target,))
-                    yield replace(initial, target=target, value=value, loops=self._without(loops, target))
+                    own = tuple(loop for loop in loops if index(loop.index) in topological(target.args))
+                    yield replace(initial, target=target, value=value, loops=own)
 
     def _led(self, coordinate: str) -> bool:
         """Whether a statement gives the content of a leader of the coordinate's classes."""
         leaders = self._leaders.get(coordinate, ())
         return any(meet(m.box, box) for m in leaders for _, box in self._given.get(m.element.name, []))
-
-    def _without(self, loops: tuple[Loop, ...], target: Node) -> tuple[Loop, ...]:
-        """The loops that the target still follows."""
-        used = {n.data for n in topological(target.args) if n.op == "index"}
-        return tuple(loop for loop in loops if loop.index in used)
 
     def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
         """Where one piece is read: (pin | class | drop, target, value); class: the coordinate of the store's class."""
@@ -271,13 +275,3 @@ def _led_by(m: Member) -> Box:
     pairs = ((None if k is None else m.box[k], c) for k, c in m.leader_index)
     return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
 
-
-def _own_indices(element: Element) -> tuple[tuple[Node, ...], overlaps.Ranges]:
-    """Loop variables over the indices of its name, and their ranges."""
-    within = {f"#c{k}": interval for k, interval in enumerate(element.named)}
-    return tuple(index(name) for name in within), within
-
-
-def meet(a: Box, b: Box) -> bool:
-    """Whether boxes have elements in common."""
-    return all(x.first.value <= y.last.value and y.first.value <= x.last.value for x, y in zip(a, b, strict=True))

@@ -206,3 +206,8 @@ def indices(box: Box) -> tuple[Node, ...]:
 def loops_over(box: Box) -> tuple[Loop, ...]:
     """The loops over a box."""
     return tuple(Loop(name, i.first.node, i.last.node) for name, i in zip(counters(box), box, strict=True))
+
+
+def ranges_over(box: Box) -> dict[str, Interval]:
+    """The ranges of the loop variables over a box."""
+    return dict(zip(counters(box), box, strict=True))

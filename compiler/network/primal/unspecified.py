@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Box, Sizes
-from sysdyn.compiler.network.primal.contents import TELLING, held_at, meet
+from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
+from sysdyn.compiler.network.primal.contents import TELLING, held_at
 from sysdyn.compiler.network.primal.overlaps import meeting, narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
@@ -48,8 +48,12 @@ def measured(
             for loops, content in _contents(b, part.loops, reader):
                 guess = replace(part, target=content, loops=loops, store=b.name, unit=unit.text)
                 found.append((guess, _owners(_unknowns(content))))
-    shared -= _written(network.energies)
-    kept = tuple(initial for initial, owners in found if owners & shared)
+    written, names = _written(network.energies), set[str]()
+    shared -= written
+    while more := {initial.store for initial, owners in found if owners & shared} - names:
+        names |= more
+        shared |= {owner for initial, owners in found if initial.store in more for owner in owners} - written
+    kept = tuple(initial for initial, _ in found if initial.store in names)
     return kept, frozenset(i.store for i in kept if i.said)
 
 

@@ -15,7 +15,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from sysdyn.compiler.forms.broken import broken
+from sysdyn.compiler.forms.corners.broken import broken
+from sysdyn.compiler.forms.corners.kinks import YES, Surface, surfaces, watched
 from sysdyn.compiler.forms.descriptor import (
     BLOCKS,
     Block,
@@ -26,7 +27,6 @@ from sysdyn.compiler.forms.descriptor import (
     Summand,
     Unknowns,
 )
-from sysdyn.compiler.forms.kinks import YES, Surface, surfaces, watched
 from sysdyn.compiler.forms.steepness import magnitude
 from sysdyn.compiler.model.mirror import lettered
 from sysdyn.dsl.model.expression import (

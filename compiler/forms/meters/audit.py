@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations
 from sysdyn.compiler.forms.efforts import Effort
-from sysdyn.compiler.forms.ledgers import POWERS, STORED, Element, Entry, Ledger, ledgers
+from sysdyn.compiler.forms.meters.ledgers import POWERS, STORED, Element, Entry, Ledger, ledgers
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.magnitudes import rounding
 from sysdyn.compiler.model.terms import Term, counter, local_variables

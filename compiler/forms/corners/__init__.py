@@ -1,0 +1,1 @@
+"""Laws with corners: where they change, and their branches as parameters that events set."""

@@ -1,0 +1,1 @@
+"""What a run writes down beside its unknowns: the energy audit, its ledgers, and what is traced."""

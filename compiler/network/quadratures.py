@@ -1,0 +1,113 @@
+"""Displacements that no potential store of the complementary family holds: quadratures q' = f of what is read.
+
+Where a displacement is traced that has no place there, its quadrature is added as a dynamic variable NAME.q; momenta of
+points are those of the kinetic stores that move with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from sysdyn.compiler.network.primal.bounds import Box, Sizes, without
+from sysdyn.compiler.network.primal.overlaps import ranges_of
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Loop, Network, State
+from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
+from sysdyn.dsl.text.diagnostics import Place
+
+Wanted = tuple[str, str]
+"""Name and kind (nq, bq) of a displacement."""
+
+
+def from_masses(network: Network) -> Network:
+    """Momenta of points, and their rates, as those of the kinetic stores that move with them."""
+    whole = massive(network)
+    held: dict[str, list[tuple[float, Branch, tuple[Node, ...]]]] = {}
+    for b in network.branches:
+        for terminal, sign in ((b.plus, 1.0), (b.minus, -1.0)):
+            if b.kind == "kinetic" and terminal is not None and terminal.node is not None:
+                held.setdefault(terminal.node, []).append((sign, b, terminal.at))
+
+    def stores(node: Node) -> Node:
+        """A store stands at all points of a family, or at one of them."""
+        terms = []
+        for sign, b, at in held.get(node.data[0], ()):
+            if not b.loops and at == node.args:
+                terms.append((sign, ex.var(b.name, "bp", *b.at, order=node.data[2])))
+            elif b.loops and node.data[0] in whole and at == tuple(ex.index(loop.index) for loop in b.loops):
+                here = dict(zip(at, node.args, strict=True))
+                own = (ex.substitute(a, here) for a in b.at)
+                terms.append((sign, ex.var(b.name, "bp", *own, order=node.data[2])))
+        return ex.linear(0.0, terms) if terms else node
+
+    def read(root: Node) -> Node:
+        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[1] == "np"]
+        return ex.substitute(root, {n: stores(n) for n in found}) if found else root
+
+    return rewritten(network, read, (*TRACED, "dynamics"))
+
+
+def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
+    """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of: a dynamic
+    variable NAME.q each, which begins as the displacement is written to begin.
+    """
+    stores = stores_of(network)
+    roots = ex.topological(expressions(network, "observations", "dynamics", "expectations"))
+    wanted = dict.fromkeys((n.data[0], n.data[1]) for n in roots if is_position(n, stores))
+
+    def read(root: Node) -> Node:
+        found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] in wanted]
+        return ex.substitute(root, {n: quadrature(n.data[0], n.args, n.data[2]) for n in found}) if found else root
+
+    families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
+    for n in network.nodes:
+        loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(n.shape))
+        families[n.name, "nq"] = [(loops, tuple(ex.index(x.index) for x in loops), n.domain, n.place)]
+    for b in network.branches:
+        families.setdefault((b.name, "bq"), []).append((b.loops, b.at, b.domain, b.place))
+    states, dynamics = [], []
+    for name, kind in wanted:
+        for loops, at, domain, place in families[name, kind]:
+            shape = tuple((loop.first, loop.last) for loop in loops)
+            states.append(State(f"{name}.q", shape, domain.displacement, place))
+            dynamics.append(Dynamic(quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
+    starts = (i for i in network.initials if i.target.op == "var" and i.target.data in {(*w, 0) for w in wanted})
+    begun = (replace(i, target=quadrature(i.target.data[0], i.target.args)) for i in starts)
+    network = rewritten(network, read, (*TRACED, "dynamics"))
+    found = replace(
+        network,
+        states=(*network.states, *states),
+        dynamics=(*network.dynamics, *dynamics),
+        initials=(*network.initials, *begun),
+    )
+    return found, frozenset(wanted)
+
+
+def massive(network: Network) -> frozenset[str]:
+    """Families of common-flow nodes on each of which a mass stands."""
+    sizes = Sizes(network)
+    found: dict[str, list[Box]] = {}
+    for b in network.branches:
+        alone = b.minus is None or b.minus.node is None
+        if b.kind == "kinetic" and alone and b.plus is not None and b.plus.node is not None:
+            reach = sizes.reach(b.plus.at, ranges_of(b.loops, sizes, b.place), b.place)
+            found.setdefault(b.plus.node, []).append(reach)
+    boxes = {n.name: sizes.box(n.shape, n.place) for n in network.nodes}
+    return frozenset(name for name, holes in found.items() if not without(boxes[name], *holes))
+
+
+def stores_of(network: Network) -> frozenset[str]:
+    """Potential stores, which hold their displacements."""
+    return frozenset(b.name for b in network.branches if b.kind == "potential")
+
+
+def is_position(node: Node, stores: frozenset[str]) -> bool:
+    """Whether it reads a displacement that no potential store holds."""
+    return node.op == "var" and (node.data[1] == "nq" or (node.data[1] == "bq" and node.data[0] not in stores))
+
+
+def quadrature(name: str, at: Sequence[Node], order: int = 0) -> Node:
+    """The dynamic variable that a displacement without a store is."""
+    return ex.var(f"{name}.q", "s", *at, order=order)
