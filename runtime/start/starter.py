@@ -328,8 +328,8 @@ class Starter:
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:
-        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; generous: the
-        largest (rates of fast and slow stores 1e12 apart).
+        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
+        (rates of fast and slow stores 1e12 apart) where generous.
         """
         known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)

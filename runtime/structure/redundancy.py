@@ -141,9 +141,9 @@ def _sparse_dependent(found: Reactions) -> Ints:
     column: those are independent.
     """
     m, n = found.multipliers.size, found.rows.size
-    places = found.which.astype(np.int32), found.place.astype(np.int32), found.value
-    peeled = np.zeros(m, dtype=np.int32)
-    left = lib.core.sd_peel(m, n, found.which.size, *map(lib.pointer, places), PIVOT, lib.pointer(peeled))
+    entries = found.which.astype(np.int32), found.place.astype(np.int32), found.value
+    arrays, peeled = [lib.pointer(item) for item in entries], np.zeros(m, dtype=np.int32)
+    left = lib.core.sd_peel(m, n, found.which.size, *arrays, PIVOT, lib.pointer(peeled))
     if left < 0:
         raise MemoryError
     if not left:
