@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import tall_order
 from sysdyn.runtime.numerics.points import uniform
 from sysdyn.values import dataclass
@@ -22,6 +23,8 @@ PIVOT = 1e-8
 """Least pivot, as part of its column, of an unknown that rows determine; with less the least norm has a say."""
 FILLED = 12
 """Entries of factors for one of the matrix from which those of the saddle point are no worse."""
+OPEN = 1e-6
+"""Of a unit vector: a part of it that is open."""
 MEMORY = 2
 """What the core answers where it has none."""
 
@@ -99,3 +102,11 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     whole[columns.used] = found
     whole /= max(np.abs(whole).max(initial=0.0), 1e-300)
     return whole
+
+
+def free_unknowns(shape: tuple[int, int], entries: Entries) -> NDArray[np.bool_] | None:
+    """Unknowns that rows of any size leave open; None where that would cost too much."""
+    i, j, v = entries
+    row, column = sparse_factors(i, j, np.abs(v), shape)
+    free = left_open(shape, (i, j, v * row[i] * column[j]))
+    return None if free is None else np.abs(free) > OPEN

@@ -69,14 +69,10 @@ class Impulses:
         acts = self._impulse.copy()
         acts[self.system.held[1]] = False
         number = np.cumsum(use) - 1
+        balance, moving = self._balance[self._rows], self._moving[self._columns]
         for _ in range(_ITERATIONS):
             jy, jyd = self.system.jacobian(t, y, yd)
-            balance = self._balance[self._rows]
-            value = np.where(
-                balance,
-                np.where(acts[self._columns], jy, np.where(self._moving[self._columns], jyd, 0.0)),
-                np.where(self._moving[self._columns], jy, 0.0),
-            )
+            value = np.where(moving, np.where(balance, jyd, jy), np.where(balance & acts[self._columns], jy, 0.0))
             value = np.where(use[self._rows] & np.isfinite(value), value, 0.0)
             r = self.system.residual(t, y, yd)
             if aims is not None:
@@ -129,20 +125,15 @@ class Impulses:
         return np.where((self.system.kinds == "e") & (steepest == 0.0), y + magnitude, y)
 
     def _solve(self, value: Floats, aim: Floats, number: NDArray[np.int64], magnitude: Floats) -> Floats:
-        """Least change of the columns that take part."""
+        """Least change [unknowns] of those that take part, in magnitudes; impulses in what they act on."""
         take = value != 0.0
-        columns = np.unique(self._columns[take])
-        if not columns.size:
-            return np.zeros(self.system.unknowns)
-        place = np.searchsorted(columns, self._columns[take])
-        scale = np.where(self._impulse, 1.0, magnitude)[columns]
-        v = value[take] * scale[place]
-        largest = np.zeros(columns.size)
-        np.maximum.at(largest, place, np.abs(v))
-        own = self._impulse[columns]
-        shrink = np.where(own & (largest > 0.0), 1.0 / np.where(largest > 0.0, largest, 1.0), 1.0)
-        shape = aim.size, columns.size
-        found = least_norm(shape, (number[self._rows[take]], place, v * shrink[place]), aim)
+        columns, place = np.unique(self._columns[take], return_inverse=True)
         step = np.zeros(self.system.unknowns)
-        step[columns] = found * scale * shrink
+        if not columns.size:
+            return step
+        most = np.zeros(columns.size)
+        np.maximum.at(most, place, np.abs(value[take]))
+        scale = np.where(self._impulse[columns], 1.0 / most, magnitude[columns])
+        entries = number[self._rows[take]], place, value[take] * scale[place]
+        step[columns] = scale * least_norm((aim.size, columns.size), entries, aim)
         return step

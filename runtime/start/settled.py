@@ -17,16 +17,13 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import column_order, tall_order
-from sysdyn.runtime.numerics.tall import left_open
+from sysdyn.runtime.numerics.tall import free_unknowns
 
 LARGE = 100_000
 """Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
-OPEN = 1e-6
-"""Of a unit vector: a part of it that is open."""
 RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
 HELD = 1e8
 """Weight (of squares) of a state that moves only where the rows leave nothing else."""
@@ -94,11 +91,8 @@ def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray
     v = np.concatenate([jy[free], jyd[rated]])
     if not np.isfinite(v).all():
         return True
-    shape = settled.rows, n + rates.size
-    row, column = sparse_factors(i, j, np.abs(v), shape)
-    open_ = left_open(shape, (i, j, v * row[i] * column[j]))
-    flow = (settled.kinds == "f") & ~state
-    return open_ is None or bool((np.abs(open_[:n][flow]) > OPEN).any())
+    open_ = free_unknowns((settled.rows, n + rates.size), (i, j, v))
+    return open_ is None or bool(open_[:n][(settled.kinds == "f") & ~state].any())
 
 
 class Settler:

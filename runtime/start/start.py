@@ -44,7 +44,7 @@ BACK = 1e-10
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
 EXPLAINED = 0.1
-"""Share of the work of a search that what comes after may take: steadying what was found, explaining what was not."""
+"""Share of the work of a search that explaining what was not found may take."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,28 +104,18 @@ def _rescaled(
     in the magnitudes of the solution too.
     """
     at, best = x, Solution(x, np.inf, np.zeros(0))
-    empty = None
     for k in range(_RESCALINGS):
         if k and starter.work.done:
             break
-        scale = starter.scale(t, at)
-        found = solve(problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least), best.x)
-        if empty is not None and found.residual >= EXACT and not found.residual < best.residual:
-            if at is empty:
-                break
-            at = empty
-            continue
-        best = found
+        problem = problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least)
+        best = solve(problem, best.x)
         if not np.isfinite(best.residual):
             break
-        at = starter.without_noise(best.x, scale)
-        # what is far below its magnitude may be zero, which has none of its own
-        empty = np.where(free & (np.abs(at) < OWN * scale), 0.0, at)
-        for candidate in (at, empty) if best.residual < EXACT else ():
-            if _own(starter, t, candidate, candidate) < OWN:
-                return Solution(candidate, best.residual, best.scaled), True
-            if candidate is at and _own(starter, t, at, best.x) < OWN:
-                return best, True
+        at = starter.without_noise(best.x, problem.scale)
+        if best.residual < EXACT:
+            clean = next((c for c in (at, best.x) if _own(starter, t, at, c) < OWN), None)
+            if clean is not None:
+                return replace(best, x=clean), True
     return best, False
 
 
@@ -170,32 +160,12 @@ def _anew(
     near = stepped(problem_of(starter, t, there, guess, rows=starter.every, free=free, least=True), there)
     largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
-    near = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
-    found, holds = _rescaled(starter, t, np.where(state, near, x), guess, free & ~state, least=False)
-    return (found, True) if holds else (best, False)
-
-
-def _closed(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
-    """The nearest point to a solution on which rows that it misses by more than round-off hold: a guess rounded to ten
-    digits satisfies rows as far as a search asks, and a stiff model pays for the rest with its first step.
-    """
-    if best.residual <= CLOSED:
-        return best
-    found = solve(problem_of(starter, t, best.x, best.x, rows=starter.every, free=free, least=True), best.x)
-    if not found.residual < best.residual:
-        return best
-    stays = np.abs(found.x - best.x) <= NOISE * starter.largest_alike(best.x)
-    clean = _without_noise(starter, t, np.where(stays, best.x, found.x), best.x, free)
-    return best if clean is None else replace(found, x=clean)
-
-
-def _without_noise(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats | None:
-    """A solution with zeros where it is round-off of the magnitudes that the guesses make, or of what is alike; or as
-    it is.  The first that holds in its own magnitudes; None where none does.
-    """
-    z = starter.without_noise(x, starter.scale(t, x))
-    empty = np.where(free & (np.abs(z) < NOISE * starter.scale(t, guess)), 0.0, z)
-    return next((c for c in (empty, z, x) if _own(starter, t, c, c) < OWN), None)
+    back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
+    for moved in (back, near):
+        found, holds = _rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
+        if holds and found.residual <= max(CLOSED, best.residual):
+            return found, True
+    return best, False
 
 
 Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool]]
@@ -203,9 +173,14 @@ Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool
 
 
 def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """What follows from the state alone, by Newton's method; where that is not enough everything, the least first."""
+    """What follows from the state alone, by Newton's method; where that is not enough everything, the least first: a
+    guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
+    """
     found, holds = _rescaled(starter, t, x, guess, free & starter.following(t, x), least=False)
-    return (found, holds) if holds else _rescaled(starter, t, x, guess, free)
+    if holds and found.residual <= CLOSED:
+        return found, holds
+    best, also = _rescaled(starter, t, x, guess, free)
+    return (best, also) if also >= holds else (found, holds)
 
 
 def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -381,8 +356,6 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     best, strategy = _attempt(starter, t0, guess, free)
     if not strategy:
         raise _explain(starter, t0, guess, free, best)
-    starter.work = Work(EXPLAINED, until)
-    best = _closed(starter, t0, best, free)
     y, yd = starter.expand(best.x)
     moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
     if best.x.size > LARGE:

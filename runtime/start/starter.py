@@ -90,7 +90,7 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        here = t, x.tobytes()
+        here = t, self.generous, x.tobytes()
         if here != self.here:
             self.here = here
             self.known.clear()
@@ -113,7 +113,7 @@ class Starter:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.here, self.known = (0.0, b""), dict[str, NDArray[Any]]()
+        self.here, self.known = (0.0, False, b""), dict[str, NDArray[Any]]()
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
@@ -328,15 +328,9 @@ class Starter:
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:
-        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes."""
-        return self._scale(t, x, largest=False)
-
-    @remembered
-    def largest(self, t: float, x: Floats) -> Floats:
-        """The same by the largest that a row proposes (rates of fast and slow stores 1e12 apart)."""
-        return self._scale(t, x, largest=True)
-
-    def _scale(self, t: float, x: Floats, *, largest: bool) -> Floats:
+        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
+        (rates of fast and slow stores 1e12 apart) where generous.
+        """
         known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self.residual(t, x)
@@ -344,7 +338,7 @@ class Starter:
         sized = values - told
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
-        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * largest, lib.pointer(found)
+        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * self.generous, lib.pointer(found)
         if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
         return self._of_one_unit(np.abs(told), found) if self.missed.size else found
@@ -367,7 +361,7 @@ def problem_of(
 
     least: the state moves least in the order of what is said of it, however much what follows has to; else by weights.
     """
-    scale = starter.largest(t, x) if starter.generous else starter.scale(t, x)
+    scale = starter.scale(t, x)
     levels: tuple[Mask, ...] = ()
     if least:
         state = free & ~starter.following(t, x)

@@ -15,9 +15,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import sparse_factors
-from sysdyn.runtime.numerics.tall import left_open
-from sysdyn.runtime.start.settled import OPEN
+from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.start.start import ConsistentState
 
 MOVED = 1e-3
@@ -33,10 +31,8 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     found[column] = True
     if (np.bincount(row, minlength=1) <= 1).all():  # each determines its own
         return found
-    shape = system.rows, system.unknowns
-    by_row, by_column = sparse_factors(row, column, np.abs(value), shape)
-    free = left_open(shape, (row, column, by_row[row] * value * by_column[column]))
-    return found if free is None else found & (np.abs(free) <= OPEN)
+    free = free_unknowns((system.rows, system.unknowns), (row, column, value))
+    return found if free is None else found & ~free
 
 
 def _read(system: System) -> NDArray[np.bool_]:

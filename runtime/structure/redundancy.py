@@ -123,50 +123,40 @@ def dependent(found: Reactions) -> Ints:
         return NONE
     if found.large:
         return _sparse_dependent(found)
-    basis = np.zeros((0, found.rows.size))
-    left = []
+    basis, left = np.zeros((0, found.rows.size)), []
     for k, row in enumerate(found.full()):
-        size = float(np.linalg.norm(row))
-        rest = row
-        for _ in range(2):  # twice is enough (Kahan)
-            rest = rest - basis.T @ (basis @ rest)
-        # a row depends on those kept before it where next to nothing of it lies outside them
-        if float(np.linalg.norm(rest)) <= TOLERANCE * size or size == 0.0:
+        outside = row - basis.T @ (basis @ row)
+        outside -= basis.T @ (basis @ outside)  # twice is enough (Kahan)
+        size = float(np.linalg.norm(outside))
+        if size <= TOLERANCE * float(np.linalg.norm(row)):  # next to nothing lies outside those kept before it
             left.append(k)
         else:
-            basis = np.vstack([basis, rest / np.linalg.norm(rest)])
+            basis = np.vstack([basis, outside / size])
     return np.asarray(left, dtype=np.int32)
 
 
 def _sparse_dependent(found: Reactions) -> Ints:
     """The same from the pivots of [I J^T; J -eps]: those of the order of eps.  In any order they count the dependent
-    rows; eliminated in the order written they name them.
+    rows; eliminated in the order written they name them.  Not asked where every row in its turn alone stands in some
+    column: those are independent.
     """
-    if not _left(found):
+    m, n = found.multipliers.size, found.rows.size
+    entries = found.which.astype(np.int32), found.place.astype(np.int32), found.value
+    arrays, peeled = [lib.pointer(item) for item in entries], np.zeros(m, dtype=np.int32)
+    left = lib.core.sd_peel(m, n, found.which.size, *arrays, PIVOT, lib.pointer(peeled))
+    if left < 0:
+        raise MemoryError
+    if not left:
         return NONE
     from scipy.sparse import block_array, csc_array, eye_array
     from scipy.sparse.linalg import splu
 
-    m, n = found.multipliers.size, found.rows.size
     j = csc_array((found.value, (found.which, found.place)), shape=(m, n))
     matrix = block_array([[eye_array(n), j.T], [j, -_EPS * eye_array(m)]], format="csc")
-    pivots = np.abs(splu(matrix, permc_spec="COLAMD").U.diagonal())
-    if not (pivots < 1e3 * _EPS).any():
+    if not (np.abs(splu(matrix, permc_spec="COLAMD").U.diagonal()) < 1e3 * _EPS).any():
         return NONE
     lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.flatnonzero(np.abs(lu.U.diagonal())[n:] < 1e3 * _EPS).astype(np.int32)
-
-
-def _left(found: Reactions) -> int:
-    """How many rows of J are left when those are taken away that alone stand in some column: they are independent."""
-    m, n = found.multipliers.size, found.rows.size
-    which, place = found.which.astype(np.int32), found.place.astype(np.int32)
-    arrays = lib.pointer(which), lib.pointer(place), lib.pointer(found.value)
-    peeled = np.zeros(m, dtype=np.int32)
-    left = int(lib.core.sd_peel(m, n, which.size, *arrays, PIVOT, lib.pointer(peeled)))
-    if left < 0:
-        raise MemoryError
-    return left
 
 
 def _moves(system: System, state: ConsistentState) -> tuple[Floats, Floats]:
@@ -180,12 +170,11 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     starter, found = Starter(system), []
     x = starter.unknowns(state.t, state.y, state.yd)
     size, moves = _moves(system, state)
+    rows, free = starter.groups("phi"), starter.moves(("q",))
     for move in moves:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * np.append(move, np.zeros(x.size - move.size))
-            rows, free = starter.groups("phi"), starter.moves(("q",))
-            problem = problem_of(starter, state.t, shaken, shaken, rows=rows, free=free)
-            there = solve(problem, shaken)
+            there = solve(problem_of(starter, state.t, shaken, shaken, rows=rows, free=free), shaken)
             near = np.abs(there.x - x)[: size.size] <= NEAR * amplitude * size
             if there.residual < EXACT and near.all():
                 found.append(there.x[: starter.n])
@@ -220,9 +209,5 @@ def combination(found: Reactions, left: Ints) -> Floats:
     if not left.size or found.large:
         return np.zeros(0)
     rows, last = found.full(), int(left[0])
-    weights = np.zeros(len(rows))
-    weights[:last] = -least_squares(rows[:last].T, rows[last])
-    weights[last] = 1.0
-    weights *= found.scale
-    weights /= weights[np.argmax(np.abs(weights))]
-    return weights
+    weights = np.append(-least_squares(rows[:last].T, rows[last]), np.eye(1, len(rows) - last)) * found.scale
+    return np.asarray(weights / weights[np.argmax(np.abs(weights))])

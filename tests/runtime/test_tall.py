@@ -6,7 +6,7 @@ from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.numerics import least_change
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.ordering import neighbours, paired_order
-from sysdyn.runtime.numerics.tall import determined, left_open
+from sysdyn.runtime.numerics.tall import determined, free_unknowns, left_open
 
 N = 400
 
@@ -147,3 +147,11 @@ def _filled(n, pairs, order):
             beside[a] |= others
             beside[a] -= {a, k}
     return count
+
+
+def test_what_is_free_does_not_depend_on_units():
+    """Differences of three in rows and columns of sizes 1e12 apart, the last unknown fixed by a row of its own."""
+    rows, columns, values = np.array([0, 0, 1, 1, 2]), np.array([0, 1, 1, 2, 3]), np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+    of_row, of_column = np.array([1e12, 1.0, 1e-12]), np.array([1.0, 1e9, 1e-9, 1.0])
+    entries = rows, columns, values * of_row[rows] * of_column[columns]
+    assert free_unknowns((4, 4), entries).tolist() == [True, True, True, False]

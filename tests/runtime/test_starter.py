@@ -1,0 +1,132 @@
+"""What a start is sought in, its rows and magnitudes, and rows that depend on each other: against closed forms."""
+
+import numpy as np
+import pytest
+import small_models as models
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.equations import pairs
+from sysdyn.runtime.start.settled import inertial_rows, rates_of
+from sysdyn.runtime.start.starter import Starter, problem_of
+from sysdyn.runtime.structure.redundancy import DENSE, Reactions, combination, dependent
+
+PENDULUM = {"q_1": (3.0, True), "q_2": (-4.0, False), "f_1": (0.0, False), "f_2": (0.0, False)}
+
+
+def starter(**more):
+    """A point of 2 kg on a rod of 5 m, written in Cartesian coordinates."""
+    made = models.small(
+        "1 2", "f_1**2 + f_2**2", "2*9.81*q_2", phi={"rod": "q_1**2 + q_2**2 - 25"}, initial=PENDULUM, **more
+    )
+    manifest, binding, module = made
+    return Starter(System(manifest, binding, load(module)))
+
+
+def by_name(found, values):
+    """Values of the unknowns of y by their names."""
+    return dict(zip(found.system.unknown_names, values, strict=False))
+
+
+def test_unknowns_are_those_of_y_and_the_rates_that_rows_read():
+    found = starter()
+    names = found.system.unknown_names
+    assert [names[k] for k in found.rates] == [names[k] for k in rates_of(found.settled)]
+    assert {"f_1", "f_2"} <= {names[k] for k in found.rates}
+    y = np.arange(1.0, found.n + 1.0)
+    yd = np.zeros(found.n)
+    yd[found.rates] = 10.0 + np.arange(found.rates.size)
+    form = found.system.form
+    yd[form.k_q] = y[form.k_f]  # rates of displacements are the flows
+    for one, other in zip(found.expand(found.unknowns(0.0, y, yd)), (y, yd), strict=True):
+        assert (one == other).all()
+
+
+def test_rows_hold_the_constraint_and_its_derivatives():
+    """At (3, -4) with flow (4, 3) the rod is met and not stretched; its acceleration asks for f'.q = -25."""
+    found = starter()
+    names = found.system.unknown_names
+    y, yd = np.zeros(found.n), np.zeros(found.n)
+    for name, value in {"q_1": 3.0, "q_2": -4.0, "f_1": 4.0, "f_2": 3.0}.items():
+        y[names.index(name)] = value
+    x = found.unknowns(0.0, y, yd)
+
+    def at(group):
+        return found.residual(0.0, x)[found.groups(group)]
+
+    assert at("phi") == pytest.approx([0.0])
+    assert at("phi_rate") == pytest.approx([0.0])
+    still = float(at("phi_acceleration")[0])
+    x[found.n + list(found.rates).index(names.index("f_1"))] = -25.0 / 3.0
+    assert at("phi_acceleration") == pytest.approx([0.0], abs=1e-12)
+    assert abs(still) == pytest.approx(50.0)
+
+
+def test_what_carries_inertia_is_state_and_the_tension_follows():
+    found = starter()
+    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
+    follows = by_name(found, found.following(0.0, x))
+    assert {name for name, yes in follows.items() if not yes} == {"q_1", "q_2", "f_1", "f_2"}
+    assert not found.idle.any()
+    assert by_name(found, found.given.fixed)["q_1"]
+
+
+def test_momenta_are_paired_with_their_flows_and_flows_weigh_by_them():
+    found = starter(form="hamiltonian")
+    momenta, flows = pairs(found.system)
+    names = found.system.unknown_names
+    assert [(names[p], names[f]) for p, f in zip(momenta, flows, strict=True)] == [("p_1", "f_1"), ("p_2", "f_2")]
+    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
+    scale = np.ones(x.size)
+    weight = by_name(found, found.weights(0.0, x, scale))
+    # of 2 kg a flow of 1 m/s holds 2 N s, twice what a momentum of 1 N s does
+    assert weight["f_1"] == pytest.approx(weight["f_2"])
+    assert found.measures[momenta[0]] == found.measures[flows[0]]
+    assert inertial_rows(found.settled).any()
+
+
+def test_magnitudes_of_what_is_zero_balance_their_rows():
+    """No tension is guessed: in magnitudes of its own the weight of 19.62 N is what q_2 times it has to balance."""
+    found = starter()
+    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
+    scale = by_name(found, found.scale(0.0, x))
+    assert scale["q_1"] == 3.0
+    assert scale["q_2"] == 4.0
+    assert scale["kappa_rod"] == pytest.approx(2.0 * 9.81 / 8.0)
+
+
+def test_the_written_state_moves_before_what_is_unsaid():
+    """Levels: what the text says of the state, what it does not, what holds nothing; fixed unknowns are in none."""
+    found = starter()
+    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
+    free = np.append(~found.given.fixed, np.ones(x.size - found.n, dtype=bool))
+    problem = problem_of(found, 0.0, x, x, rows=found.every, free=free, least=True)
+    written, unsaid, idle = (by_name(found, level) for level in problem.levels)
+    assert {name for name, yes in written.items() if yes} == {"q_2", "f_1", "f_2"}
+    assert not any(unsaid.values())
+    assert not any(idle.values())
+
+
+def reactions(matrix, multipliers=None):
+    """J as the equations give it, with some more empty columns where it shall be large."""
+    j = np.asarray(matrix, dtype=float)
+    which, place = np.nonzero(j)
+    columns = max(j.shape[1], multipliers or 0)
+    return Reactions(which, place, j[which, place], np.arange(len(j)), np.arange(columns), np.ones(len(j)))
+
+
+ROWS = [[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [1.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]
+"""The third is the first less the second; the fourth is empty."""
+
+
+@pytest.mark.parametrize("columns", [None, 4 * DENSE + 1])
+def test_rows_that_depend_on_those_before_them_are_named(columns):
+    found = reactions(ROWS, columns)
+    assert found.large == (columns is not None)
+    assert dependent(found).tolist() == [2, 3]
+    assert dependent(reactions(ROWS[:2] + ROWS[4:], columns)).tolist() == []
+
+
+def test_the_combination_that_vanishes():
+    weights = combination(reactions(ROWS), np.array([2, 3]))
+    assert weights / weights[0] == pytest.approx([1.0, -1.0, -1.0, 0.0, 0.0])
+    assert combination(reactions(ROWS, 4 * DENSE + 1), np.array([2])).size == 0
