@@ -110,8 +110,8 @@ class _Points:
             return None
 
     def left(self) -> list[_Join]:
-        """What joins nodes in a pattern that index classes cannot hold."""
-        return [self._joins[link.owner] for link in self.forest.refused]
+        """What closes loops in a pattern that index classes cannot hold."""
+        return [self._joins[link.owner] for link in self.forest.refused] if self.forest.misses_loops() else []
 
     def loops(self) -> Iterator[tuple[_Join, tuple[Loop, ...], Node]]:
         """Who closes loops, where, and the position of plus over minus that others tell."""

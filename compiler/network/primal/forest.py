@@ -27,6 +27,7 @@ from sysdyn.compiler.network.primal.index_classes import (
     foremost_way,
 )
 from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, reduction, sub, substitute
+from sysdyn.dsl.model.joined import Joined
 
 Stage = Sequence[tuple[Link, Node]]
 Ends = tuple[Cell, Cell]
@@ -45,9 +46,10 @@ class IndexForest(IndexClasses):
         self._over: dict[Cell, tuple[Cell, Node]] = {}
         self._contents = {link.owner: content for stage in stages for link, content in stage}
         self._stages = {link.owner: k for k, stage in enumerate(stages) for link, _ in stage}
-        self._left: list[tuple[Link, Box]] = []
+        self._left: list[tuple[Link, tuple[Option, ...], Box]] = []
         self._serial = itertools.count(1)
-        super().__init__(items, [link for stage in stages for link, _ in stage], cuts)
+        self._links = [link for stage in stages for link, _ in stage]
+        super().__init__(items, self._links, cuts)
 
     def trees(self) -> list[list[Cell]]:
         """The cells of each tree that joins any."""
@@ -114,12 +116,16 @@ class IndexForest(IndexClasses):
                 for link, choice in applied:
                     if foremost_way(choice) == way:
                         self._tie(link, choice)
-        self.refused = [link for link, box in (*refused, *self._left) if not self._closed(link, box)]
+            again, self._left = self._left, []  # others may have joined the trees of its ends meanwhile
+            for link, choice, _ in again:
+                self._tie(link, choice)
+        left = [(link, box) for link, _, box in self._left]
+        self.refused = [link for link, box in (*refused, *left) if not self._closed(link, box)]
 
-    def _tie(self, link: Link, choice: Sequence[Option]) -> None:
+    def _tie(self, link: Link, choice: tuple[Option, ...]) -> None:
         """Hang one tree at the other, lay a run, or close loops."""
         box = tuple(self._range(link, k, option) for k, option in enumerate(choice))
-        ends = self._ends(link, tuple(choice))
+        ends = self._ends(link, choice)
         one, other = (self._open(end, cell) for end, cell in zip((link.a, link.b), ends, strict=True))
         if self._root(ends[0]) == self._root(ends[1]):
             runs = [k for k in one if k is not None and choice[k].how == "self"]
@@ -128,7 +134,7 @@ class IndexForest(IndexClasses):
             elif one.keys() == other.keys() and not runs:
                 self._close(link, box, ends)
             else:
-                self._left.append((link, box))
+                self._left.append((link, choice, box))
             return
         moving = {k for k, i in enumerate(box) if i.size > 1}
         whole = all(
@@ -141,7 +147,7 @@ class IndexForest(IndexClasses):
         elif whole and not (moving - other.keys()) & one.keys():
             self._join_trees(link, box, ends, 1, other)
         else:
-            self._left.append((link, box))
+            self._left.append((link, choice, box))
 
     def _range(self, link: Link, k: int, option: Option) -> Interval:
         """The values of a link index in one place."""
@@ -211,6 +217,17 @@ class IndexForest(IndexClasses):
                 left -= box_size(here)
                 self._close(link, here, ends)
         return left == 0
+
+    def misses_loops(self) -> bool:
+        """Whether links that were refused close loops; only where there are any are the elements counted."""
+        if not self.refused:
+            return False
+        joined, closed = Joined[tuple[int, ...]](), 0
+        for link in self._links:
+            for k in itertools.product(*(range(i.first.value, i.last.value + 1) for i in link.box)):
+                at = ([(0 if d is None else k[d]) + c.value for d, c in end.at] for end in (link.a, link.b))
+                closed += not joined.join((link.a.item, *next(at)), (link.b.item, *next(at)))
+        return closed > sum(box_size(box) for _, box, _ in self.loops)
 
     def _between(self, link: Link, box: Box, ends: Ends) -> Box:
         """The link indices at which its ends lie in these cells."""
