@@ -92,7 +92,7 @@ class Elaborator(Instances):
         except NotYetError as early:
             self.postpone(early, partial(self._resolve, pending))
         except Failed:
-            self.left_out = True
+            return
 
     def statements(self) -> None:
         """Resolve what the model and its instances say: constraints first, which others may read."""
@@ -144,4 +144,4 @@ class Elaborator(Instances):
                         if not symbol.at and symbol.dimension is not None:
                             self._speed(symbol, value.node, symbol.dimension)
                 except Failed:
-                    self.left_out = True
+                    continue

@@ -113,7 +113,6 @@ class ElaborationContext:
         self.resolver.branches = self.parts.branches
         self.scope = Scope()
         self.current = Space("", self.scope, self.scope, self.resolver.source)
-        self.left_out = False
         self._postponed: list[tuple[Space, NotYetError, Callable[[], None]]] = []
 
     def entering(self, space: Space) -> _Entered:
@@ -132,7 +131,6 @@ class ElaborationContext:
             except NotYetError as early:
                 self.postpone(early, partial(self.each, [(statement, loops)], do))
             except Failed:  # what it would have declared is not reported again where it is used
-                self.left_out = True
                 for decl in declared(statement):
                     if decl.name not in self.scope.symbols:
                         self.scope.broken.add(decl.name)

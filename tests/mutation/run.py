@@ -69,7 +69,6 @@ EQUIVALENT = (
     ("forms/momenta.py", "inertial", "found.add(", _CARRIERS),
     ("forms/lowering.py", "_massless", "for function, kind in", "the start leaves out the rows that have inertia"),
     ("forms/lowering.py", "_massless", "found.update(", "the start leaves out the rows that have inertia"),
-    ("network/positions.py", "read", "over_ground(", "a quadrature takes its place"),
     ("forms/momenta.py", "undefined", "yield ", _TEXT),
     ("forms/integration.py", "_touches", "", _INTEGRATED),
     ("forms/integration.py", "_exact", "flows = ", _INTEGRATED),
