@@ -385,7 +385,8 @@ class Handler:
         """
         values, zero = self.observer(t, *point), self.observer.zero
         contacts = [self.contacts.contacts[k] for k in touched]
-        slips = [c for k, c in enumerate(self.contacts.contacts) if c.kind == "friction" and not self.contacts.active[k]]
+        stick = self.contacts.active
+        slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
         idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)
         return idle or any(c.kind != "phi" or abs(values[c.rate]) <= zero(c.rate) for c in contacts)
 

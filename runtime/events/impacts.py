@@ -54,7 +54,7 @@ class _Struck(NamedTuple):
 
 
 class _Blow(NamedTuple):
-    """An instant: t, y, yd before it, how impulses are found, and the aims of the flows of the contacts that take part."""
+    """An instant: t, y, yd before it, how impulses are found, the aims of the flows of the contacts that take part."""
 
     point: tuple[float, Floats, Floats]
     strike: Strike
