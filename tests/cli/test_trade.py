@@ -193,6 +193,7 @@ def test_two_trades_are_equal_but_for_seconds(tmp_path, capsys):
     assert one == two
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("options", [[], ["--full", "--method", "radau", "--formulation", "lagrangian"]])
 def test_runs_made_ahead_change_nothing(tmp_path, capsys, options):
     file = write(tmp_path, PENDULUM)

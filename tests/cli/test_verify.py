@@ -170,7 +170,7 @@ COSTLY = (
 
 
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
-@pytest.mark.one_in(11)
+@pytest.mark.one_in(17)
 def test_every_scene_agrees(file, scene, capsys):
     if (file, scene) in COSTLY and not LONG:
         pytest.skip("SYSDYN_LONG=1 verifies it")

@@ -109,7 +109,7 @@ def formed_of(model, index, backend, scene, settings):
 @C
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 @pytest.mark.parametrize("model", EVERY if LONG else SLICE)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_outside_is_inside_to_the_last_bit(tmp_path, model, backend):
     for index in ("auto", *FORMS) if LONG else ("auto", "1"):
         same(model, tmp_path / index, index, backend)

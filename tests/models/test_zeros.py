@@ -38,7 +38,7 @@ scene fall of falling {
 def test_a_chain_that_falls_freely_does_not_turn(tmp_path, formulation):
     """Angular velocities and joint forces have no others of their units: round-off of weights and positions alone."""
     (tmp_path / "model.sd").write_text(LINKS)
-    trace = api.simulate(tmp_path / "model.sd", formulation=formulation)
+    trace = api.simulate(tmp_path / "model.sd", formulation=formulation, output=tmp_path / "out.h5")
     t = trace.time
     assert np.abs(trace["a.y.q"].values - (-9.80665 / 2 * t**2)).max() < 1e-6 * 4.9
     for name in ("a.th.f", "b.th.f", "c.th.f", "b.x.f", "ab.px.multiplier", "ab.py.multiplier", "bc.px.multiplier"):
@@ -74,7 +74,7 @@ scene shut of shorted {
 def test_two_gyrators_that_short_each_other(tmp_path, formulation):
     """Two ratios at the same ends leave no voltage, no turning: the flux stays, the inertia has the damper alone."""
     (tmp_path / "model.sd").write_text(SHORTED)
-    trace = api.simulate(tmp_path / "model.sd", formulation=formulation)
+    trace = api.simulate(tmp_path / "model.sd", formulation=formulation, output=tmp_path / "out.h5")
     t, decay = trace.time, 1.5 * 0.4
     turning = 0.8 * (decay * np.sin(3 * t) - 3 * np.cos(3 * t) + 3 * np.exp(-decay * t)) / (decay**2 + 9)
     assert np.abs(trace["J.f"].values - turning).max() < 1e-6 * np.abs(turning).max()
@@ -113,7 +113,8 @@ scene s of driven {
 def test_rows_between_steps_leave_the_state_where_it_is(tmp_path):
     """A prescribed velocity settles forces that no state knows; a flux that balances overrate a million times stays."""
     (tmp_path / "model.sd").write_text(DRIVEN)
-    one = api.simulate(tmp_path / "model.sd", formulation="co_lagrangian", method="radau", rtol=1e-10)
-    two = api.simulate(tmp_path / "model.sd", formulation="lagrangian", method="bdf", rtol=1e-10)
+    path, out = tmp_path / "model.sd", [tmp_path / name for name in ("one.h5", "two.h5")]
+    one = api.simulate(path, output=out[0], formulation="co_lagrangian", method="radau", rtol=1e-10)
+    two = api.simulate(path, output=out[1], formulation="lagrangian", method="bdf", rtol=1e-10)
     assert 1e-8 < np.abs(two["X2.f"].values).max() < 1e-7
     assert np.abs(one["X2.f"].values - two["X2.f"].values).max() < 1e-9

@@ -10,7 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import planted
 
-NUMBER = 200 if os.environ.get("SYSDYN_LONG") else 12
+NUMBER = 200 if os.environ.get("SYSDYN_LONG") else 8
 
 LINES = {
     "    r[to[0]] += a9;": {("sign", "    r[to[0]] -= a9;")},
