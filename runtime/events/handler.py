@@ -96,6 +96,7 @@ class Handler:
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
         self._stalled, self.last = 0, -np.inf
         self.simple, self.rounds = False, list[Round]()
+        self.blow = False
         self._exact: list[int] = []
         self.back(begin)
         self.before = self.now()
@@ -268,8 +269,8 @@ class Handler:
         else:
             raise SolverFailure("chatter", t, 0.0, self._names())
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
-        flows = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
-        self.simple &= not flows and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
+        self.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
+        self.simple &= not self.blow and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
         if not (changed or touched):
             return None
@@ -333,7 +334,7 @@ class Handler:
                 self._renew(t, *known)
                 self._note(t, said, touched)
                 return known
-            y = self.impacts.after(t, y, yd, self._strike)
+            y, self.blow = self.impacts.after(t, y, yd, self._strike, blow=self.blow), False
             values = self.observer(t, y, yd)
             for k in touched:
                 if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:

@@ -68,14 +68,14 @@ class Impacts:
         self.contacts, self.rest = contacts, rest
         self.fastest = np.zeros(len(contacts.contacts))
 
-    def after(self, t: float, y: Floats, yd: Floats, strike: Strike) -> Floats:
-        """Y after the impacts of the gaps that close; the active set is then that of the impulses."""
+    def after(self, t: float, y: Floats, yd: Floats, strike: Strike, *, blow: bool) -> Floats:
+        """Y after the impacts of the gaps that close, or after a blow; the active set is then that of the impulses."""
         contacts, zero = self.contacts, self.contacts.observer.zero
         values, terms = contacts.observer(t, y, yd), contacts.observer.terms.copy()
         near = [k for k in range(len(contacts.contacts)) if k not in contacts.frozen and self._near(k, values)]
         speed = {k: float(values[self._flow(k)]) for k in near if contacts.contacts[k].kind == "phi"}
         closing = [k for k in speed if speed[k] < -zero(self._flow(k))]
-        if not closing:
+        if not (closing or (blow and near)):
             return y
         aim = dict.fromkeys(near, 0.0)
         for k in closing:
