@@ -57,7 +57,7 @@ class Contacts:
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
-        self._finite, self._unknown = frozenset[int](), True
+        self._finite: frozenset[int] | None = None
         self.singular: Callable[[float, Floats, Floats], bool] | None = None
         self._contradicts: set[tuple[bool, ...]] = set()
         self.time = 0.0
@@ -216,7 +216,7 @@ class Contacts:
             return bool(self.active[k] or sense == 0.0)
         if self.active[k]:
             beyond = abs(values[c.multiplier]) > values[c.bound] * (1.0 + 1e-9) + zero(c.multiplier)
-            return bool(beyond or (k in self._finite and abs(impulse) > self.impulse(c)))
+            return bool(beyond or self._overstrained(k, impulse))
         if sense == 0.0:
             return True
         slip = sense * values[c.value]
@@ -224,13 +224,16 @@ class Contacts:
 
     def finite(self, t: float, y: Floats, yd: Floats) -> frozenset[int]:
         """The frictions whose bound no reaction tells: no impulse is within it."""
-        if self._unknown:
+        if self._finite is None:
             reactions = self.system.are("kappa", "mu", "e")[: y.size]
             bounds = [self.system.observe(t, np.where(reactions, y + s, y), yd) for s in (-1.0, 0.0, 1.0)]
             frictions = (k for k, c in enumerate(self.contacts) if c.kind in ("friction", "planar"))
             self._finite = frozenset(k for k in frictions if np.ptp([self._bound(k, b) for b in bounds]) <= UNTOLD)
-            self._unknown = False
         return self._finite
+
+    def _overstrained(self, k: int, impulse: float) -> bool:
+        """Whether friction that holds takes an impulse, which it has not got."""
+        return bool(self._finite and k in self._finite and abs(impulse) > self.impulse(self.contacts[k]))
 
     def _bound(self, k: int, values: Floats) -> float:
         """What a friction holds at most."""
@@ -240,7 +243,7 @@ class Contacts:
     def _planar(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero, speed = self.observer.zero, values[c.aim[4]]
         if self.active[k]:
-            return bool(values[c.upper] < -zero(c.multiplier) or (k in self._finite and abs(impulse) > self.impulse(c)))
+            return bool(values[c.upper] < -zero(c.multiplier) or self._overstrained(k, impulse))
         if self.p[c.sense] == 0.0:
             return True
         if speed > zero(c.aim[4]):

@@ -12,18 +12,17 @@ has one within the bound that the impulses tell (Coulomb's law).
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.events.contacts import TRIALS, Contacts, NoActiveSetError
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.system import System
 
 UNSEEN = 16.0 * float(np.finfo(float).eps)
 """Of the terms of a gap: a flight lower than that."""
-TRIALS = 20
-"""Sets a contact, beside TRIALS for all."""
 
 Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]
 """t, y, yd, aims [settled rows] -> y after impulses that bring the flow rows to their aims; the impulses [unknowns]."""
@@ -134,12 +133,8 @@ class Impacts:
 
     def _struck(self, blow: _Blow) -> _Struck:
         """Behind the impulses of inequalities, with the frictions that hold as they are."""
-        aim = blow.aim
-
-        def of(struck: list[int]) -> _Struck:
-            return self._of(blow, struck)
-
-        now, seen = of([]), list[set[int]]()
+        aim, of = blow.aim, partial(self._of, blow)
+        now, seen = of([]), set[frozenset[int]]()
         had = now.impulses
         for _ in range(TRIALS * (1 + len(aim))):
             if now.pulls:  # as far on the way as none does: what comes to nothing there is let go
@@ -156,8 +151,8 @@ class Impacts:
             if now.contradicts:  # what is said by others already takes the place of one of them
                 instead = {j: of([*(k for k in before.struck if k != j), worst]) for j in before.struck}
                 jammed = [worst, *(j for j, one in instead.items() if not one.contradicts)]
-                now = next((one for one in instead.values() if one.fits and set(one.struck) not in seen), now)
-                seen.append(set(now.struck))
+                now = next((one for one in instead.values() if one.fits and frozenset(one.struck) not in seen), now)
+                seen.add(frozenset(now.struck))
                 if now.contradicts and any(aim[k] > 0.0 for k in jammed):  # a closed chain: nothing can part there
                     return self._struck(blow._replace(aim=aim | dict.fromkeys(jammed, 0.0)))
         raise NoActiveSetError(tuple(self.contacts.contacts[k].name for k in aim))

@@ -22,8 +22,6 @@ PROBES = 4
 """Errors of the rows that are tried."""
 MARGIN = 64.0
 """Times what they make of a quantity."""
-
-
 PIVOT = 0.1
 """Of the largest of its column: what an elimination takes as a pivot."""
 HOPS = 3

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import replace
-from functools import cache
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -139,6 +139,7 @@ class Runs:
         self.samples: list[Floats] = []
         self.done: tuple[Finished, list[Floats], Writer] | None = None
         self.samplings: tuple[Sampled, ...] = ()
+        self._opened: tuple[Finished, LeftOpen] | None = None
         self.jumps: Floats | None = None
         self.controlled = False
         self.forecast: float | None = None
@@ -433,15 +434,18 @@ class Runs:
         between = beside(self.compared_at, jumps if last is None else last, jumps, span)
         counted = finished.statistics
         late = self._late(rows) if instants is not None else 0.0
-        open_ = cache(lambda: self._open_quantities(finished))
+        open_ = partial(self._open_quantities, finished)
         found = Sampled(tolerance, values, sizes, counted.steps, noise, open_, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
 
     def _left_open(self, finished: Finished) -> LeftOpen:
-        assert finished.last is not None
-        step = (finished.reached - self.options.t_start) / max(finished.statistics.steps, 1)
-        return left_open(self.system, finished.reached, finished.last, step)
+        """Asked of the equations once a run: of its quantities, and of each of its ledgers."""
+        if self._opened is None or self._opened[0] is not finished:
+            assert finished.last is not None
+            step = (finished.reached - self.options.t_start) / max(finished.statistics.steps, 1)
+            self._opened = finished, left_open(self.system, finished.reached, finished.last, step)
+        return self._opened[1]
 
     def _open_quantities(self, finished: Finished) -> Floats:
         """What the equations of a run leave open of each compared quantity by round-off."""

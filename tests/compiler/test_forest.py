@@ -8,7 +8,7 @@ from sysdyn.compiler.network.primal.forest import IndexForest
 from sysdyn.compiler.network.primal.index_classes import End, Link
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.joined import Joined
-from test_index_classes import box, inside, random_box, random_link
+from test_index_classes import box, inside, random_net
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -47,8 +47,7 @@ def test_loops_are_those_of_the_elements_and_no_more(dimensions):
     followed = 0
     for seed in range(120):
         random = np.random.default_rng([seed, dimensions])
-        items = [random_box(random, dimensions if random.random() < 0.8 else 1) for _ in range(random.integers(1, 4))]
-        links = [random_link(random, items) for _ in range(int(random.integers(1, 6)))]
+        items, links = random_net(random, dimensions)
         points = {(item, at): place for place, (item, at) in enumerate(everywhere(items))}
         ends = {(n, k): (point(e.a, k), point(e.b, k)) for n, e in enumerate(links) for k in inside(e.box)}
         row = dict(zip(ends, np.eye(len(ends)), strict=True))

@@ -133,13 +133,18 @@ def random_link(random, items):
     return Link(box(*((0, length - 1) for length in lengths)), *ends)
 
 
+def random_net(random, dimensions):
+    """Families, and links between them."""
+    items = [random_box(random, dimensions if random.random() < 0.8 else 1) for _ in range(random.integers(1, 4))]
+    return items, [random_link(random, items) for _ in range(int(random.integers(1, 6)))]
+
+
 @pytest.mark.parametrize("dimensions", [1, 2])
 def test_elements_belong_together_as_if_each_link_were_followed(dimensions):
     followed = 0
     for seed in range(1500):
         random = np.random.default_rng([seed, dimensions])
-        items = [random_box(random, dimensions if random.random() < 0.8 else 1) for _ in range(random.integers(1, 4))]
-        links = [random_link(random, items) for _ in range(int(random.integers(1, 6)))]
+        items, links = random_net(random, dimensions)
         found = IndexClasses(items, links)
         if found.refused:
             continue
