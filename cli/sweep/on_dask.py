@@ -13,6 +13,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
@@ -51,6 +52,7 @@ Work = Callable[[Request, str, Chunk], tuple[Answer, float]]
 
 @dataclass(slots=True)
 class _Given:
+    address: str
     chunk: Chunk
     future: Any
     careful: bool
@@ -123,7 +125,7 @@ class _Crew:
         future = self.client.submit(
             self.work, self.request, self.keep, chunk, key=key, workers=[address], pure=False, allow_other_workers=False
         )
-        item = _Given(chunk, future, careful)
+        item = _Given(address, chunk, future, careful)
         self.given[address][key] = item
         future.add_done_callback(lambda _: self.ready.put((key, item)))
 
@@ -148,8 +150,12 @@ class _Crew:
         if key is not None and not any(items.pop(key, None) for items in self.given.values()):
             return
         if item.future.status == "finished":
-            found, seconds = item.future.result()
-            yield from self.queue.took(item.chunk, found, seconds)
+            came = self._fetched(item)
+            if came is None:
+                self.client.cancel([item.future], force=True)
+                self.queue.again.extend(item.chunk.tasks)
+                return
+            yield from self.queue.took(item.chunk, *came)
         elif item.future.status == "cancelled":
             yield from self._died(item.chunk)
         else:
@@ -158,6 +164,15 @@ class _Crew:
                 raise error
             yield from self._died(item.chunk)
         item.future.release()
+
+    def _fetched(self, item: _Given) -> tuple[Answer, float] | None:
+        """What a worker has ready; None where it died before that was fetched (Dask would wait for ever)."""
+        while True:
+            with suppress(TimeoutError):
+                found: tuple[Answer, float] = item.future.result(timeout=POLL)
+                return found
+            if item.address not in self.workers():
+                return None
 
 
 def results(

@@ -33,6 +33,7 @@ CASCADE = 100
 STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
+"""Of the span: no time."""
 FALLEN = 1e-4
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
 AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
@@ -80,7 +81,7 @@ class Handler:
         self, plan: Plan, system: System, span: tuple[float, float], begin: Standing, rtol: float = 0.0
     ) -> None:
         self.plan, self.system, self.span = plan, system, span
-        self.p = system.description.p
+        self.p, self.nothing = system.description.p, NOTHING * (span[1] - span[0])
         self.restart: Restart | None = None
         self.observer = Observer(system, rtol)
         self.contacts = Contacts(plan, system, self.observer, self.p)
@@ -185,10 +186,10 @@ class Handler:
         return min(times, default=np.inf)
 
     def due(self, t: float) -> list[int]:
-        """Numbers of the samples at t, which are counted."""
+        """Numbers of the samples at t (one instant by two formulas is one), which are counted."""
         found = []
         for k, s in enumerate(self.plan.sampled):
-            while self.span[0] + int(self.next[k]) * s.period <= t:
+            while self.span[0] + int(self.next[k]) * s.period <= t + self.nothing:
                 self.next[k] += 1
                 found.append(k)
         return list(dict.fromkeys(found))
@@ -294,6 +295,7 @@ class Handler:
         self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
     ) -> Point:
         """The consistent point with the constraints and the branches that hold from now on."""
+        self.kinks.leave(self.observer(t, y, yd))
         point = self._constrained(t, y, yd, said, touched)
         try:
             while self.kinks.turn(self.observer(t, *point)):
@@ -529,7 +531,7 @@ class Handler:
     # -- what never ends -----------------------------------------------------------------------------------------
 
     def _count(self, t: float) -> None:
-        near = t - self.last <= NOTHING * (self.span[1] - self.span[0])
+        near = t - self.last <= self.nothing
         self._stalled, self.last = (self._stalled + 1 if near else 0), t
         if self._stalled > STALLED:
             raise SolverFailure("chatter", t, 0.0, self._names())

@@ -68,6 +68,12 @@ class Kinks:
         self.anew()
         return any(kink.jumps for kink in self.kinks)
 
+    def leave(self, values: Floats) -> None:
+        """What slides is let go where a jump (of the text, of what an event assigned) has left its surface."""
+        for kink in self.kinks:
+            if self.p[kink.branch] == SLIDES and abs(values[kink.value]) > self.observer.zero(kink.value):
+                self.p[kink.branch] = float(np.sign(values[kink.value]))
+
     def turn(self, values: Floats) -> bool:
         """Turns the first kink whose branch does not fit; whether there was one."""
         for k, kink in enumerate(self.kinks):

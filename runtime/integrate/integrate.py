@@ -460,6 +460,7 @@ class Integration:
             raise self._failure("newton")
         method.t_end = segment.end
         self.go_on(segment.begin, segment.label, found, (y, yd))
+        self.run_.contents.start_kind = 0
 
     def go_on(
         self, t: float, label: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats]

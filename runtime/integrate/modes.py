@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sysdyn.runtime.events.handler import NOTHING, Handler, Watched
+from sysdyn.runtime.events.handler import Handler, Watched
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
@@ -119,7 +119,7 @@ class Modes:
         core.contact, core.kink = c.addressof(contacts), c.addressof(kinks)
         core.system = c.addressof(systems)
         core.period, core.next = self._array([s.period for s in plan.sampled]), lib.pointer(handler.next)
-        core.first, core.nothing = handler.span[0], NOTHING * (handler.span[1] - handler.span[0])
+        core.first, core.nothing = handler.span[0], handler.nothing
         core.small, core.largest = handler.observer.small, lib.pointer(handler.observer.largest)
         alike = handler.observer.groups
         core.alikes, core.alike = len(alike), self._array(np.concatenate([*alike, []]), np.int32)

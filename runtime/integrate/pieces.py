@@ -95,12 +95,14 @@ class Pieces:
         return point
 
     def aim(self, end: float) -> None:
-        """The next step ends no later than at the next sample, or the end (s) of the segment."""
-        self._end, sample = end, self.handler.next_sample()
+        """The next step ends no later than at the next sample, or the end (s) of the segment; a sample due where
+        the text jumps reads what holds behind it.
+        """
+        self._end, sample, near = end, self.handler.next_sample(), self.handler.nothing
         if self.modes is not None:
             self.modes.core.segment = end
-        self.run.method.contents.t_end = min(end, sample, self._landing)
-        self.run.run_.contents.end_kind = TRACE if sample <= min(end, self._landing) else 0
+        self.run.method.contents.t_end = min(sample if sample < end - near else end, self._landing)
+        self.run.run_.contents.end_kind = TRACE if sample <= min(end + near, self._landing) else 0
 
     def _bounce(self, t: float) -> None:
         """Steps short enough for a bounce that begins at t (s), until it must have ended."""
@@ -190,7 +192,8 @@ class Pieces:
         """What is due where a piece has met its end; whether the segment, which ends at `end` (s), goes on."""
         run, method = self.run, self.run.method.contents
         self._told()
-        due = self.handler.due(method.t)
+        jumps = method.t >= end and end < run.segments[-1].end  # the text, which is first
+        due = [] if jumps else self.handler.due(method.t)
         if not due and method.t < end:  # a bounce that has not come back
             self._landing, method.h_max = np.inf, self._longest
             self.aim(end)
@@ -213,6 +216,7 @@ class Pieces:
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or self.handler.anew(t, y, yd)
+        self.run.run_.contents.start_kind = TRACE if due else 0
         self._bounce(t)
         self._watch()
         return point

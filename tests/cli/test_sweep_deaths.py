@@ -11,6 +11,7 @@ import threading
 import time
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -177,6 +178,25 @@ def test_a_poison_run_on_dask_is_named_after_three_deaths(fall, cluster):
     [named] = [item for item in found if isinstance(item, Kept) and item.exit]
     assert (named.run, named.exit) == (17, 4)
     assert "died 3 times" in named.reason
+
+
+def test_a_result_that_went_with_its_worker_is_made_again():
+    from sysdyn.cli.sweep.on_dask import _Crew, _Given
+
+    class Gone:
+        status = "finished"
+
+        def result(self, timeout):
+            raise TimeoutError
+
+    gone, cancelled = Gone(), []
+    client = SimpleNamespace(sync=lambda *_, **__: {"workers": {"b": {}}}, cancel=lambda f, **_: cancelled.extend(f))
+    client.scheduler = SimpleNamespace(identity=None)
+    crew = _Crew(client, None, "end", workers.Queue(iter(()), 0, 1), None)
+    given = _Given("a", workers.Chunk(((3, None), (4, None))), gone, False)
+    assert list(crew._took(None, given)) == []
+    assert cancelled == [gone]
+    assert [task[0] for task in crew.queue.again] == [3, 4]
 
 
 @pytest.mark.filterwarnings("ignore")

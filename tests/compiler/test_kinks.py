@@ -27,6 +27,18 @@ def beyond():
     return x.sub(q(), x.param("p"))
 
 
+def far_off():
+    return x.sub(x.param("far"), x.const(1e5))
+
+
+def far():
+    return x.compare(">", far_off(), x.const(0.0))
+
+
+def mode(number):
+    return x.compare("==", x.param("mode"), x.const(number))
+
+
 CASES = {
     "drag": (lambda: x.mul(f(), x.call("abs", f())), f, SMOOTH),
     "a size": (lambda: x.call("abs", f()), f, KINK),
@@ -41,6 +53,10 @@ CASES = {
     "the larger of two": (lambda: x.call("max", q(), f()), lambda: x.sub(q(), f()), KINK),
     "a step at a parameter": (lambda: x.call("step", beyond()), beyond, JUMPS),
     "a flat beginning": (lambda: x.mul(x.call("step", beyond()), x.mul(beyond(), beyond())), beyond, SMOOTH),
+    "a step beside another": (lambda: x.conditional(x.both(past(2.0), far()), x.const(0.0), f()), None, JUMPS),
+    "a step within another": (lambda: x.mul(x.call("step", far_off()), x.call("step", beyond())), beyond, JUMPS),
+    "a step in one mode": (lambda: x.conditional(x.both(past(2.0), mode(2.0)), x.const(0.0), f()), None, JUMPS),
+    "a later piece": (lambda: x.conditional(past(2.0), x.conditional(past(3.0), past(4.0), q()), q()), None, SMOOTH),
     "a rectified wave": (lambda: x.call("abs", x.call("sin", q())), lambda: x.call("sin", q()), KINK),
 }
 

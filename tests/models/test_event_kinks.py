@@ -34,6 +34,16 @@ model m {
 }
 scene s of m { time 0 s to 60 s; trace T; accuracy 1e-9 }
 """
+WINDUP = """
+model m {
+  param p = 10 s
+  state I = 0
+  discrete held = 0
+  every 1 s { held := held + 0.5 }
+  dynamic I' = if I + held > t/(1 s) and p > 5 s then 0 else 2/(1 s)
+}
+scene s of m { time 0 s to 3 s; trace I every 0.25 s; accuracy 1e-9 }
+"""
 TABLE = """
 table F(x: m) -> N linear clamp [ (-1, -1), (-0.2, 0), (0.3, 0), (1, 3) ]
 model m {
@@ -104,6 +114,16 @@ def test_relay_slides(method, tmp_path):
     assert (before, after) == ("< 0", "slides")
     assert abs(time - 10.0 * math.log(1.25)) < 1e-8
     assert abs(trace["T"][-1] - 22.0) < 1e-9
+
+
+@pytest.mark.parametrize("method", ["auto", "bdf", "radau"])
+def test_what_slides_beside_another_condition_is_let_go_where_a_sample_leaves_it(method, tmp_path):
+    """I + held follows t, and waits for half a second behind each sample."""
+    trace = run(WINDUP, tmp_path, method=method)
+    whole = np.floor(trace.time + 1e-9)
+    exact = 0.5 * whole + np.maximum(trace.time - whole - 0.5, 0.0)
+    assert np.abs(trace["I"].values - exact).max() < 1e-8
+    assert trace.statistics["steps"] < 500
 
 
 def test_relay_without_events_ran_for_ever(tmp_path):

@@ -5,15 +5,18 @@
 
 Where u is zero the text has a kink, or jumps; a text with two continuous derivatives of its value there (f abs(f)) has
 neither for a method and is left alone.  Which of the three it is, is asked of the expressions on the surface u = 0, at
-sampled values of everything else.  Received: a descriptor form; returned: its `Surface`s, in the order of the text.
+sampled values of everything else; of what stands beside other conditions (raw > hi and err > 0) on both sides of these.
+Received: a descriptor form; returned: its `Surface`s, in the order of the text.
 Loops keep what they have (a family is one row here): what stands in one is integrated through.
 """
 
 from __future__ import annotations
 
 import math
+import random
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.expression import (
@@ -38,6 +41,11 @@ SAMPLES = 5
 TOUCHES = 1e-7
 """Of the magnitudes of both sides: what differs by less does not jump."""
 BESIDE = 0.5
+DRAWS, MANY = 8, 8
+"""Further samples for each other condition, and of how many conditions at most."""
+SIDES = (-1.0, -1.0, 0.0, 1.0, 1.0)
+SECANTS = 4
+LEAVES = ("var", "param", "time")
 MOST = 200
 """Surfaces of one model: more cost each step more than they save."""
 
@@ -151,33 +159,52 @@ def smoothness(root: Node, u: Node) -> int:
     if moved is None:
         return SMOOTH
     slopes = [derivative(node, moved) for node in (u, above, below)]
-    found = SMOOTH
-    for k in range(SAMPLES):
-        values = _on_surface(u, slopes[0], moved, k)
-        if values is None:  # nothing is known of it: what the operation itself does
-            found = min(found, KINK if _continuous(root, u) else JUMPS)
+    others, found, known = _others((above, below), u), SMOOTH, False
+    for k in range(SAMPLES + DRAWS * min(len(others), MANY)):
+        asked = k < SAMPLES
+        values = _on_surface(u, slopes[0], moved, _drawn((u,), k) if asked else _on_sides(others, u, k))
+        if values is None:
             continue
         both = (above, below, slopes[1], slopes[2])
         beside = {**values, moved: values[moved] + BESIDE}
         try:
             here, there = _values(both, values), _values(both, beside)
         except (ArithmeticError, ValueError, KeyError, TypeError):
+            if asked:
+                return JUMPS
+            continue
+        known = True
+        if _apart(here[:2], there[:2], asked=asked):
             return JUMPS
-        if _apart(here[:2], there[:2]):
-            return JUMPS
-        if _apart(here[2:], there[2:]):
+        if _apart(here[2:], there[2:], asked=asked):
             found = KINK
-    return found
+    if known:
+        return found
+    return KINK if _continuous(root, u) else JUMPS  # what the operation itself does
+
+
+def _others(sides: tuple[Node, ...], u: Node) -> tuple[Node, ...]:
+    """What the other conditions of both branches compare with zero."""
+    found: dict[Node, None] = {}
+    for node in topological(sides):
+        on = sided(node)
+        gap = sub(*node.args) if node.op == "cmp" else on.u if on is not None else u
+        known = gap is u or neg(gap) is u or neg(gap) in found
+        if not known and any(n.op in LEAVES for n in topological([gap])):
+            found[gap] = None
+    return tuple(found)
 
 
 def _values(nodes: tuple[Node, ...], values: Mapping[Node, float]) -> list[float]:
     return evaluate(nodes, lambda node: _look(node, values))
 
 
-def _apart(here: list[float], there: list[float]) -> bool:
-    """Whether two values differ on the surface, against what they are there and beside it."""
+def _apart(here: list[float], there: list[float], *, asked: bool) -> bool:
+    """Whether two values differ on the surface, against those there and beside it; asked: where there are none."""
     known = [abs(x) for x in (*here, *there) if math.isfinite(x)]
-    return not all(map(math.isfinite, here)) or abs(here[0] - here[1]) > TOUCHES * sum(known)
+    if not all(map(math.isfinite, here)):
+        return asked
+    return abs(here[0] - here[1]) > TOUCHES * sum(known)
 
 
 def _continuous(root: Node, u: Node) -> bool:
@@ -186,10 +213,38 @@ def _continuous(root: Node, u: Node) -> bool:
     return all(n.op == "call" and n.data in ("abs", "min", "max") for n in on)
 
 
-def _on_surface(u: Node, slope: Node, moved: Node, number: int) -> Mapping[Node, float] | None:
+def _drawn(roots: tuple[Node, ...], number: int) -> dict[Node, float]:
+    return {n: _sample(n, number) for n in topological(roots) if n.op in LEAVES}
+
+
+def _on_sides(gaps: tuple[Node, ...], u: Node, number: int) -> dict[Node, float]:
+    """Values of the leaves at which each gap (difference of a condition) is above, below or on zero, at random."""
+    chance = random.Random(number)
+    values = _drawn((u, *gaps), number)
+    for gap in chance.sample(gaps, len(gaps)):
+        leaf = chance.choice([n for n in topological([gap]) if n.op in LEAVES])
+        away = chance.choice(SIDES) * chance.uniform(BESIDE, 2.0 * BESIDE)
+        with suppress(ArithmeticError, KeyError, TypeError, ValueError):
+            values[leaf] = _beside(gap, leaf, values, away)
+    return values
+
+
+def _beside(gap: Node, leaf: Node, values: Mapping[Node, float], away: float) -> float:
+    """The value of a leaf at which a gap is zero, by secants, or beside it on the side of `away`."""
+
+    def at(x: float) -> float:
+        return evaluate((gap,), lambda node: _look(node, {**values, leaf: x}))[0]
+
+    x = values[leaf]
+    for _ in range(SECANTS):
+        here = at(x)
+        x -= here / (at(x + BESIDE) - here) * BESIDE
+    x = float(f"{x:.12g}")
+    return x + away if at(x + away) * away >= 0.0 else x - away
+
+
+def _on_surface(u: Node, slope: Node, moved: Node, values: dict[Node, float]) -> Mapping[Node, float] | None:
     """Values of the leaves with u = 0, by Newton on one unknown; None where it finds none."""
-    leaves = [n for n in topological([u]) if n.op in ("var", "param", "time")]
-    values = {n: _sample(n, number) for n in leaves}
     for _ in range(50):
         try:
             at, by = evaluate((u, slope), lambda n: _look(n, values))

@@ -333,8 +333,8 @@ static void go_on(sd_run *run, double t, const sd_transition *transition)
     for (int32_t k = 0; k < m->samples; k++)
         sample = fmin(sample, m->first + (double)m->next[k] * m->period[k]);
     *m->h_max = m->longest;
-    *m->t_end = fmin(m->segment, sample);
-    run->end_kind = sample <= m->segment ? SD_TRACE : 0;
+    *m->t_end = sample < m->segment - m->nothing ? sample : m->segment; /* where the text jumps too, that is first */
+    run->end_kind = sample <= m->segment + m->nothing ? SD_TRACE : 0;
     for (int32_t i = 0; i < m->unknowns; i++)
         m->restart_d[i] = m->differential[i] ? m->rate[i] : 0.0;
     run->start_kind = SD_TRACE;
@@ -436,12 +436,12 @@ int sd_modes_event(sd_run *run)
 int sd_modes_sample(sd_run *run)
 {
     sd_modes *m = run->modes;
-    double t = *run->stepper->t;
+    double t = *run->stepper->t, now = t + m->nothing;
     int32_t due = 0;
     for (int32_t k = 0; k < m->samples; k++)
-        if (m->first + (double)m->next[k] * m->period[k] <= t)
+        if (m->first + (double)m->next[k] * m->period[k] <= now)
             m->which[due++] = k;
-    if (!due || m->now < 0)
+    if (!due || m->now < 0 || t >= m->segment)
         return SD_FINISHED;
     if (roomy(run, t) == 0)
         return SD_FULL;
@@ -453,7 +453,7 @@ int sd_modes_sample(sd_run *run)
         return SD_FINISHED;
     m->last = t;
     for (int32_t i = 0; i < due; i++)
-        while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= t)
+        while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= now)
             m->next[one->sample[i]]++;
     go_on(run, t, one);
     return SD_RUNNING;

@@ -358,12 +358,11 @@ static void rows_of_start(sd_run *run, double label)
         double kind = (double)run->instant_kind[run->next];
         emit(run, t, run->instant[run->next++], kind, 1);
     }
-    int asked = run->next < run->instants && run->instant[run->next] <= t;
-    double kind = (double)((int32_t)kind_here(run, asked) | run->start_kind);
-    emit(run, t, label, kind, 1);
-    run->next += asked;
+    int32_t asked = (int32_t)kind_here(run, 0) | run->start_kind;
     while (run->next < run->instants && run->instant[run->next] <= t)
-        run->next++; /* between label and t there is nothing new */
+        asked |= run->instant_kind[run->next++]; /* between label and t there is nothing new */
+    double kind = (double)asked;
+    emit(run, t, label, kind, 1);
     if (kind == 0.0 && run->rows > before) {
         run->rows--; /* nobody asked for it */
         run->rows_written--;
