@@ -58,6 +58,8 @@ class Contacts:
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self._finite: frozenset[int] | None = None
+        # wrong open and closed: zero of its value is none of its multiplier, so that any value above zero is open
+        self._open: frozenset[int] = frozenset()
         self.singular: Callable[[float, Floats, Floats], bool] | None = None
         self._contradicts: set[tuple[bool, ...]] = set()
         self.time = 0.0
@@ -191,7 +193,7 @@ class Contacts:
         zero = self.observer.zero
         if self.active[k]:
             return bool(impulse < -self.impulse(c) or values[c.multiplier] < -zero(c.multiplier))
-        if values[c.value] > zero(c.value):
+        if values[c.value] > (0.0 if k in self._open else zero(c.value)):
             return False
         if c.kind == "psi":
             return bool(values[c.value] < -zero(c.value) or values[c.rate] < -zero(c.rate))
@@ -254,6 +256,23 @@ class Contacts:
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
+        before, turned = (self.active.copy(), self.p.copy()), dict[int, set[bool]]()
+        try:
+            return self._pivoted(t, y, yd, settle, turned)
+        except NoActiveSetError:
+            self._open = frozenset(k for k, ways in turned.items() if len(ways) > 1)
+            if not self._open:
+                raise
+        self.active[:], self.p[:] = before
+        try:
+            return self._pivoted(t, y, yd, settle, turned)
+        finally:
+            self._open = frozenset()
+
+    def _pivoted(
+        self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]]
+    ) -> tuple[Floats, Floats]:
+        """The same; turned: those that were turned, and whether they held."""
         seen: set[tuple[float, ...]] = set()
         changed: list[int] = []
         fewest = len(self.contacts)
@@ -284,6 +303,7 @@ class Contacts:
             block = (self.active.copy(), wrong[0], values) if several else None
             fewest = min(fewest, len(wrong))
             for k in wrong if several else wrong[:1]:
+                turned.setdefault(k, set()).add(bool(self.active[k]))
                 changed.append(k)
                 self.turn(k, values)
         names = dict.fromkeys(self.contacts[k].name for k in changed[-6:] or range(min(len(self.contacts), 6)))

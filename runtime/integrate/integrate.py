@@ -278,6 +278,10 @@ class Integration:
         sizes[kept] = magnitude
         return largest, sizes
 
+    def last(self) -> tuple[Floats, Floats, Floats]:
+        """y and yd at the end of the last step, the largest |y| met [unknowns]."""
+        return (*self.method.point(), self._sizes()[0])
+
     def _projected(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
         if self.underlying is not None:
@@ -561,7 +565,7 @@ class Integration:
             self.ledgers,
             self.happened(),
             self.run_.contents.beyond,
-            (*self.method.point(), self._sizes()[0]),
+            self.last(),
         )
 
     def __del__(self) -> None:

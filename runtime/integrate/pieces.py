@@ -15,6 +15,7 @@ from sysdyn.runtime.events.handler import Handler, Point, Watched
 from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.modes import Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
+from sysdyn.runtime.integrate.round_off import left_open
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
@@ -25,6 +26,9 @@ UNSEEN = 100.0
 """Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
 PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
+
+FAINT = 1e3
+"""Times what round-off leaves of a quantity: what has never been larger is asked again whether it is any."""
 
 _DENSE = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p)
 _REFINE = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
@@ -44,7 +48,7 @@ class Pieces:
         n = run.system.form.written
         self._first(self.handler.begin(start.t, run.y[:n].copy(), run._start_rate[:n].copy()))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
-        self._mode = -1
+        self._mode, self._open = -1, np.full(run.observed, np.inf)
         self._watch()
 
     def _first(self, point: tuple[Floats, Floats] | None) -> None:
@@ -156,6 +160,8 @@ class Pieces:
                 self._watch()
                 return time.process_time() - began
             t, which = found
+            if self._by_round_off(which):
+                continue
             before = self._point(t)
             point = self._fire(t, before, [], which)
             if point is not None:
@@ -163,6 +169,18 @@ class Pieces:
                 self._go_on(t, point, before, misled=end - core.t_from if self.handler.stands(which) else 0.0)
                 return time.process_time() - began
             begin = t
+
+    def _by_round_off(self, which: list[Watched]) -> bool:
+        """Whether a relation has crossed zero within what round-off leaves of it, which is then its zero."""
+        observer, run = self.handler.observer, self.run
+        rows = [w.row for w in which if w.relation >= 0]
+        if not any(observer.largest[row] <= FAINT * self._open[row] for row in rows):
+            return False
+        method = run.method.contents
+        self._open = left_open(run.system, method.t, run.last(), method.h).quantities
+        faint = [row for row in rows if observer.largest[row] < self._open[row]]
+        observer.largest[faint] = self._open[faint] / observer.small
+        return bool(faint)
 
     def _accept(self, t: float, kind: int, sink: Sink) -> None:
         """The last step counts up to t; rows of before the event are written with the parameters of before."""
