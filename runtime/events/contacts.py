@@ -295,7 +295,7 @@ class Contacts:
             wrong = list(self._wrongs(values, found[2]))
             if not wrong:
                 return found[0], found[1]
-            if again and all(self._opens(k, found[2]) for k in wrong):  # from behind their impulses on
+            if again and self._done(t, wrong, y, found):  # from behind their impulses on
                 y, yd = found[:2]
                 seen.clear()
             # diodes all at once while they become fewer (Judice and Pires 1994), else the first
@@ -309,9 +309,22 @@ class Contacts:
         names = dict.fromkeys(self.contacts[k].name for k in changed[-6:] or range(min(len(self.contacts), 6)))
         raise NoActiveSetError(tuple(names))
 
-    def _opens(self, k: int, impulses: Floats) -> bool:
-        """Whether an impulse has stopped what closed, and nothing holds it afterwards."""
-        return bool(self.active[k]) and self.contacts[k].kind == "psi" and impulses[self.multiplier[k]] > 0.0
+    def _done(self, t: float, wrong: Sequence[int], y: Floats, found: tuple[Floats, Floats, Floats]) -> bool:
+        """Whether impulses have done what these inequalities are wrong by: one of effort has stopped what closed, and
+        nothing holds it afterwards; one of flow has passed, and nothing goes on.
+        """
+        if any(self.contacts[k].kind != "psi" for k in wrong):
+            return False
+        held = [k for k in wrong if self.active[k]]
+        if any(found[2][self.multiplier[k]] <= 0.0 for k in held):
+            return False
+        open_ = [self.contacts[k].value for k in wrong if not self.active[k]]
+        form, still = self.system.form, found[0].copy()
+        still[form.k_f] = 0.0
+        passed = still.copy()
+        passed[form.k_f] = (found[0] - y)[form.k_q]
+        both = (self.system.observe(t, point, found[1])[open_] for point in (passed, still))
+        return bool((np.subtract(*both) > 0.0).all())
 
     def _beside(
         self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]

@@ -375,12 +375,25 @@ class Handler:
         self.contacts.become(after)
         found = self.restart.struck(t, *point)
         if found is not None:
-            fits = self.contacts.wrong(self.observer(t, *found[:2]), found[2]) < 0
+            values = self.observer(t, *found[:2])
+            fits = self.contacts.wrong(values, found[2]) < 0 and (key[1] or self._decided(before[0], values))
             if fits and self.determined.leaves(t, *found[:2]) == 0:
                 return found[0], found[1]
         self.contacts.active[:], self.p[:] = before
         self.contacts.apply()
         return None
+
+    def _decided(self, before: NDArray[np.bool_], values: Floats) -> bool:
+        """Whether the inequalities that turned could not have stayed as they were `before`: what would hold and open
+        alike at this instant (a diode that conducts beside a capacitor) stays where nothing touched it.
+        """
+        active, zero = self.contacts.active, self.observer.zero
+        turned = [k for k in np.flatnonzero(active != before) if self.plan.contacts[k].kind in ("phi", "psi")]
+        held = [self.plan.contacts[k] for k in turned if active[k]]
+        open_ = [self.plan.contacts[k] for k in turned if not active[k]]
+        return all(values[c.multiplier] > zero(c.multiplier) for c in held) and all(
+            values[c.value] > zero(c.value) or values[c.rate] > zero(c.rate) for c in open_
+        )
 
     def _tied(self, t: float, point: Point, touched: Sequence[int]) -> bool:
         """Whether something touched may hold or not at this instant, but a gap that has bounced; or friction that is

@@ -176,8 +176,9 @@ class Pieces:
         rows = [w.row for w in which if w.relation >= 0]
         if not any(observer.largest[row] <= FAINT * self._open[row] for row in rows):
             return False
-        method = run.method.contents
-        self._open = left_open(run.system, method.t, run.last(), method.h).quantities
+        method, last = run.method.contents, run.last()
+        step = max((method.t - run.start.t) / max(method.steps, 1), method.h)
+        self._open = left_open(run.system, method.t, last, step).quantities
         faint = [row for row in rows if observer.largest[row] < self._open[row]]
         observer.largest[faint] = self._open[faint] / observer.small
         return bool(faint)

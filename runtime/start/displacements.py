@@ -73,10 +73,13 @@ class Displacements:
         most = np.zeros(self.number)
         np.maximum.at(most, force, np.abs(slope[forced]))
         scale[most > 0.0] = 1.0 / most[most > 0.0]
-        now, here = y.copy(), self._given[self._row]
+        now, given = y.copy(), self._given.copy()
+        open_, without = self.system.held  # what does not hold has no multiplier, and no impulse of one
+        given[open_], scale[self._impulse[without]] = True, 0.0
+        here = given[self._row]
         for _ in range(_ITERATIONS):
             aim = np.zeros(self.rows)
-            aim[: self._given.size] = np.where(self._given, -self.system.residual(t, now, yd), 0.0)
+            aim[: given.size] = np.where(given, -self.system.residual(t, now, yd), 0.0)
             np.add.at(aim, rows[: through.size], -slope[resisting] * (now - y)[through])
             i, j = np.append(self._row[here], rows), np.append(self._column[here], columns)
             v = np.append(self.system.jacobian(t, now, yd)[0][here], slopes)

@@ -190,6 +190,34 @@ static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const
     return c->kind != SD_PHI && slip >= -zero(m, c->value) && sense * v[c->rate] >= -zero(m, c->rate);
 }
 
+static int touched(const sd_modes *m, const sd_mode *from, const sd_transition *one)
+{
+    for (int32_t k = 0; k < one->crossed; k++)
+        for (int32_t i = 0; i < m->contacts; i++) {
+            int32_t row = from->row[one->which[k]];
+            if (row == m->contact[i].value || row == m->contact[i].multiplier)
+                return 1;
+        }
+    return 0;
+}
+
+/* Whether the inequalities that a transition turns, which touches none, could not have stayed as they were: what would
+ * hold and open alike at this instant (a diode that conducts beside a capacitor) stays. */
+static int decided(const sd_modes *m, const sd_mode *from, const sd_transition *one, const double *v)
+{
+    if (touched(m, from, one))
+        return 1;
+    for (int32_t k = 0; k < m->contacts; k++) {
+        const sd_contact *c = &m->contact[k];
+        int holds = present(m)->holds[k], turned = holds != from->holds[k] && (c->kind == SD_PHI || c->kind == SD_PSI);
+        if (turned && holds && !(v[c->multiplier] > zero(m, c->multiplier)))
+            return 0;
+        if (turned && !holds && !(v[c->value] > zero(m, c->value)) && !(v[c->rate] > zero(m, c->rate)))
+            return 0;
+    }
+    return 1;
+}
+
 /* Whether the branch of a law is what its switching function says. */
 static int kink_fits(const sd_modes *m, const sd_kink *k, const double *v)
 {
@@ -303,7 +331,8 @@ static int lands(sd_run *run, const sd_transition *one, double t)
         memcpy(m->restart, m->y, written);
         memcpy(m->rate, m->yd, written);
         look(run, t, m->y, m->yd, m->values);
-        done = fits(m, one->sides + one->rounds * m->relations, m->values) && ordinary(m);
+        done = fits(m, one->sides + one->rounds * m->relations, m->values) && ordinary(m) &&
+               decided(m, &m->mode[from], one, m->values);
     }
     if (!done) {
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
