@@ -31,12 +31,12 @@ def pairs(system: System) -> tuple[Ints, Ints]:
 
 
 class Equations:
-    """system: as written; settled: its form "start"; measuring: guessed expressions hold but for what they miss.
+    """system: as written; settled: its form "start".
 
-    guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: rows of the guesses that have an
-    unknown of their own; unsettled [rows]: they need not hold; rows, columns, structural [entries]: of the matrix;
-    alike [unknowns]: number of the kind and unit of each; member [unknowns of y]: number of the kind; first: place of
-    the first that is missed.
+    guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: the rows of these guesses, each
+    with an unknown of its own; contents [rows]: those of them that guess what stores hold; unsettled [rows]: they need
+    not hold; rows, columns, structural [entries]: of the matrix; alike [unknowns]: number of the kind and unit of each;
+    member [unknowns of y]: number of the kind; first: place of the first that is missed.
     """
 
     def __init__(self, system: System, settled: System) -> None:
@@ -44,8 +44,7 @@ class Equations:
         self.rates = rates_of(settled)
         self.momenta = system.of_groups("momentum")
         self._rows(settled)
-        self.measuring = any(r.content for r in settled.description.rows)
-        self.missed = np.flatnonzero(self.guessed & self.measuring)
+        self.missed = np.flatnonzero(self.guessed)
         self.first = self.n + self.rates.size
         self.unsettled = inertial_rates(settled)
         self.unknowns = self.first + self.missed.size
@@ -53,17 +52,18 @@ class Equations:
         self._entries(settled)
         self.units = self._units(settled)
         self._kinds(system)
-        self.measured = self._measured(settled.rows)
+        self.measured = self._measured()
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _rows(self, settled: System) -> None:
-        """Rows of block initial that are guesses, and those of them that no text says."""
-        self.guessed, self.unsaid = (np.zeros(settled.rows, dtype=bool) for _ in range(2))
+        """Rows of block initial that are guesses, and those of them that no text says, that guess contents."""
+        self.guessed, self.unsaid, self.contents = np.zeros((3, settled.rows), dtype=bool)
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
             if group == "initial" and not rows.fixed:
                 self.guessed[first : first + rows.size] = True
                 self.unsaid[first : first + rows.size] = not rows.written
+                self.contents[first : first + rows.size] = rows.content
 
     def _entries(self, settled: System) -> None:
         """Those of dF/dy, of dF/dy' where the derivative is an unknown, of what is missed."""
@@ -79,12 +79,12 @@ class Equations:
         self.structural = np.concatenate([in_y, in_rate[self.rated], np.ones(self.missed.size, dtype=bool)])
 
     def _units(self, settled: System) -> list[str]:
-        """The unit of what each guess misses."""
+        """What tells the unit of what each guess misses: that of contents, another for each expression."""
         found = [""] * settled.rows
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
             if group == "initial":
-                found[first : first + rows.size] = [rows.unit] * rows.size
+                found[first : first + rows.size] = [rows.unit if rows.content else rows.owner] * rows.size
         return [found[row] for row in self.missed]
 
     def _kinds(self, system: System) -> None:
@@ -117,11 +117,10 @@ class Equations:
         among = np.array([kind in kinds for kind in self._numbers], dtype=bool)
         return np.append(among[self.member], np.full(self.rates.size, "rate" in kinds))
 
-    def _measured(self, number: int) -> Mask:
+    def _measured(self) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
-        mask, missed = np.zeros(self.n, dtype=bool), np.zeros(number, dtype=bool)
-        missed[self.missed] = True
-        own = self.structural & missed[self.rows] & (self.columns < self.n)
+        mask = np.zeros(self.n, dtype=bool)
+        own = self.structural & self.contents[self.rows] & (self.columns < self.n)
         mask[self.columns[own]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask

@@ -69,30 +69,20 @@ class ConsistentState:
         return y, yd
 
 
-def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Solution | None:
-    """The point nearest to the guess on these rows, from x in these unknowns; None where they do not hold."""
+def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Floats:
+    """The point nearest to the guess on these rows, from x in these unknowns; x where they do not hold."""
+    if not (rows.any() and free.any()):
+        return x
     found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
-    return found if found.residual < EXACT else None
+    return found.x if found.residual < EXACT else x
 
 
 def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
-    """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
-    written = starter.guessed & ~starter.unsaid
-    if not written.any():
-        return guess
-    free = free & (np.arange(free.size) < starter.n)
-    # an expression gives its own unknown where the others are guessed by numbers: of several roots that one is meant
-    own = free & ~starter.written
-    given = _onto(starter, t, guess, guess, rows=written, free=own) if own.any() else None
-    guess = guess if given is None else given.x
-    rows = written | starter.groups("phi", "psi")
-    found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-    if found.residual < EXACT or (np.isfinite(found.residual) and given is None):
-        guess = found.x
-    # of a flow that an expression guesses, the momentum is guessed with it
-    momenta = free & starter.moves(("p",)) & ~starter.written
-    moved = _onto(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta)
-    return guess if moved is None else moved.x
+    """The guess with what written expressions give their own unknowns where the others are guessed by numbers: of
+    several roots that one is meant.
+    """
+    own = free & ~starter.written & (np.arange(free.size) < starter.n)
+    return _onto(starter, t, guess, guess, rows=starter.guessed & ~starter.unsaid, free=own)
 
 
 def _rescaled(
@@ -129,14 +119,11 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     """X with what follows as implicit unknowns at their guesses make it: of two roots of a gamma that is not linear the
     iteration then begins at that of the guess.
     """
-    bent = _bent(starter, t, x) & starter.groups("gamma")
-    held = starter.moves(("e",)).copy()
-    held[held] = np.isin(np.flatnonzero(held), starter.columns[bent[starter.rows]])
+    held = starter.moves(("e",)) & starter.written
     if not held.any():
         return x
-    rows, may = starter.every & ~bent & ~starter.groups("gamma_rate"), free & ~held & starter.following(t, x)
-    found = _onto(starter, t, x, guess, rows=rows, free=may)
-    return x if found is None else starter.without_noise(found.x, starter.scale(t, x))
+    rows, may = starter.every & ~starter.groups("gamma", "gamma_rate"), free & ~held & starter.following(t, x)
+    return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -150,22 +137,18 @@ def _bent(starter: Starter, t: float, x: Floats) -> Mask:
 def _anew(
     starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask
 ) -> tuple[Solution, bool]:
-    """The solution with its state to round-off, in its own magnitudes, and what follows found from x as where no state
-    moves: neither depends on the way here; whether that holds.  What is too large for full matrices is left alone.
+    """The solution with what follows found from x as where no state moves: it does not depend on the way here; whether
+    that holds.  What is too large for full matrices is left alone.
     """
     there = best.x
     state = free & ~starter.following(t, there)
     if best.residual >= EXACT or there.size > DENSE or not (there != guess)[state].any():
         return best, False
-    near = stepped(problem_of(starter, t, there, guess, rows=starter.every, free=free, least=True), there)
-    largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
-    near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
-    back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
-    for moved in (back, near):
-        found, holds = _rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
-        if holds and found.residual <= max(CLOSED, best.residual):
-            return found, True
-    return best, False
+    largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(there)))
+    moved = state & (np.abs(there - guess) > BACK * largest)
+    begun = np.where(moved, there, np.where(state, guess, x))
+    found, holds = _rescaled(starter, t, begun, guess, free & ~state, least=False)
+    return (found, True) if holds and found.residual <= max(CLOSED, best.residual) else (best, False)
 
 
 Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool]]

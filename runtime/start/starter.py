@@ -3,8 +3,8 @@
 Unknowns: y as written and the derivatives that the settled rows read; equations: all settled rows (as written,
 phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.
 
-Where contents of stores follow from several coordinates, each has a row of block `initial` and an unknown of its own,
-what the row misses; these are what moves least, and the coordinates follow.
+A guess of an expression, or of contents that follow from several coordinates, has a row of block `initial` and an
+unknown of its own, what the row misses; these move least, and coordinates follow contents.
 """
 
 from __future__ import annotations
@@ -107,8 +107,8 @@ def remembered(
 class Starter:
     """The equations of the start of one model (t0 apart), for one search: nothing but t and x changes.
 
-    Where contents of stores are guessed, guessed expressions hold but for an unknown of their own each, behind those of
-    y and its rates; sums of balances without inertia have their rates.
+    Guessed expressions hold but for an unknown of their own each, behind those of y and its rates; sums of balances
+    without inertia have their rates.
     """
 
     def __init__(self, system: System) -> None:
@@ -126,8 +126,6 @@ class Starter:
         self.measured = known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
-        if not known.measuring:
-            self.every &= ~self.guessed
         self.rows, self.columns, self._structural = known.rows, known.columns, known.structural
         self._sums = self._floating(np.flatnonzero(known.unsettled))
         if self._sums is not None:
