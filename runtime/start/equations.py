@@ -6,7 +6,6 @@ Unknowns x = (y as written, the derivatives that occur, what guessed expressions
 from __future__ import annotations
 
 import ctypes as c
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.inertia import with_flows
-from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
@@ -42,7 +40,6 @@ class Equations:
     def __init__(self, system: System, settled: System) -> None:
         self.n = system.form.written
         self.rates = rates_of(settled)
-        self.momenta = system.of_groups("momentum")
         self._rows(settled)
         self.missed = np.flatnonzero(self.guessed)
         self.first = self.n + self.rates.size
@@ -97,25 +94,6 @@ class Equations:
         of_family = [number.setdefault(f.kind, len(number)) for f in system.description.families]
         self.member = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: self.n]]
         self.members = len(number)
-        self._numbers, self._of_kinds = number, dict[tuple[str, ...], Mask]()
-        self._guesses = self._read([*number])
-
-    def _read(self, kinds: list[str]) -> NDArray[np.str_]:
-        """The kind of unknowns that each guess is of; none where it is of several [missed]."""
-        if not self.missed.size:
-            return np.zeros(0, dtype="<U5")
-        found, many = np.full(self.guessed.size, "", dtype="<U5"), np.zeros(self.guessed.size, dtype=bool)
-        for kind in (*kinds, "rate"):
-            moves = np.append(self._plain((kind,)), np.zeros(self.missed.size, dtype=bool))
-            rows = self.rows[self.structural & moves[self.columns]]
-            many[rows] |= found[rows] != ""
-            found[rows] = kind
-        return np.where(many, "", found)[self.missed]
-
-    def _plain(self, kinds: Sequence[str]) -> Mask:
-        """Unknowns of these kinds among those of y and the derivatives."""
-        among = np.array([kind in kinds for kind in self._numbers], dtype=bool)
-        return np.append(among[self.member], np.full(self.rates.size, "rate" in kinds))
 
     def _measured(self) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
@@ -124,14 +102,6 @@ class Equations:
         mask[self.columns[own]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
-
-    def moves(self, kinds: Sequence[str]) -> Mask:
-        """Unknowns of these kinds [unknowns]; read-only."""
-        key = tuple(kinds)
-        if key not in self._of_kinds:
-            missed = np.array([kind in key for kind in self._guesses], dtype=bool)
-            self._of_kinds[key] = read_only(np.append(self._plain(key), missed))
-        return self._of_kinds[key]
 
     def core(self, system: System, settled: System) -> lib.RowsOfStart:
         """The core's structure for the rows of one settled system."""

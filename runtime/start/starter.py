@@ -227,9 +227,11 @@ class Starter:
         """Rows of the named groups; read-only."""
         return self.settled.of_groups(*names)
 
-    def moves(self, kinds: Sequence[str]) -> Mask:
-        """Unknowns of these kinds [unknowns]; read-only."""
-        return self.equations.moves(kinds)
+    def moves(self, *kinds: str) -> Mask:
+        """Unknowns of y of these kinds [unknowns]."""
+        found = np.zeros(self.equations.unknowns, dtype=bool)
+        found[: self.n] = self.system.are(*kinds)[: self.n]
+        return found
 
     def _floating(self, unsettled: Places) -> _Sums | None:
         """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
@@ -269,18 +271,11 @@ class Starter:
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
 
-        The flow of a momentum counts as state: where neither is written, both begin at zero.
+        Of a momentum and its flow the one that is written carries the state, else the momentum.
         """
-        jy, jyd = self.system.jacobian(t, *self.expand(x))
+        _, jyd = self.system.jacobian(t, *self.expand(x))
         state = self.system.are(*STATE)[: self.n]
-        carries = self.system.differential(jyd)[: self.n] & state
-        if self._flow.size:
-            pattern = self.system.pattern
-            inert = np.zeros(self.n, dtype=bool)
-            inert[pattern.columns_of()[(jy != 0.0) & self.equations.momenta[pattern.row]]] = True
-            moved = self._flow[carries[self._momentum]]
-            carries[moved[inert[moved]]] = True
-        carries &= ~self.measured
+        carries = self.system.differential(jyd)[: self.n] & state & ~self.measured
         carries |= self.given.written & state
         carries[np.where(self.given.written[self._flow], self._momentum, self._flow)] = False
         found = np.ones(x.size, dtype=bool)

@@ -170,7 +170,7 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     starter, found = Starter(system), []
     x = starter.unknowns(state.t, state.y, state.yd)
     size, moves = _moves(system, state)
-    rows, free = starter.groups("phi"), starter.moves(("q",))
+    rows, free = starter.groups("phi"), starter.moves("q")
     for move in moves:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * np.append(move, np.zeros(x.size - move.size))
