@@ -149,10 +149,12 @@ def _anew(
     near = stepped(problem_of(starter, t, there, guess, rows=starter.every, free=free, least=True), there)
     largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
-    moved = state & (np.abs(near - guess) > BACK * largest)
-    begun = np.where(moved, near, np.where(state, guess, x))
-    found, holds = _rescaled(starter, t, begun, guess, free & ~state, least=False)
-    return (found, True) if holds and found.residual <= max(CLOSED, best.residual) else (best, False)
+    back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
+    for moved in (back, near):
+        found, holds = _rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
+        if holds and found.residual <= max(CLOSED, best.residual):
+            return found, True
+    return best, False
 
 
 Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool]]
