@@ -188,7 +188,7 @@ class Starter:
             return values
         full = np.zeros((self.settled.rows, known.unknowns))
         np.add.at(full, (known.rows, known.columns), values)
-        values[np.isin(known.rows, self._places)] = 0.0
+        values[np.isin(known.rows, self._summed)] = 0.0
         return np.append(values, self._sums @ full[self._summed])
 
     def row_scale(self, t: float, x: Floats, scale: Floats) -> Floats:
