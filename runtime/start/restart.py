@@ -76,12 +76,9 @@ class Restart:
         if kept is not None:
             return *kept, impulse
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
-        for hold in (HELD, 1.0):
-            self.settler.core.contents.ready = 0
-            found, rate, done = self.settler.settle(t, y, yd, hold=hold)
-            if done and self._stays(found, y, magnitude):
-                return found, rate, impulse
-        return None
+        self.settler.core.contents.ready = 0
+        found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
+        return (found, rate, impulse) if done and self._stays(found, y, magnitude) else None
 
     def _stays(self, found: Floats, y: Floats, magnitude: Floats) -> bool:
         """Whether the state is where the balances of the instant put it; one that moves besides is no answer."""
