@@ -90,8 +90,8 @@ class Restart:
         """
         follows = np.isin(self.settler.system.kinds, ("f", "e")) & ~self.state
         for part in GUESSES if follows.any() else GUESSES[:1]:
-            found, moved = _held(self.settler, t, (np.where(follows, y + part * magnitude, y), yd), magnitude)
-            if found is not None and not moved[self.state].any():
+            beside = np.where(follows, y + part * magnitude, y), yd
+            if (found := still(self.settler, t, beside, self.state, magnitude)) is not None:
                 return found
         return None
 

@@ -119,8 +119,6 @@ def independent(system: System, jy: Floats) -> bool:
 
 def dependent(found: Reactions) -> Ints:
     """Constraints (places in `multipliers`) that depend on those before them."""
-    if not found.multipliers.size:
-        return NONE
     if found.large:
         return _sparse_dependent(found)
     basis, left = np.zeros((0, found.rows.size)), []
