@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.least_change import solve
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.displacements import Displacements
 from sysdyn.runtime.start.impulses import Impulses
 from sysdyn.runtime.start.settled import HELD, Settler
+from sysdyn.runtime.start.starter import Starter, problem_of
 
 STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
@@ -25,6 +27,8 @@ SLACK = 1e-6
 """Of its magnitude: what a state may move by where rows hold only nearly."""
 ROUND_OFF = 1e-14
 """Of its magnitude: what a search moves an unknown by that stays where it is."""
+EXACT = 1e-9
+"""Scaled residual with which the slower search is content."""
 
 
 def still(
@@ -78,7 +82,10 @@ class Restart:
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
         self.settler.core.contents.ready = 0
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
-        return (found, rate, impulse) if done and self._stays(found, y, magnitude) else None
+        if done and self._stays(found, y, magnitude):
+            return found, rate, impulse
+        searched = self._search(t, y, yd)
+        return (*searched, impulse) if searched is not None and self._stays(searched[0], y, magnitude) else None
 
     def _stays(self, found: Floats, y: Floats, magnitude: Floats) -> bool:
         """Whether the state is where the balances of the instant put it; one that moves besides is no answer."""
@@ -107,3 +114,18 @@ class Restart:
     def magnitude(self, number: int) -> Floats:
         """Magnitudes [number] of the first unknowns."""
         return lib.reader(self.settler.core.contents.scale, number).copy()
+
+    def _search(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
+        """The same by Gauss-Newton with shortened steps: first with the state held, then with everything free."""
+        starter = Starter(self.settler.system.another("3"))
+        guess = starter.unknowns(t, y, yd)
+        # a rate of a multiplier that is zero because its constraint does not hold stays zero
+        idle, state = np.zeros((2, guess.size), dtype=bool)
+        idle[starter.n : starter.first] = np.isin(starter.rates, starter.system.idle_multipliers())
+        guess[idle], state[: y.size] = 0.0, self.state
+        for held in (state, np.zeros_like(state)):
+            rows, free = starter.every & ~starter.groups("initial"), ~(idle | held)
+            best = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
+            if best.residual < EXACT:
+                return starter.expand(best.x)
+        return None
