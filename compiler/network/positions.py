@@ -12,11 +12,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Sizes, box_size
-from sysdyn.compiler.network.primal.contents import held_at
+from sysdyn.compiler.network.primal.contents import told
 from sysdyn.compiler.network.primal.forest import IndexForest
 from sysdyn.compiler.network.primal.incidence import indices, loops_over, ranges_over, unrolled
 from sysdyn.compiler.network.primal.index_classes import Cell, Cut, End, Link
-from sysdyn.compiler.network.primal.overlaps import Ranges, initially, meeting, narrowed, ranges_of, untold
+from sysdyn.compiler.network.primal.overlaps import Ranges, initially, narrowed, ranges_of, untold
 from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature, stores_of
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -180,14 +180,11 @@ class _Contents:
     def _told(self, *, fixed: bool) -> Iterator[_Join]:
         """Contents that the text says, as numbers."""
         for j in self.springs:
-            within, b = ranges_of(j.loops, self.sizes, j.place), j.branch
-            if b is None or b.kind != "potential":
-                continue
-            for i in self.said.get((b.name, "bq"), ()):
-                found = meeting(i, b.at, within, self.sizes) if i.fixed == fixed else None
-                value = None if found is None or ex.variables(i.value) else held_at(b, i.target.data[1], found[1])
-                if found is not None and value is not None:
-                    yield replace(j, loops=narrowed(j.loops, found[0]), content=value)
+            if j.branch is not None and j.branch.kind == "potential":
+                said = self.said.get((j.branch.name, "bq"), ())
+                numbers = [i for i in said if i.fixed == fixed and not ex.variables(i.value)]
+                for _, loops, content in told(j.branch, numbers, self.sizes):
+                    yield replace(j, loops=loops, content=content)
 
     def _moved(self) -> Iterator[Initial]:
         """Positions of points that contents join to others: guesses moved least, written ones less."""

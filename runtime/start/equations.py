@@ -6,7 +6,6 @@ Unknowns x = (y as written, the derivatives that occur, what guessed expressions
 from __future__ import annotations
 
 import ctypes as c
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.inertia import with_flows
-from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
@@ -31,21 +29,19 @@ def pairs(system: System) -> tuple[Ints, Ints]:
 
 
 class Equations:
-    """system: as written; settled: its form "start"; measuring: guessed expressions hold but for what they miss.
+    """system: as written; settled: its form "start".
 
-    guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: rows of the guesses that have an
-    unknown of their own; unsettled [rows]: they need not hold; rows, columns, structural [entries]: of the matrix;
-    alike [unknowns]: number of the kind and unit of each; member [unknowns of y]: number of the kind; first: place of
-    the first that is missed.
+    guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: the rows of these guesses, each
+    with an unknown of its own; contents [rows]: those of them that guess what stores hold; unsettled [rows]: they need
+    not hold; rows, columns, structural [entries]: of the matrix; alike [unknowns]: number of the kind and unit of each;
+    member [unknowns of y]: number of the kind; first: place of the first that is missed.
     """
 
     def __init__(self, system: System, settled: System) -> None:
         self.n = system.form.written
         self.rates = rates_of(settled)
-        self.momenta = system.of_groups("momentum")
         self._rows(settled)
-        self.measuring = any(r.content for r in settled.description.rows)
-        self.missed = np.flatnonzero(self.guessed & self.measuring)
+        self.missed = np.flatnonzero(self.guessed)
         self.first = self.n + self.rates.size
         self.unsettled = inertial_rates(settled)
         self.unknowns = self.first + self.missed.size
@@ -53,17 +49,18 @@ class Equations:
         self._entries(settled)
         self.units = self._units(settled)
         self._kinds(system)
-        self.measured = self._measured(settled.rows)
+        self.measured = self._measured()
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _rows(self, settled: System) -> None:
-        """Rows of block initial that are guesses, and those of them that no text says."""
-        self.guessed, self.unsaid = (np.zeros(settled.rows, dtype=bool) for _ in range(2))
+        """Rows of block initial that are guesses, and those of them that no text says, that guess contents."""
+        self.guessed, self.unsaid, self.contents = np.zeros((3, settled.rows), dtype=bool)
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
             if group == "initial" and not rows.fixed:
                 self.guessed[first : first + rows.size] = True
                 self.unsaid[first : first + rows.size] = not rows.written
+                self.contents[first : first + rows.size] = rows.content
 
     def _entries(self, settled: System) -> None:
         """Those of dF/dy, of dF/dy' where the derivative is an unknown, of what is missed."""
@@ -79,12 +76,12 @@ class Equations:
         self.structural = np.concatenate([in_y, in_rate[self.rated], np.ones(self.missed.size, dtype=bool)])
 
     def _units(self, settled: System) -> list[str]:
-        """The unit of what each guess misses."""
+        """What tells the unit of what each guess misses: that of contents, another for each expression."""
         found = [""] * settled.rows
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
             if group == "initial":
-                found[first : first + rows.size] = [rows.unit] * rows.size
+                found[first : first + rows.size] = [rows.unit if rows.content else rows.owner] * rows.size
         return [found[row] for row in self.missed]
 
     def _kinds(self, system: System) -> None:
@@ -97,42 +94,14 @@ class Equations:
         of_family = [number.setdefault(f.kind, len(number)) for f in system.description.families]
         self.member = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: self.n]]
         self.members = len(number)
-        self._numbers, self._of_kinds = number, dict[tuple[str, ...], Mask]()
-        self._guesses = self._read([*number])
 
-    def _read(self, kinds: list[str]) -> NDArray[np.str_]:
-        """The kind of unknowns that each guess is of; none where it is of several [missed]."""
-        if not self.missed.size:
-            return np.zeros(0, dtype="<U5")
-        found, many = np.full(self.guessed.size, "", dtype="<U5"), np.zeros(self.guessed.size, dtype=bool)
-        for kind in (*kinds, "rate"):
-            moves = np.append(self._plain((kind,)), np.zeros(self.missed.size, dtype=bool))
-            rows = self.rows[self.structural & moves[self.columns]]
-            many[rows] |= found[rows] != ""
-            found[rows] = kind
-        return np.where(many, "", found)[self.missed]
-
-    def _plain(self, kinds: Sequence[str]) -> Mask:
-        """Unknowns of these kinds among those of y and the derivatives."""
-        among = np.array([kind in kinds for kind in self._numbers], dtype=bool)
-        return np.append(among[self.member], np.full(self.rates.size, "rate" in kinds))
-
-    def _measured(self, number: int) -> Mask:
+    def _measured(self) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
-        mask, missed = np.zeros(self.n, dtype=bool), np.zeros(number, dtype=bool)
-        missed[self.missed] = True
-        own = self.structural & missed[self.rows] & (self.columns < self.n)
+        mask = np.zeros(self.n, dtype=bool)
+        own = self.structural & self.contents[self.rows] & (self.columns < self.n)
         mask[self.columns[own]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
-
-    def moves(self, kinds: Sequence[str]) -> Mask:
-        """Unknowns of these kinds [unknowns]; read-only."""
-        key = tuple(kinds)
-        if key not in self._of_kinds:
-            missed = np.array([kind in key for kind in self._guesses], dtype=bool)
-            self._of_kinds[key] = read_only(np.append(self._plain(key), missed))
-        return self._of_kinds[key]
 
     def core(self, system: System, settled: System) -> lib.RowsOfStart:
         """The core's structure for the rows of one settled system."""

@@ -80,11 +80,10 @@ class Restart:
         if kept is not None:
             return *kept, impulse
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
-        for hold in (HELD, 1.0):
-            self.settler.core.contents.ready = 0
-            found, rate, done = self.settler.settle(t, y, yd, hold=hold)
-            if done and self._stays(found, y, magnitude):
-                return found, rate, impulse
+        self.settler.core.contents.ready = 0
+        found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
+        if done and self._stays(found, y, magnitude):
+            return found, rate, impulse
         searched = self._search(t, y, yd)
         return (*searched, impulse) if searched is not None and self._stays(searched[0], y, magnitude) else None
 
@@ -98,8 +97,8 @@ class Restart:
         """
         follows = np.isin(self.settler.system.kinds, ("f", "e")) & ~self.state
         for part in GUESSES if follows.any() else GUESSES[:1]:
-            found, moved = _held(self.settler, t, (np.where(follows, y + part * magnitude, y), yd), magnitude)
-            if found is not None and not moved[self.state].any():
+            beside = np.where(follows, y + part * magnitude, y), yd
+            if (found := still(self.settler, t, beside, self.state, magnitude)) is not None:
                 return found
         return None
 

@@ -41,6 +41,8 @@ CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
+NOTED = 1e-9
+"""Of its size: a move of a guess that is told."""
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
 EXPLAINED = 0.1
@@ -69,30 +71,20 @@ class ConsistentState:
         return y, yd
 
 
-def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Solution | None:
-    """The point nearest to the guess on these rows, from x in these unknowns; None where they do not hold."""
+def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Floats:
+    """The point nearest to the guess on these rows, from x in these unknowns; x where they do not hold."""
+    if not (rows.any() and free.any()):
+        return x
     found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
-    return found if found.residual < EXACT else None
+    return found.x if found.residual < EXACT else x
 
 
 def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
-    """The guess moved onto guessed expressions, as far as constraints and fixed values let it."""
-    written = starter.guessed & ~starter.unsaid
-    if not written.any():
-        return guess
-    free = free & (np.arange(free.size) < starter.n)
-    # an expression gives its own unknown where the others are guessed by numbers: of several roots that one is meant
-    own = free & ~starter.written
-    given = _onto(starter, t, guess, guess, rows=written, free=own) if own.any() else None
-    guess = guess if given is None else given.x
-    rows = written | starter.groups("phi", "psi")
-    found = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-    if found.residual < EXACT or (np.isfinite(found.residual) and given is None):
-        guess = found.x
-    # of a flow that an expression guesses, the momentum is guessed with it
-    momenta = free & starter.moves(("p",)) & ~starter.written
-    moved = _onto(starter, t, guess, guess, rows=starter.groups("momentum"), free=momenta)
-    return guess if moved is None else moved.x
+    """The guess with what written expressions give their own unknowns where the others are guessed by numbers: of
+    several roots that one is meant.
+    """
+    own = free & ~starter.written & (np.arange(free.size) < starter.n)
+    return _onto(starter, t, guess, guess, rows=starter.guessed & ~starter.unsaid, free=own)
 
 
 def _rescaled(
@@ -129,14 +121,11 @@ def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: M
     """X with what follows as implicit unknowns at their guesses make it: of two roots of a gamma that is not linear the
     iteration then begins at that of the guess.
     """
-    bent = _bent(starter, t, x) & starter.groups("gamma")
-    held = starter.moves(("e",)).copy()
-    held[held] = np.isin(np.flatnonzero(held), starter.columns[bent[starter.rows]])
+    held = starter.moves("e") & starter.written
     if not held.any():
         return x
-    rows, may = starter.every & ~bent & ~starter.groups("gamma_rate"), free & ~held & starter.following(t, x)
-    found = _onto(starter, t, x, guess, rows=rows, free=may)
-    return x if found is None else starter.without_noise(found.x, starter.scale(t, x))
+    rows, may = starter.every & ~starter.groups("gamma", "gamma_rate"), free & ~held & starter.following(t, x)
+    return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -196,8 +185,9 @@ def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         x = found.x
     # what round-off left is no magnitude; rates follow from the rest by linear rows
     x = starter.without_noise(x, starter.scale(t, x))
+    x[starter.n : starter.first] = guess[starter.n : starter.first]
     starter.work = own
-    return _rescaled(starter, t, np.where(starter.moves(("rate",)), guess, x), guess, free)
+    return _rescaled(starter, t, x, guess, free)
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -258,41 +248,38 @@ def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
     return "asked for by " + ", ".join(found[:4]) if found else "asked for by the balance of efforts"
 
 
-def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> tuple[tuple[str, float, float, str], ...]:
-    given = starter.given
-    change = np.abs(x[: starter.n] - given.guess)
-    places = np.flatnonzero(
-        given.written & ~given.fixed & (change > 1e-9 * np.maximum(np.abs(given.guess), 1e-3 * scale[: starter.n]))
-    )
-    found = [
-        (starter.system.name(int(k)), float(given.guess[k]), float(x[k]), _asked(starter, t, x, int(k)))
-        for k in places[:100]
-    ]
-    return (*found, *_missed(starter, t, x, scale))
+Moved = tuple[str, float, float, str]
 
 
-def _missed(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[tuple[str, float, float, str]]:
-    """Guesses by expressions that the start does not meet: name of what the expression guesses, its value, the start's.
+def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[Moved]:
+    """Written guesses, of unknowns and by expressions, that the start does not meet."""
+    given, n = starter.given, starter.n
+    change, size = x.copy(), scale.copy()
+    change[:n] -= given.guess
+    size[:n] = np.maximum(np.abs(given.guess), 1e-3 * scale[:n])
+    told = starter.written & (np.abs(change) > NOTED * size)
+    told[:n] &= ~given.fixed
+    for place in np.flatnonzero(told)[:100].tolist():
+        if place >= n:
+            yield _missed(starter, t, x, place)
+        else:
+            guess = float(given.guess[place])
+            yield starter.system.name(place), guess, float(x[place]), _asked(starter, t, x, place)
+
+
+def _missed(starter: Starter, t: float, x: Floats, place: int) -> Moved:
+    """Name of what an expression guesses, its value, the start's.
 
     Where a row guesses several unknowns at once its label stands for them, and 0 for what it would miss.
     """
-    rows = starter.guessed & ~starter.unsaid
-    if not rows.any():
-        return
-    misses = starter.settled.residual(t, *starter.expand(x))
-    size = starter.row_scale(t, x, scale)
-    values = starter.jacobian(t, x)
-    for row in np.flatnonzero(rows & (np.abs(misses) * size > 1e-9))[:100]:
-        mine = (starter.rows == row) & (starter.columns < starter.n) & (values != 0.0)
-        own = mine & ~starter.written[starter.columns]
-        if own.sum() == 1:
-            (entry,) = np.flatnonzero(own)
-            k = int(starter.columns[entry])
-            guess = float(x[k] - misses[row] / values[entry])
-            yield starter.system.name(k), guess, float(x[k]), _asked(starter, t, x, k)
-        else:
-            label = starter.settled.row_label(int(row))
-            yield f"guess of line {label.line}", 0.0, float(misses[row]), "what its two sides differ by"
+    row, values, miss = starter.missed[place - starter.first], starter.jacobian(t, x), float(x[place])
+    mine = (starter.rows == row) & (starter.columns < starter.n) & (values != 0.0)
+    own = np.flatnonzero(mine & ~starter.written[starter.columns])
+    if own.size == 1:
+        k = int(starter.columns[own[0]])
+        return starter.system.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, t, x, k)
+    label = starter.settled.row_label(int(row))
+    return f"guess of line {label.line}", 0.0, miss, "what its two sides differ by"
 
 
 def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
@@ -357,7 +344,7 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     if not strategy:
         raise _explain(starter, t0, guess, free, best)
     y, yd = starter.expand(best.x)
-    moved = _moved(starter, t0, best.x, starter.scale(t0, best.x))
+    moved = tuple(_moved(starter, t0, best.x, starter.scale(t0, best.x)))
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess, free

@@ -3,8 +3,8 @@
 Unknowns: y as written and the derivatives that the settled rows read; equations: all settled rows (as written,
 phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.
 
-Where contents of stores follow from several coordinates, each has a row of block `initial` and an unknown of its own,
-what the row misses; these are what moves least, and the coordinates follow.
+A guess of an expression, or of contents that follow from several coordinates, has a row of block `initial` and an
+unknown of its own, what the row misses; these move least, and coordinates follow contents.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
-from sysdyn.runtime.numerics.rank import count, decomposed
+from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.values import dataclass
 
@@ -71,17 +71,6 @@ def _given(system: System) -> _Given:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class _Sums:
-    """Rows [k] that hold weights [k, n] times the rows `of` [n] instead; entries of these, and the n of each."""
-
-    rows: Places
-    of: Places
-    weights: Floats
-    entries: Places
-    place: Places
-
-
 def remembered(
     ask: Callable[[Starter, float, Floats], NDArray[Any]],
 ) -> Callable[[Starter, float, Floats], NDArray[Any]]:
@@ -107,8 +96,8 @@ def remembered(
 class Starter:
     """The equations of the start of one model (t0 apart), for one search: nothing but t and x changes.
 
-    Where contents of stores are guessed, guessed expressions hold but for an unknown of their own each, behind those of
-    y and its rates; sums of balances without inertia have their rates.
+    Guessed expressions hold but for an unknown of their own each, behind those of y and its rates; sums of balances
+    without inertia have their rates.
     """
 
     def __init__(self, system: System) -> None:
@@ -126,12 +115,14 @@ class Starter:
         self.measured = known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
-        if not known.measuring:
-            self.every &= ~self.guessed
-        self.rows, self.columns, self._structural = known.rows, known.columns, known.structural
-        self._sums = self._floating(np.flatnonzero(known.unsettled))
-        if self._sums is not None:
-            self._summed_rows(self._sums)
+        self.rows, self.columns = known.rows, known.columns
+        self._summed = np.flatnonzero(known.unsettled)
+        self._sums = self._floating(self._summed)
+        self._places = self._summed[: len(self._sums)]  # where these stand
+        if self.summed:
+            self.every[self._places] = True
+            self.rows = np.append(self.rows, np.repeat(self._places, known.unknowns))
+            self.columns = np.append(self.columns, np.tile(np.arange(known.unknowns), self._places.size))
         self.written = np.concatenate(
             [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
         )
@@ -141,18 +132,10 @@ class Starter:
         self.settled.forget()
         self.system.forget_once(EQUATIONS)
 
-    def _summed_rows(self, sums: _Sums) -> None:
-        """The entries of sums of rows behind the others."""
-        self.every[sums.rows] = True
-        self.rows = np.concatenate([self.rows, np.repeat(sums.rows, sums.entries.size)])
-        self.columns = np.concatenate([self.columns, np.tile(self.columns[sums.entries], sums.rows.size)])
-        more = np.tile(self._structural[sums.entries], sums.rows.size)
-        self._structural = np.concatenate([self._structural, more])
-
     @functools.cached_property
     def _balance(self) -> lib.Balance:
         """The rows and their entries, sums of rows among them."""
-        if self._sums is None:
+        if not self.summed:
             return self.core.balance  # type: ignore[no-any-return]
         self._own_balance = Balance(self.settled.rows, self.rows, self.columns, self.equations.alike)
         return self._own_balance.core
@@ -165,7 +148,8 @@ class Starter:
         inertial[self._flow] = True
         held = np.zeros(self.first + self.missed.size, dtype=bool)
         held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
-        held[self.columns[self._structural & ~self.groups("phi")[self.rows]]] = False
+        known = self.equations
+        held[known.columns[known.structural & ~self.groups("phi")[known.rows]]] = False
         return held
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
@@ -198,13 +182,14 @@ class Starter:
     @remembered
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
-        values = np.zeros(self.equations.rows.size)
+        known, values = self.equations, np.zeros(self.equations.rows.size)
         self._ask(lib.core.sd_start_jacobian, t, x, values)
-        if self._sums is None:
+        if not self.summed:
             return values
-        summed = self._sums.weights[:, self._sums.place] * values[self._sums.entries]
-        values[self._sums.entries] = 0.0
-        return np.concatenate([values, summed.ravel()])
+        full = np.zeros((self.settled.rows, known.unknowns))
+        np.add.at(full, (known.rows, known.columns), values)
+        values[np.isin(known.rows, self._summed)] = 0.0
+        return np.append(values, self._sums @ full[self._summed])
 
     def row_scale(self, t: float, x: Floats, scale: Floats) -> Floats:
         """One over the size of the terms of each row [rows], by the larger of magnitudes and values."""
@@ -214,44 +199,37 @@ class Starter:
 
     def with_sums(self, values: Floats) -> Floats:
         """Values of all rows [rows, k] with the sums of rows in their places."""
-        if self._sums is None:
-            return values
-        values = values.copy()
-        values[self._sums.rows] = self._sums.weights @ values[self._sums.of]
+        if self.summed:
+            values = values.copy()
+            values[self._places] = self._sums @ values[self._summed]
         return values
 
     @property
     def summed(self) -> bool:
         """Whether rows hold sums of rows (balances of what floats)."""
-        return self._sums is not None
+        return len(self._sums) > 0
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups; read-only."""
         return self.settled.of_groups(*names)
 
-    def moves(self, kinds: Sequence[str]) -> Mask:
-        """Unknowns of these kinds [unknowns]; read-only."""
-        return self.equations.moves(kinds)
+    def moves(self, *kinds: str) -> Mask:
+        """Unknowns of y of these kinds [unknowns]."""
+        found = np.zeros(self.equations.unknowns, dtype=bool)
+        found[: self.n] = self.system.are(*kinds)[: self.n]
+        return found
 
-    def _floating(self, unsettled: Places) -> _Sums | None:
-        """Sums of balances with inertia that read none: nothing but differences of their flows stand in T*.
+    def _floating(self, unsettled: Places) -> Floats:
+        """Sums [k, unsettled] of balances with inertia that read none: T* holds nothing but differences of their flows.
 
         They are taken from the matrix of inertia at two points: what moves with the state is left out.
         """
-        if not unsettled.size or self.n > DENSE:
-            return None
-        matrix = np.hstack([self._inertia(unsettled, shift) for shift in (0.0, 0.1)])
-        if not np.isfinite(matrix).all():
-            return None
-        size = np.abs(matrix).max(axis=0)
-        left, sigma, _ = decomposed(matrix / np.where(size > 0.0, size, 1.0))
-        weights = left[:, count(sigma) :].T
-        if not weights.size:
-            return None
-        number = np.full(self.settled.rows, -1, dtype=np.int64)
-        number[unsettled] = np.arange(unsettled.size)
-        entries = np.flatnonzero(number[self.rows] >= 0)
-        return _Sums(unsettled[: len(weights)], unsettled, weights, entries, number[self.rows[entries]])
+        if unsettled.size and self.n <= DENSE:
+            matrix = np.hstack([self._inertia(unsettled, shift) for shift in (0.0, 0.1)])
+            if np.isfinite(matrix).all():
+                size = np.abs(matrix).max(axis=0)
+                return null_space((matrix / np.where(size > 0.0, size, 1.0)).T).T
+        return np.zeros((0, unsettled.size))
 
     def _inertia(self, unsettled: Places, shift: float) -> Floats:
         """The matrix of inertia beside a state [dynamics_rate rows, flows]; zeros where a row is no flow's balance."""
@@ -271,18 +249,11 @@ class Starter:
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
 
-        The flow of a momentum counts as state: where neither is written, both begin at zero.
+        Of a momentum and its flow the one that is written carries the state, else the momentum.
         """
-        jy, jyd = self.system.jacobian(t, *self.expand(x))
+        _, jyd = self.system.jacobian(t, *self.expand(x))
         state = self.system.are(*STATE)[: self.n]
-        carries = self.system.differential(jyd)[: self.n] & state
-        if self._flow.size:
-            pattern = self.system.pattern
-            inert = np.zeros(self.n, dtype=bool)
-            inert[pattern.columns_of()[(jy != 0.0) & self.equations.momenta[pattern.row]]] = True
-            moved = self._flow[carries[self._momentum]]
-            carries[moved[inert[moved]]] = True
-        carries &= ~self.measured
+        carries = self.system.differential(jyd)[: self.n] & state & ~self.measured
         carries |= self.given.written & state
         carries[np.where(self.given.written[self._flow], self._momentum, self._flow)] = False
         found = np.ones(x.size, dtype=bool)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import with_flows
-from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.start.start import ConsistentState
@@ -35,19 +34,6 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     return found if free is None else found & ~free
 
 
-def _read(system: System) -> NDArray[np.bool_]:
-    """Unknowns whose rates block observe_rate reads, as far as it is told [unknowns], but for flows of coordinates with
-    a momentum of their own.
-    """
-    kernels, found = system.description.blocks.get("observe_rate", ()), np.ones(system.unknowns, dtype=bool)
-    if all(kernel.rates is not None for kernel in kernels):
-        families = frozenset[int]().union(*(kernel.rates or () for kernel in kernels))
-        found = np.isin(system.family_of, sorted(families))
-    for _, flows in with_flows(system):
-        found[flows] = False
-    return read_only(found)
-
-
 def _nudges(number: int) -> list[tuple[Floats, Floats]]:
     """Parts by which values are moved, and times by which rates are, at the start and beside it."""
     random = np.random.default_rng(0)
@@ -58,7 +44,9 @@ def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     """[observed]: elements of block observe whose derivative follows from the equations."""
     y, yd = start.for_form(system)
     _, jyd = system.jacobian(start.t, y, yd)
-    free = system.once("rates observed", lambda: _read(system)) & ~unique(system, jyd)
+    free = ~unique(system, jyd)
+    for _, flows in with_flows(system):  # functions of the tested momenta
+        free[flows] = False
     if not free.any():
         return np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
     nudges = system.once_if_small("nudges", lambda: _nudges(y.size))

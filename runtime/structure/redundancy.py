@@ -119,8 +119,6 @@ def independent(system: System, jy: Floats) -> bool:
 
 def dependent(found: Reactions) -> Ints:
     """Constraints (places in `multipliers`) that depend on those before them."""
-    if not found.multipliers.size:
-        return NONE
     if found.large:
         return _sparse_dependent(found)
     basis, left = np.zeros((0, found.rows.size)), []
@@ -170,7 +168,7 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     starter, found = Starter(system), []
     x = starter.unknowns(state.t, state.y, state.yd)
     size, moves = _moves(system, state)
-    rows, free = starter.groups("phi"), starter.moves(("q",))
+    rows, free = starter.groups("phi"), starter.moves("q")
     for move in moves:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * np.append(move, np.zeros(x.size - move.size))

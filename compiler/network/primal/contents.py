@@ -13,11 +13,11 @@ nothing is said of it.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, meet, shape_of, union, without
+from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, meet, shape_of, union, without
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import (
@@ -32,7 +32,7 @@ from sysdyn.compiler.network.primal.incidence import (
     ranges_over,
 )
 from sysdyn.compiler.network.primal.integrals import line
-from sysdyn.compiler.network.primal.overlaps import initially, inside, ranges_of
+from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, narrowed, ranges_of
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
@@ -48,7 +48,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
-from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Network, Parameter, State
+from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Loop, Network, Parameter, State
 
 TELLING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 """What tells what a store holds: by its law its effort or flow, and its displacement or momentum itself."""
@@ -67,6 +67,16 @@ def held_at(branch: Branch, kind: str, value: Node) -> Node | None:
     content = own(branch, held)
     straight = None if variables(branch.law) - {content} else line(branch.law, content)
     return None if straight is None else straight.inverse(value)
+
+
+def told(b: Branch, initials: Iterable[Initial], sizes: Sizes) -> Iterator[tuple[Initial, tuple[Loop, ...], Node]]:
+    """Of statements about a branch those that tell what elements of it hold, the loops over these, what they hold."""
+    within = ranges_of(b.loops, sizes, b.place)
+    for initial in initials:
+        found = meeting(initial, b.at, within, sizes)
+        content = None if found is None else held_at(b, initial.target.data[1], found[1])
+        if found is not None and content is not None:
+            yield initial, narrowed(b.loops, found[0]), content
 
 
 def at_stores(network: Network, incidence: Incidence, reader: Rewriter) -> Iterator[Initial]:

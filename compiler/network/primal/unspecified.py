@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
-from sysdyn.compiler.network.primal.contents import TELLING, held_at
-from sysdyn.compiler.network.primal.overlaps import meeting, narrowed, ranges_of, untold
+from sysdyn.compiler.network.primal.contents import TELLING, told
+from sysdyn.compiler.network.primal.overlaps import narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
 from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
@@ -62,14 +62,10 @@ def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Ini
 
     Left out is what it guesses in words that tell no content; what is fixed is guessed as well.
     """
-    within, telling = ranges_of(b.loops, sizes, b.place), [i for i in initials if _tells(i, b)]
-    for initial in telling:
-        found = meeting(initial, b.at, within, sizes)
-        if found is None:
-            continue
-        content, fixed = held_at(b, initial.target.data[1], found[1]), initial.fixed
-        if content is not None:
-            yield replace(initial, value=content, loops=narrowed(b.loops, found[0]), fixed=False, said=not fixed)
+    telling = [i for i in initials if _tells(i, b)]
+    for i, loops, content in told(b, telling, sizes):
+        yield replace(i, value=content, loops=loops, fixed=False, said=not i.fixed)
+    within = ranges_of(b.loops, sizes, b.place)
     zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
     yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in untold(telling, b.at, within, sizes))
 
