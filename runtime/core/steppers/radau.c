@@ -51,10 +51,11 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->unknowns + 1;
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
-                          &radau->slope[2], &radau->point, &radau->point_d, &radau->y, &radau->rate, &radau->ee,
-                          &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms, &radau->pull, &radau->first};
-    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full, radau->stage, radau->stage_d};
-    size_t number = sizeof vectors / sizeof *vectors, sets = sizeof of_stages / sizeof *of_stages;
+                          &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->newton_weight,
+                          &radau->scale, &radau->pull, &radau->terms, &radau->first}; /* the last ones: of steep laws */
+    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->stage, radau->stage_d, radau->base, radau->full};
+    size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
+           sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
     radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
@@ -338,14 +339,14 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
 static void project(sd_radau *radau)
 {
     size_t size = (size_t)radau->n * sizeof(double);
-    memcpy(radau->point, radau->phi, size);
-    memcpy(radau->point_d, radau->yd, size);
-    if (sd_settle_point(radau->project, radau->t, radau->point, radau->point_d))
+    memcpy(radau->y, radau->phi, size);
+    memcpy(radau->rate, radau->yd, size);
+    if (sd_settle_point(radau->project, radau->t, radau->y, radau->rate))
         return;
-    memcpy(radau->phi, radau->point, size);
+    memcpy(radau->phi, radau->y, size);
     for (int32_t i = 0; i < radau->n; i++)
         if (radau->smooth[i])
-            radau->slope[0][i] = radau->yd[i] = radau->point_d[i];
+            radau->slope[0][i] = radau->yd[i] = radau->rate[i];
 }
 
 int sd_radau_step(sd_radau *radau)
