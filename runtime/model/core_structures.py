@@ -286,7 +286,7 @@ class Radau(c.Structure):
         *[(name, _P) for name in ["phi", "yd", "last", "before"]],
         ("slope", _P * POINTS),
         ("refined", _I * POINTS),
-        *[(name, _P * STAGES) for name in ["z", "kept", "stage", "stage_d", "d", "base", "full"]],
+        *[(name, _P * STAGES) for name in ["z", "kept", "d", "base", "full"]],
         *[(name, _P) for name in ["first", "pull", "gap"]],
         *[(name, _D * POINTS) for name in ["apart", "bend"]],
         *[(name, _P) for name in ["y", "rate", "ee", "weight"]],

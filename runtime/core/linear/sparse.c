@@ -33,7 +33,7 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
     lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    lu->inverse = calloc(2 * m + all + 1, sizeof(sd_number));
+    lu->inverse = calloc(m + all + 1, sizeof(sd_number));
     lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
     lu->u_row = malloc((size_t)lu->u_room * sizeof(int32_t));
     lu->l_value = malloc((size_t)lu->l_room * sizeof(sd_number));

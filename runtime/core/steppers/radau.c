@@ -44,6 +44,17 @@ static void start(void *radau, double t, const double *y, const double *yd, doub
     sd_radau_start(radau, t, y, yd, h);
 }
 
+/* the stages of the last accepted step, before it was projected; y, yd [n] */
+static void show(const void *self, int32_t s, double *y, double *yd)
+{
+    const sd_radau *radau = self;
+    sd_radau_combine(radau->used->stages, radau->n, radau->used->inverse[s], radau->kept, yd);
+    for (int32_t i = 0; i < radau->n; i++) {
+        y[i] = radau->last[i] + radau->kept[s][i];
+        yd[i] /= radau->h_used;
+    }
+}
+
 sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const *complex_linear, int32_t stages)
 {
     sd_radau *radau = calloc(1, sizeof *radau);
@@ -53,7 +64,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
                           &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->newton_weight,
                           &radau->scale, &radau->pull, &radau->terms, &radau->first}; /* the last ones: of steep laws */
-    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->stage, radau->stage_d, radau->base, radau->full};
+    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full};
     size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
            sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
@@ -88,8 +99,8 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     radau->most_stages = stages;
     radau->method = radau->used = sd_radau_methods;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
-                                  &radau->taken, step, dense, refine, start, stages, NULL, NULL, radau->stage,
-                                  radau->stage_d, NULL, NULL, NULL, NULL, NULL, 1};
+                                  &radau->taken, step, dense, refine, start, stages, NULL, NULL, NULL, NULL,
+                                  NULL, NULL, NULL, NULL, NULL, 1, show};
     return radau;
 }
 
@@ -304,21 +315,13 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     radau->h_used = h;
     note_pulls(radau);
     for (int s = 0; s < method->stages; s++) {
-        sd_radau_combine(method->stages, radau->n, method->inverse[s], radau->z, radau->stage_d[s]);
-        for (int32_t i = 0; i < radau->n; i++) {
-            radau->stage[s][i] = radau->phi[i] + radau->z[s][i];
-            radau->stage_d[s][i] /= h;
-        }
-    }
-    memcpy(radau->phi, radau->stage[method->stages - 1], size);
-    memcpy(radau->yd, radau->stage_d[method->stages - 1], size);
-    memcpy(radau->slope[0], radau->yd, size);
-    for (int s = 0; s < method->stages; s++) {
         double *swap = radau->kept[s];
         radau->kept[s] = radau->z[s];
         radau->z[s] = swap;
     }
     radau->used = method;
+    show(radau, method->stages - 1, radau->phi, radau->yd);
+    memcpy(radau->slope[0], radau->yd, size);
     show_nodes(radau);
     double t = radau->t + h;
     radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;

@@ -81,7 +81,6 @@ typedef struct sd_radau {
     double *slope[SD_POINTS]; /* [n] derivatives at phi, last, before, for values within the step */
     int32_t refined[SD_POINTS];                     /* they are settled */
     double *z[SD_STAGES], *kept[SD_STAGES];         /* of this step, of the last accepted one */
-    double *stage[SD_STAGES], *stage_d[SD_STAGES];  /* y, yd of the last accepted step, before it was projected */
     double *d[SD_STAGES];                           /* right sides and corrections */
     double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it; of steep
                                                      * laws alone, like first and terms */
