@@ -91,8 +91,7 @@ class Integration:
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
         alone = origin is None and request.events is None
-        if system.unknowns > LARGE:
-            lib.core.sd_trim()  # of the run before
+        system.trim()  # of the run before
         self.origin = origin = origin or Origin(system, start, request.index)
         self.y, self.yd, self._start_rate = origin.point(own=alone)
         self._restart: Restart | None = None
@@ -132,7 +131,7 @@ class Integration:
         if self.system.unknowns > LARGE:
             self.origin.let_go()
             self.system.spare()
-            lib.core.sd_trim()
+            self.system.trim()
 
     def _put_away(self) -> None:
         """Lets go of patterns of a large model that no step reads: those of what is condensed."""

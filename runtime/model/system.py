@@ -19,7 +19,7 @@ from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, de
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
 from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
-from sysdyn.runtime.model.patterns import Pattern, Places, compress, places, read_only
+from sysdyn.runtime.model.patterns import Pattern, Places, compress, joined, places, read_only
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
@@ -44,6 +44,9 @@ KEPT = 1000
 """Unknowns up to which what is as long as they are, and quickly made, is kept."""
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
+HUGE = 1_000_000
+"""Unknowns beyond which pages that a stage left go back to the machine: it asks for them again for the next one, which
+costs a line of 500000 unknowns a tenth of its CPU time to the first step, and saves it a sixth of its memory."""
 DEAR = ("order", "sets")
 """Names of what is long to find and short to keep."""
 _NOWHERE: Callable[[int], int | None] = lambda _: None  # noqa: E731
@@ -137,6 +140,11 @@ class System:
         if self.description.systems is None:
             self.description.layouts.pop(("once", name, self.form.name, self.left_out), None)
 
+    def trim(self) -> None:
+        """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again."""
+        if self.unknowns > HUGE:
+            lib.core.sd_trim()
+
     def put_away(self, *, whole: bool) -> None:
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.
         Nobody may hold addresses of what goes.
@@ -193,20 +201,20 @@ class System:
 
     def _found_layout(self) -> Layout:
         form = self.form
-        number = np.asarray(form.k_row, dtype=np.int64)
-        parts = [Places(number, form.k_q.astype(np.int64)), Places(number, form.k_f.astype(np.int64))]
-        found = [self._places(call) for call in form.calls]
-        for pair in found:
-            parts += pair
+        parts = [Places(form.k_row, form.k_q), Places(form.k_row, form.k_f)]
+        for call in form.calls:
+            parts += self._places(call)
         held = held_rows(self.description, form, self.left_out)
         times = switch_rows(self.description, form)
         parts.append(Places(np.concatenate([held[0], times[0]]), np.concatenate([held[1], times[1]])))
-        pattern, slots = compress(form.rows, form.unknowns, parts)
-        entries = max([part.row.size for part in parts] + [1])
+        last, sizes = parts[-1], [part.row.size for part in parts]
+        parts = [joined(parts)]  # of a large one the room counts
+        pattern, (number,) = compress(form.rows, form.unknowns, parts)
+        slots = [np.ascontiguousarray(piece) for piece in np.split(number, np.cumsum(sizes)[:-1])]
         place = np.concatenate([np.full(held[0].size, -1), times[2]])
         reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
-        at_times = parts[-1].row.astype(np.int32), parts[-1].column.astype(np.int32), slots[-1].copy(), place
-        return Layout(pattern, tuple(slots), entries, at_times, reads_rate)
+        at_times = last.row.astype(np.int32), last.column.astype(np.int32), slots[-1].copy(), place
+        return Layout(pattern, tuple(slots), max([*sizes, 1]), at_times, reads_rate)
 
     def _assemble(self) -> None:
         form, layout = self.form, self._laid_out()

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.patterns import read_only
@@ -364,5 +363,5 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess, free
-        lib.core.sd_trim()
+        system.trim()
     return ConsistentState(t0, y, yd, moved, best.residual, strategy)
