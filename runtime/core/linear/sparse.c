@@ -6,6 +6,8 @@
 #include <string.h>
 
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
+#define ROOM 2          /* entries of a factor for each of the matrix: room for them */
+#define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
 #define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
 
 void sd_sparse_free(sd_sparse *lu)
@@ -30,15 +32,10 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     size_t m = (size_t)n, all = (size_t)rows;
     lu->n = n;
     lu->rows = rows;
-    lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
     lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
     lu->inverse = calloc(m + all + 1, sizeof(sd_number));
-    lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
-    lu->u_row = malloc((size_t)lu->u_room * sizeof(int32_t));
-    lu->l_value = malloc((size_t)lu->l_room * sizeof(sd_number));
-    lu->u_value = malloc((size_t)lu->u_room * sizeof(sd_number));
-    if (!lu->order || !lu->l_start || !lu->inverse || !lu->l_row || !lu->u_row || !lu->l_value || !lu->u_value) {
+    if (!lu->order || !lu->l_start || !lu->inverse) {
         sd_sparse_free(lu);
         return NULL;
     }
@@ -130,6 +127,26 @@ static void leave(sd_sparse *lu)
     lu->l_row = lu->u_row = NULL;
     lu->l_value = lu->u_value = NULL;
     lu->l_room = lu->u_room = 0;
+}
+
+/* room for factors of which nothing is known but the entries of their matrix */
+static int begin(sd_sparse *lu, int64_t entries)
+{
+    int64_t room = ROOM * entries + lu->n;
+    return grow(room, &lu->l_room, &lu->l_row, &lu->l_value) || grow(room, &lu->u_room, &lu->u_row, &lu->u_value);
+}
+
+/* lets go of what the columns of one factor have not taken */
+static void fit(int64_t taken, int64_t *room, int32_t **rows, sd_number **values)
+{
+    size_t kept = (size_t)taken + 1;
+    if ((int64_t)kept >= *room)
+        return;
+    int32_t *r = realloc(*rows, kept * sizeof *r);
+    *rows = r ? r : *rows;
+    sd_number *v = realloc(*values, kept * sizeof *v);
+    *values = v ? v : *values;
+    *room = (int64_t)kept;
 }
 
 /* with room for the search */
@@ -238,7 +255,11 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     lu->count = lu->mark + rows;
     for (int32_t e = 0; e < column[lu->n]; e++)
         lu->count[row[e]]++;
-    int failed = pivot_all(lu, column, row, value);
+    int failed = lu->l_room == 0 && begin(lu, column[lu->n]) ? 2 : pivot_all(lu, column, row, value);
+    if (!failed && lu->n > SMALL) {
+        fit(lu->l_start[lu->n], &lu->l_room, &lu->l_row, &lu->l_value);
+        fit(lu->u_start[lu->n], &lu->u_room, &lu->u_row, &lu->u_value);
+    }
     free(lu->stack);
     lu->stack = lu->head = lu->mark = lu->count = NULL;
     return failed;
