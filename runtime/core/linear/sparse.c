@@ -8,6 +8,7 @@
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
+#define NARROW 4        /* entries of both factors a column up to which they are a line's */
 #define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
 
 void sd_sparse_free(sd_sparse *lu)
@@ -305,6 +306,51 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     return 0;
 }
 
+/* work[place] -= part, where those at two places are held apart */
+static inline __attribute__((always_inline)) void lessen(int32_t place, int32_t one, int32_t two, sd_number part,
+                                                         sd_number *at_one, sd_number *at_two, sd_number *work)
+{
+    if (place == two)
+        *at_two -= part;
+    else if (place == one)
+        *at_one -= part;
+    else
+        work[place] -= part;
+}
+
+/* The solution of sd_sparse_solve from its right side in work; narrow: what the next two places wait for stays in
+ * registers, for along a line each waits for one of those before it. */
+static inline __attribute__((always_inline)) void substitute(const sd_sparse *lu, sd_number *x, sd_number *work,
+                                                             const double *column_scale, const int narrow)
+{
+    int32_t n = lu->n;
+    sd_number next = n > 0 ? work[0] : 0.0, behind = n > 1 ? work[1] : 0.0;
+    for (int32_t k = 0; k < n; k++) {
+        sd_number v = work[k] = narrow ? next : work[k];
+        next = behind;
+        behind = narrow && k + 2 < n ? work[k + 2] : 0.0;
+        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
+            if (narrow)
+                lessen(lu->l_row[l], k + 1, k + 2, lu->l_value[l] * v, &next, &behind, work);
+            else
+                work[lu->l_row[l]] -= lu->l_value[l] * v;
+    }
+    next = n > 0 ? work[n - 1] : 0.0;
+    behind = n > 1 ? work[n - 2] : 0.0;
+    for (int32_t k = n - 1; k >= 0; k--) {
+        sd_number v = (narrow ? next : work[k]) * lu->inverse[k];
+        int32_t c = lu->order[k];
+        next = behind;
+        behind = narrow && k > 1 ? work[k - 2] : 0.0;
+        x[c] = column_scale ? v * column_scale[c] : v;
+        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
+            if (narrow)
+                lessen(lu->u_row[p], k - 1, k - 2, lu->u_value[p] * v, &next, &behind, work);
+            else
+                work[lu->u_row[p]] -= lu->u_value[p] * v;
+    }
+}
+
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
@@ -312,18 +358,10 @@ void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double 
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];
     }
-    for (int32_t k = 0; k < n; k++) {
-        sd_number v = work[k];
-        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
-            work[lu->l_row[l]] -= lu->l_value[l] * v;
-    }
-    for (int32_t k = n - 1; k >= 0; k--) {
-        sd_number v = work[k] * lu->inverse[k];
-        int32_t c = lu->order[k];
-        x[c] = column_scale ? v * column_scale[c] : v;
-        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
-            work[lu->u_row[p]] -= lu->u_value[p] * v;
-    }
+    if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
+        substitute(lu, x, work, column_scale, 1);
+    else
+        substitute(lu, x, work, column_scale, 0);
 }
 
 void sd_sparse_basic(const sd_sparse *lu, const sd_number *b, sd_number *x, sd_number *work)
