@@ -99,15 +99,67 @@ class Room:
         self.slope = np.zeros(entries)
 
 
+class Straights:
+    """Stretches of eliminated unknowns whose terms read stretches, as the core has them: array, number."""
+
+    def __init__(self, found: Sums) -> None:
+        count, number = np.diff(found.start), found.place.size
+        same = np.diff(found.place) == 1
+        same &= np.diff(count) == 0
+        # within a stretch each term reads one further than the term above it
+        inner = np.repeat(np.concatenate([[False], same]), count)
+        above = np.arange(found.source.size) - np.repeat(np.concatenate([[0], count[:-1]]), count)
+        steps = np.ones(found.source.size, dtype=bool)
+        steps[inner] = found.source[inner] == found.source[above[inner]] + 1
+        broken = np.zeros(number, dtype=bool)
+        broken[np.repeat(np.arange(number), count)[~steps]] = True
+        begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
+        ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
+        made = (lib.Straight * max(begin.size, 1))()
+        order = np.arange(found.factor.size)
+        for low, high in zip(begin.tolist(), ends.tolist(), strict=True):
+            terms, entry = int(count[low]), int(found.start[low])
+            block = order[entry : entry + terms * (high - low)]
+            block[:] = block.reshape(high - low, terms).T.ravel()
+        self._begin, self._order, self._some = begin, order, np.zeros(begin.size, dtype=bool)
+        self._factors, self._constants = np.zeros(order.size), np.zeros(number)
+        terms_of, offset = count[begin], np.cumsum(count[begin]) - count[begin]
+        self._source = found.source[ranges(found.start[begin], terms_of)].astype(np.int32)
+        at, first = lib.pointer(self._factors), lib.pointer(self._source)
+        assert at is not None
+        assert first is not None
+        for k, (low, high, source) in enumerate(zip(begin.tolist(), ends.tolist(), offset.tolist(), strict=True)):
+            place, entry = int(found.place[low]), int(found.start[low])
+            made[k] = lib.Straight(place, high - low, int(count[low]), first + 4 * source, at + 8 * entry, None)
+        self.array, self.number = made, int(begin.size)
+
+    def renew(self, found: Sums) -> None:
+        """Takes the numbers of other sums of the same structure."""
+        self._factors[:] = found.factor[self._order]
+        self._constants[:] = found.constant
+        base = lib.pointer(self._constants)
+        assert base is not None
+        some = np.logical_or.reduceat(found.constant != 0.0, self._begin) if self._begin.size else self._some
+        for k in np.flatnonzero(some != self._some):
+            self.array[int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
+        self._some = some
+
+    def fix(self) -> None:
+        """Lets go of what only other numbers would need."""
+        self._order = self._order[:0].copy()
+
+
 class Condensed:
     """The kept unknowns and rows of a system; what Method and Settler ask of a System, with places of its own.
 
     kept, kept_rows: their places in the whole system; core: the core's structure of it.
     """
 
-    def __init__(self, system: System, found: Sums, terms: Composition, kept_rows: Longs, room: Room) -> None:
-        """found: the structure, and the first numbers; terms: as sums of kept unknowns."""
-        self._room, self._composition = room, terms
+    def __init__(
+        self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Longs, room: Room
+    ) -> None:
+        """found: the structure, and the first numbers; terms: as sums of kept unknowns; straights: of found."""
+        self._room, self._composition, self._straights = room, terms, straights
         self.whole, self.sums = system, found
         self.kept, self.kept_rows = found.kept, kept_rows.astype(np.int32)
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
@@ -187,57 +239,17 @@ class Condensed:
         self._keep.append(made)
         return made, int(first.size)
 
-    def _straights(self) -> tuple[c.Array[Any], int]:
-        """Stretches of eliminated unknowns whose terms read stretches."""
-        found = self.sums
-        count, number = np.diff(found.start), found.place.size
-        same = np.diff(found.place) == 1
-        same &= np.diff(count) == 0
-        # within a stretch each term reads one further than the term above it
-        inner = np.repeat(np.concatenate([[False], same]), count)
-        above = np.arange(found.source.size) - np.repeat(np.concatenate([[0], count[:-1]]), count)
-        steps = np.ones(found.source.size, dtype=bool)
-        steps[inner] = found.source[inner] == found.source[above[inner]] + 1
-        broken = np.zeros(number, dtype=bool)
-        broken[np.repeat(np.arange(number), count)[~steps]] = True
-        begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
-        ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
-        made = (lib.Straight * max(begin.size, 1))()
-        order = np.arange(found.factor.size)
-        for low, high in zip(begin.tolist(), ends.tolist(), strict=True):
-            terms, entry = int(count[low]), int(found.start[low])
-            block = order[entry : entry + terms * (high - low)]
-            block[:] = block.reshape(high - low, terms).T.ravel()
-        self._begin, self._order, self._some = begin, order, np.zeros(begin.size, dtype=bool)
-        self._factors, self._constants = np.zeros(order.size), np.zeros(number)
-        at, first = self._hold(self._factors), self._hold(found.source.astype(np.int32))
-        assert at is not None
-        assert first is not None
-        for k, (low, high) in enumerate(zip(begin.tolist(), ends.tolist(), strict=True)):
-            entry = int(found.start[low])
-            made[k] = lib.Straight(
-                int(found.place[low]), high - low, int(count[low]), first + 4 * entry, at + 8 * entry, None
-            )
-        self._keep.append(made)
-        return made, int(begin.size)
-
     def renew(self, found: Sums) -> None:
         """Takes the numbers of other sums of the same structure."""
         self.sums = found
         at, term = self._shared
         self._share[at] = self._composition.values(found.factor)[term]
-        self._factors[:] = found.factor[self._order]
-        self._constants[:] = found.constant
-        base = lib.pointer(self._constants)
-        assert base is not None
-        some = np.logical_or.reduceat(found.constant != 0.0, self._begin) if self._begin.size else self._some
-        for k in np.flatnonzero(some != self._some):
-            self._straight[0][int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
-        self._some = some
+        self._straights.renew(found)
 
     def fix(self) -> None:
         """Lets go of what only other numbers would need: `renew` is not asked again."""
-        del self._composition, self._shared, self._order
+        del self._composition, self._shared
+        self._straights.fix()
         found, nothing = self.sums, np.zeros(0, dtype=np.int64)
         self.sums = Sums(found.place, np.zeros(0), nothing, nothing, np.zeros(0), found.kept, found.unread)
 
@@ -257,7 +269,7 @@ class Condensed:
         parts = (form.k_row, form.k_q, form.k_f, *whole.slots[:2])
         row, q, f, slot_q, slot_f = (self._hold(np.ascontiguousarray(part[here])) for part in parts)
         made = lib.System.from_buffer_copy(whole.core)
-        made.kinematics = int(here.sum())
+        made.kinematics, made.column, made.row = int(here.sum()), None, None  # nothing reads its pattern
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
         made.k_scale = self._hold(np.ones(here.size))
         return made
@@ -266,7 +278,6 @@ class Condensed:
         whole = self.whole
         self._trim = self._trimmed()
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
-        straight = self._straight = self._straights()
         self.renew(self.sums)
         room = self._room
         self.condensed = lib.Condensed(
@@ -275,10 +286,10 @@ class Condensed:
             rows=self.rows,
             unknown_spans=unknown[1],
             row_spans=row[1],
-            straights=straight[1],
+            straights=self._straights.number,
             unknown=c.addressof(unknown[0]),
             row=c.addressof(row[0]),
-            straight=c.addressof(straight[0]),
+            straight=c.addressof(self._straights.array),
             observed_rates=int(self._observed_rates()),
             products=self._from.size,
             from_=self._hold(self._from),
@@ -387,6 +398,7 @@ class _Condenser:
             return self._forms
         # of a large one the room counts: other numbers find all anew
         forms, self._found, self._forms = self._forms, None, None
+        self._allowed = allowed[:0].copy()
         whole.forget_once("may leave")
         for form in () if forms is None else (forms.stepped, forms.settled):
             form.fix()
@@ -401,9 +413,9 @@ class _Condenser:
         if kept is None:
             return None
         places = np.flatnonzero(rows), np.flatnonzero(kept)
-        room, terms = Room(whole, self.settled), numbers.composed(whole.unknowns)
+        room, terms, straights = Room(whole, self.settled), numbers.composed(whole.unknowns), Straights(numbers)
         stepped, settled = (
-            Condensed(system, numbers, terms, rows, room)
+            Condensed(system, numbers, terms, straights, rows, room)
             for system, rows in zip((whole, self.settled), places, strict=True)
         )
         return Forms(stepped, settled)

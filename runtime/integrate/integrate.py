@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -90,7 +90,8 @@ class Integration:
         """origin: of this start, where it is known for several runs."""
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
-        alone = origin is None
+        alone = origin is None and request.events is None
+        system.trim()  # of the run before
         self.origin = origin = origin or Origin(system, start, request.index)
         self.y, self.yd, self._start_rate = origin.point(own=alone)
         self._restart: Restart | None = None
@@ -98,9 +99,7 @@ class Integration:
         self.underlying: Underlying | None = None
         if request.method in ON_UNDERLYING:
             self._solved, self.roles = origin.explicit
-        self._carries, self._resolved = self.roles.state, np.zeros(system.unknowns)
-        # a tolerance below what round-off leaves open is one that no step meets
-        self._least = origin.least / max(request.rtol, 1e-15)
+        self._carries = self.roles.state
         self.magnitude = self._magnitudes()
         if system.form.name == "2":
             self._weigh()
@@ -120,15 +119,26 @@ class Integration:
         self._driver()
         self.pieces = Pieces(self, request.events) if request.events else None
         self._spare()
+        self._put_away()
         if system.unknowns > LARGE:
-            del self.origin
+            del self.origin, self.yd, self._least
+            if self.forms is not None:  # of what is kept the method has its own
+                nothing = np.zeros(0, dtype=np.int32)
+                self.roles = replace(self.roles, test=nothing, power=nothing)
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
         if self.system.unknowns > LARGE:
             self.origin.let_go()
             self.system.spare()
-            lib.core.sd_trim()
+            self.system.trim()
+
+    def _put_away(self) -> None:
+        """Lets go of patterns of a large model that no step reads: those of what is condensed."""
+        if self.system.unknowns > LARGE and self.forms is not None:
+            self.system.put_away(whole=True)
+            for form in (self.forms.stepped, self.forms.settled):
+                form.whole.put_away(whole=False)
 
     def _weigh(self) -> None:
         """The factors of the rows q' - f; the magnitudes of nu follow them."""
@@ -144,6 +154,8 @@ class Integration:
         whole = request.events is not None or request.least_norm or request.fixed_step is not None
         if whole or not request.condense or request.method in ON_UNDERLYING:
             return None
+        if self.system.unknowns > LARGE:
+            self.system.put_away(whole=True)  # found again, if it is what is stepped
         found = condensed(self.system, self.start.t, self.y, self.yd)
         self._spare()
         return found
@@ -152,6 +164,22 @@ class Integration:
     def stepped(self) -> System | Condensed:
         """What the method sees."""
         return self.system if self.forms is None else self.forms.stepped
+
+    @cached_property
+    def _least(self) -> Floats:
+        """Magnitudes below which a tolerance is less than round-off leaves open: no step meets it [unknowns]."""
+        origin = getattr(self, "origin", None) or Origin(self.system, self.start, self.request.index)
+        return origin.least / max(self.request.rtol, 1e-15)
+
+    @cached_property
+    def _met(self) -> Floats:
+        """Largest |y| met [unknowns]; of a condensed form as far as it is shared (`_share`)."""
+        return np.zeros(self.system.unknowns)
+
+    @cached_property
+    def _resolved(self) -> Floats:
+        """|y| of which is known what round-off leaves open [unknowns]."""
+        return np.zeros(self.system.unknowns)
 
     def _magnitudes(self) -> Floats:
         found, self._time = self.origin.sized(self.request.t_end)
@@ -211,7 +239,6 @@ class Integration:
         self.method = Method(request.method, self.stepped, self.linear, self._order, self.underlying, most)
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
-        self._met = np.zeros(self.system.unknowns)
         self._unnamed = self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
         method = self.method.contents
         method.rtol, method.t_end = request.rtol, self.segments[0].end
@@ -239,13 +266,15 @@ class Integration:
 
     def _tell(self, method: Any) -> None:
         """What the method is told of each unknown that it steps: tolerance, magnitude, roles."""
-        found, seen, origin = self.roles, (self._atol, self.magnitude, self._met), self.origin
-        if self.forms is not None:
+        found, origin = self.roles, self.origin
+        if self.forms is None:
+            seen = self._atol, self.magnitude, self._met
+        else:
             kept = self.forms.stepped.kept
             if origin.kept is None:
                 origin.kept = self._kept_roles(self.forms.stepped.whole, kept)
             found = origin.kept
-            seen = (None if self._atol is None else self._atol[kept], self.magnitude[kept], self._met[kept])
+            seen = (None if self._atol is None else self._atol[kept], self.magnitude[kept], np.zeros(kept.size))
         smooth = found.smooth.astype(np.int32)
         if self.forms is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing
             smooth[found.smooth & self.system.are("q")[kept]] = UNPULLED
@@ -471,6 +500,9 @@ class Integration:
     ) -> None:
         """Restarts at t (s) from a point [unknowns as written], with the row of the instant `label`."""
         n = self.system.form.written
+        if not self._start_rate.flags.writeable:  # the start's own
+            self.y, self._start_rate = np.zeros(self.system.unknowns), np.zeros(self.system.unknowns)
+            self.run_.contents.start_rate = lib.pointer(self._start_rate)
         self.y[:], self._start_rate[:] = 0.0, 0.0
         self.y[:n], self._start_rate[:n] = point
         self.yd = np.where(self.roles.differential, self._start_rate, 0.0)
@@ -552,6 +584,7 @@ class Integration:
             if segment is not self.segments[0]:
                 before = time.process_time()
                 self._cross(segment)
+                self._put_away()
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
         magnitude = confirmed(self.system, self.request.t_end - self.start.t, *self._sizes())

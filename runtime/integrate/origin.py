@@ -36,7 +36,7 @@ class Origin:
         """Roles of what is left where unknowns leave the runs (condense/)."""
 
     def point(self, *, own: bool) -> tuple[Floats, Floats, Floats]:
-        """y, yd, rate [unknowns]; own: nobody else has them."""
+        """y, yd, rate [unknowns]; own: nobody else changes them."""
         return (self.y, self.yd, self.rate) if own else (self.y.copy(), self.yd.copy(), self.rate.copy())
 
     @property

@@ -125,7 +125,8 @@ class Runs:
         if options.events:  # laws are as the text says, whatever a run before from this start left
             self.system.description.p[[kink.branch for kink in options.events.kinks]] = LIVE
         # events write there: every run begins with these
-        self.begin = self.system.description.p.copy(), self.system.description.switches.active.copy()
+        begin = self.system.description.p, self.system.description.switches.active
+        self.begin = (begin[0].copy(), begin[1].copy()) if options.events else begin
         self.names = self.system.once("observed names", lambda: _observed_names(self.system.description))
         self.instants, self.kinds, self.common, self._joined = self._instants()
         self.keeping = keeping(options.output)

@@ -220,7 +220,9 @@ def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
     at, kind, written, extended = _layout(description)
     unknowns = written
-    k_q, k_f, first = _kinematics(description, at)
+    if "kinematics" not in description.layouts:  # the same in every form
+        description.layouts["kinematics"] = _kinematics(description, at)
+    k_q, k_f, first = description.layouts["kinematics"]
     bare = name in BARE
     if bare:
         k_rows, number = np.zeros(0, np.int32), 0

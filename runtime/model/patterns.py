@@ -151,13 +151,22 @@ def places(
     )
 
 
-def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern, list[Ints]]:
-    """One pattern that holds all parts, and for each part the place of each of its entries (int32)."""
+def joined(parts: Sequence[Places]) -> Places:
+    """All parts one behind the other (int32)."""
+    if len(parts) == 1:
+        return Places(*(np.asarray(item, dtype=np.int32) for item in (parts[0].row, parts[0].column)))
     empty = np.zeros(0, dtype=np.int32)
     row, column = (
         np.concatenate([empty, *(np.asarray(getattr(part, side), dtype=np.int32) for part in parts)])
         for side in ("row", "column")
     )
+    return Places(row, column)
+
+
+def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern, list[Ints]]:
+    """One pattern that holds all parts, and for each part the place of each of its entries (int32)."""
+    one = joined(parts)
+    row, column = one.row, one.column
     if row.size and (row.min() < 0 or row.max() >= rows or column.min() < 0 or column.max() >= unknowns):
         raise ContractError("an entry lies outside the matrix")
     number, starts, own = numbered(column, row, unknowns, rows)

@@ -158,39 +158,27 @@ def unresolved(system: System, y: Floats, jy: Floats) -> Floats:
 
     A charge of 1e-17 C in a sum with one of 0.1 C is known to 1e-17 C, whatever tolerance is asked of it.
     """
-    rows, columns = system.pattern.row, system.pattern.columns_of()
-    constraint = system.of_groups(*(g for g in dict.fromkeys(g for g, _, _ in system.form.groups) if g[:3] in _HOLDS))
-    take = constraint[rows] & np.isfinite(jy) & (jy != 0.0)
-    i, j, slope = rows[take], columns[take], np.abs(jy[take])
-    size = np.zeros(system.rows)
-    np.maximum.at(size, i, slope * np.abs(y[j]))
     found = np.zeros(system.unknowns)
-    np.maximum.at(found, j, np.finfo(np.float64).eps * size[i] / slope)
+    arrays = map(lib.pointer, (_holding(system), np.ascontiguousarray(y), jy, found))
+    if lib.core.sd_unresolved(c.byref(system.core), *arrays):
+        raise MemoryError
     return found
+
+
+def _holding(system: System) -> NDArray[np.bool_]:
+    """Rows of constraints [rows]."""
+    return system.of_groups(*(g for g in dict.fromkeys(g for g, _, _ in system.form.groups) if g[:3] in _HOLDS))
 
 
 def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
     """What round-off leaves open of each unknown [unknowns] in steps of `time` (s): flows are differences of their
     displacements over it, and multipliers balance what flows make of that.
     """
-    rows, columns = system.pattern.row.astype(np.int64), system.pattern.columns_of()
-    form, found = system.form, unresolved(system, y, jy)
-    found[form.k_f] = np.maximum(found[form.k_f], found[form.k_q] / time)
-    balance = system.of_groups("dynamics")
-    slope = np.where(np.isfinite(jy), np.abs(jy), 0.0)
-    take = balance[rows] & (slope > 0.0)
-    i, j, slope = rows[take], columns[take], slope[take]
-    multiplier = system.are("kappa", "mu", "e")[j]
-    leading = np.zeros(system.rows)
-    np.maximum.at(leading, i[multiplier], slope[multiplier])
-    told = multiplier & (slope >= GROUP * leading[i])
-    for _ in range(_SWEEPS):
-        row = np.zeros(system.rows)
-        np.maximum.at(row, i, slope * np.where(multiplier | system.are("f")[j], found[j], 0.0))
-        before = found.copy()
-        np.maximum.at(found, j[told], row[i[told]] / slope[told])
-        if (found == before).all():
-            break
+    found = np.zeros(system.unknowns)
+    kinds = _holding(system), system.of_groups("dynamics"), system.are("kappa", "mu", "e"), system.are("f")
+    arrays = map(lib.pointer, (*kinds, np.ascontiguousarray(y), jy))
+    if lib.core.sd_noise(c.byref(system.core), *arrays, time, _SWEEPS, GROUP, lib.pointer(found)):
+        raise MemoryError
     return found
 
 

@@ -19,7 +19,7 @@ from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, de
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
 from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
-from sysdyn.runtime.model.patterns import Pattern, Places, compress, places, read_only
+from sysdyn.runtime.model.patterns import Pattern, Places, compress, joined, places, read_only
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
@@ -44,8 +44,12 @@ KEPT = 1000
 """Unknowns up to which what is as long as they are, and quickly made, is kept."""
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
+HUGE = 1_000_000
+"""Unknowns beyond which pages that a stage left go back to the machine: it asks for them again for the next one, which
+costs a line of 500000 unknowns a tenth of its CPU time to the first step, and saves it a sixth of its memory."""
 DEAR = ("order", "sets")
 """Names of what is long to find and short to keep."""
+_NOWHERE: Callable[[int], int | None] = lambda _: None  # noqa: E731
 SETS = 4096
 """Active sets whose rows are kept."""
 
@@ -99,6 +103,8 @@ class System:
         self.failure = Failure()
         self._keep: list[Any] = []
         self._own: dict[Hashable, Any] = {}
+        self._layout: Layout | None = None
+        self._slots: list[Ints] = []
         self._assemble()
 
     def once(self, name: Hashable, make: Callable[[], Found]) -> Found:
@@ -134,6 +140,24 @@ class System:
         if self.description.systems is None:
             self.description.layouts.pop(("once", name, self.form.name, self.left_out), None)
 
+    def trim(self) -> None:
+        """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again."""
+        if self.unknowns > HUGE:
+            lib.core.sd_trim()
+
+    def put_away(self, *, whole: bool) -> None:
+        """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.
+        Nobody may hold addresses of what goes.
+        """
+        if self.description.systems is not None:
+            return
+        self.description.layouts.pop(self._layout_key, None)
+        self._layout, self._away = None, whole
+        self._core.column = self._core.row = None
+        if whole:
+            self._slots = []
+            self._told(_NOWHERE)
+
     def own(self, name: Hashable, make: Callable[[], Found]) -> Found:
         """What is made of this system's structures in the core, whatever the numbers: once for all runs it serves."""
         if name not in self._own:
@@ -166,59 +190,57 @@ class System:
 
     def _laid_out(self) -> Layout:
         """Pattern and slots of the form, found once a description."""
-        key = self.form.name, self.left_out
+        key = self._layout_key
         if key not in self.description.layouts:
-            self.description.layouts[key] = self._layout()
+            self.description.layouts[key] = self._found_layout()
         return self.description.layouts[key]  # type: ignore[no-any-return]
 
-    def _layout(self) -> Layout:
+    @property
+    def _layout_key(self) -> tuple[str, LeftOut]:
+        return self.form.name, self.left_out
+
+    def _found_layout(self) -> Layout:
         form = self.form
-        number = np.asarray(form.k_row, dtype=np.int64)
-        parts = [Places(number, form.k_q.astype(np.int64)), Places(number, form.k_f.astype(np.int64))]
-        found = [self._places(call) for call in form.calls]
-        for pair in found:
-            parts += pair
+        parts = [Places(form.k_row, form.k_q), Places(form.k_row, form.k_f)]
+        for call in form.calls:
+            parts += self._places(call)
         held = held_rows(self.description, form, self.left_out)
         times = switch_rows(self.description, form)
         parts.append(Places(np.concatenate([held[0], times[0]]), np.concatenate([held[1], times[1]])))
-        pattern, slots = compress(form.rows, form.unknowns, parts)
-        entries = max([part.row.size for part in parts] + [1])
+        last, sizes = parts[-1], [part.row.size for part in parts]
+        parts = [joined(parts)]  # of a large one the room counts
+        pattern, (number,) = compress(form.rows, form.unknowns, parts)
+        slots = [np.ascontiguousarray(piece) for piece in np.split(number, np.cumsum(sizes)[:-1])]
         place = np.concatenate([np.full(held[0].size, -1), times[2]])
         reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
-        at_times = parts[-1].row.astype(np.int32), parts[-1].column.astype(np.int32), slots[-1], place
-        return Layout(pattern, tuple(slots), entries, at_times, reads_rate)
+        at_times = last.row.astype(np.int32), last.column.astype(np.int32), slots[-1].copy(), place
+        return Layout(pattern, tuple(slots), max([*sizes, 1]), at_times, reads_rate)
 
     def _assemble(self) -> None:
         form, layout = self.form, self._laid_out()
-        self.pattern, slots = layout.pattern, list(layout.slots)
         calls = (lib.Call * max(len(form.calls), 1))()
         for k, call in enumerate(form.calls):
-            calls[k] = self.call(
-                call.block, call.at, call.to, form.rows, dy=slots[2 * k + 2], dyd=slots[2 * k + 3]
-            )
-        self.calls, self._slots = calls, slots
+            sizes = (int(slots.size) for slots in layout.slots[2 * k + 2 : 2 * k + 4])
+            calls[k] = self.call(call.block, call.at, call.to, form.rows, *sizes)
+        self.calls = calls
         scales = (lib.Call * max(len(form.scales), 1))()
         for k, scale in enumerate(form.scales):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
         self.kinematic_scale = np.ones(form.k_row.size)
         self._scratch = self._work(layout.entries)
-        self._keep += [calls, slots]
+        self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
-        self.core = lib.System(
+        self._core = lib.System(
             unknowns=form.unknowns,
             rows=form.rows,
-            entries=self.pattern.entries,
+            entries=layout.pattern.entries,
             calls=len(form.calls),
             kinematics=form.k_row.size,
-            column=lib.pointer(self.pattern.column),
-            row=lib.pointer(self.pattern.row),
             call=c.addressof(calls),
             k_row=lib.pointer(form.k_row),
             k_q=lib.pointer(form.k_q),
             k_f=lib.pointer(form.k_f),
-            k_slot_q=lib.pointer(slots[0]),
-            k_slot_f=lib.pointer(slots[1]),
             k_scale=lib.pointer(self.kinematic_scale),
             scales=len(form.scales),
             scale=c.addressof(scales),
@@ -226,9 +248,36 @@ class System:
             stop=lib.pointer(self.failure.flag),
             together=isinstance(self.carrier, LibraryCarrier),
         )
+        self._bring_back()
         self._sets: dict[bytes, tuple[Any, Any]] = self.once("sets", dict)
         self.switch()
         self.description.switches.join(self)
+
+    def _bring_back(self) -> Layout:
+        """The layout and all that points there."""
+        layout = self._layout = self._laid_out()
+        self._slots, self._away = list(layout.slots), False
+        self._core.column, self._core.row = lib.pointer(layout.pattern.column), lib.pointer(layout.pattern.row)
+        self._told(lambda k: lib.pointer(layout.slots[k]))
+        return layout
+
+    def _told(self, address: Callable[[int], int | None]) -> None:
+        """Where the entries of each part of the matrix stand."""
+        self._core.k_slot_q, self._core.k_slot_f = address(0), address(1)
+        for k in range(len(self.form.calls)):
+            self.calls[k].slot_dy, self.calls[k].slot_dyd = address(2 * k + 2), address(2 * k + 3)
+
+    @property
+    def core(self) -> lib.System:
+        """The core's structure."""
+        if self._layout is None:
+            self._bring_back()
+        return self._core
+
+    @property
+    def pattern(self) -> Pattern:
+        """Of the Jacobian."""
+        return (self._layout or self._bring_back()).pattern
 
     def _work(self, entries: int) -> Floats:
         """Room for the entries of any part, one after the other: all systems of a description have the same."""
@@ -246,7 +295,7 @@ class System:
             self._sets[key] = self._set_of_rows()
         self._held, pointers = self._sets[key]
         self.held, cleared = self._held[:2], self._held[4]
-        core = self.core
+        core = self._core
         core.held, core.clear = self.held[0].size, cleared.size
         core.held_row, core.held_unknown, core.held_slot, core.held_rate, core.cleared = pointers
 
@@ -266,13 +315,12 @@ class System:
         return np.array([self.form.at[family] + position for family, position in idle], dtype=np.int32)
 
     def call(
-        self, block: str, at: Ints, to: Ints, rows: int, *, dy: Ints | None = None, dyd: Ints | None = None
+        self, block: str, at: Ints, to: Ints, rows: int, n_dy: int = 0, n_dyd: int = 0
     ) -> lib.Call:
-        """The core's structure for one block with its tables; slots of its entries or None."""
+        """The core's structure for one block with its tables, and how many entries it writes."""
         tables = Tables(self.description.p, self.description.ix, at, to)
-        n_dy, n_dyd = (0 if slots is None else int(slots.size) for slots in (dy, dyd))
         made = self.carrier.bind(block, tables, Extent(self.form.extended, rows, n_dy, n_dyd), self.failure)
-        self._keep.append((tables, made, dy, dyd))
+        self._keep.append((tables, made))
         frame = lib.Frame(*(lib.pointer(item) for item in (tables.p, tables.ix, at, to)))
         return lib.Call(
             rows=made.rows,
@@ -281,18 +329,18 @@ class System:
             frame=frame,
             n_dy=n_dy,
             n_dyd=n_dyd,
-            slot_dy=lib.pointer(dy),
-            slot_dyd=lib.pointer(dyd),
         )
 
     @property
     def slots(self) -> list[Ints]:
         """Places in the pattern of entries: of q', of f in the rows q' - f; dy, dyd of each call; of held rows."""
+        if self._away:
+            self._bring_back()
         return self._slots
 
     def slots_dy(self, call: int) -> Ints:
         """Places in the pattern of the entries that a call adds to dF/dy."""
-        return self._slots[2 * call + 2]
+        return self.slots[2 * call + 2]
 
     def structural(self) -> tuple[Mask, Mask]:
         """Which places of the pattern [entries] some block writes in dF/dy, in dF/dyd (rows q' - f left out)."""
@@ -301,10 +349,10 @@ class System:
     def _structural(self) -> tuple[Mask, Mask]:
         in_y, in_rate = np.zeros(self.pattern.entries, dtype=bool), np.zeros(self.pattern.entries, dtype=bool)
         for k in range(len(self.form.calls)):
-            in_y[self._slots[2 * k + 2]] = True
-            in_rate[self._slots[2 * k + 3]] = True
-        in_y[self._slots[-1]] = True
-        in_rate[self._slots[-1][self._reads_rate != 0]] = True
+            in_y[self.slots[2 * k + 2]] = True
+            in_rate[self.slots[2 * k + 3]] = True
+        in_y[self.slots[-1]] = True
+        in_rate[self.slots[-1][self._reads_rate != 0]] = True
         return read_only(in_y), read_only(in_rate)
 
     def observer(self, block: str) -> lib.Call | None:
@@ -341,7 +389,7 @@ class System:
         """F(t, y, yd) [rows]."""
         r = np.zeros(max(self.rows, 1))
         a, b = self._buffer(y), self._buffer(yd)
-        lib.core.sd_residual(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), lib.pointer(r))
+        lib.core.sd_residual(c.byref(self._core), t, lib.pointer(a), lib.pointer(b), lib.pointer(r))
         self.failure.check()
         return r[: self.rows]
 

@@ -200,9 +200,7 @@ class Settler:
         return provide
 
     def _allocate(self) -> None:
-        self.core = lib.core.sd_settle_new(
-            c.byref(self._left.core), self.linear, int(self.rates.size), self._points
-        )
+        self.core = lib.core.sd_settle_new(c.byref(self._left.core), self.linear, int(self.rates.size))
         if not self.core:
             raise MemoryError
         core = self.core.contents

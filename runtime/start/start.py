@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
+from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
@@ -65,7 +65,9 @@ class ConsistentState:
     strategy: str = ""
 
     def for_form(self, system: System) -> tuple[Floats, Floats]:
-        """y, yd in the layout of an index form: new multipliers are zero."""
+        """y, yd in the layout of an index form: new multipliers are zero.  Read-only where they are the state's own."""
+        if system.unknowns == self.y.size:
+            return read_only(self.y[:]), read_only(self.yd[:])
         y, yd = np.zeros(system.unknowns), np.zeros(system.unknowns)
         y[: self.y.size], yd[: self.y.size] = self.y, self.yd
         return y, yd
@@ -348,5 +350,5 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess, free
-        lib.core.sd_trim()
+        system.trim()
     return ConsistentState(t0, y, yd, moved, best.residual, strategy)

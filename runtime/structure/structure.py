@@ -300,7 +300,7 @@ def structure(system: System, state: ConsistentState) -> Structure:
     names = tuple(_place(system, int(places[k])) for k in left)
     if system.unknowns > LARGE:
         system.spare()
-        lib.core.sd_trim()
+        system.trim()
     return Structure(
         index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names
     )

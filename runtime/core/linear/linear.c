@@ -33,8 +33,8 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
     linear->row = row;
     linear->row_scale = calloc(2 * m + 1, sizeof(double));
     linear->work = calloc(2 * m + nnz + 1, sizeof(sd_number));
-    linear->pivot = calloc(2 * m + 1, sizeof(int32_t));
-    linear->place = linear->pivot ? linear->pivot + m : NULL;
+    linear->pivot = calloc(order ? 1 : 2 * m + 1, sizeof(int32_t)); /* of dense ones */
+    linear->place = !linear->pivot || order ? NULL : linear->pivot + m;
     linear->rank = n;
     if (order)
         linear->sparse = sd_sparse_new(n, n, column, order);

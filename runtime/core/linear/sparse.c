@@ -6,6 +6,9 @@
 #include <string.h>
 
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
+#define ROOM 2          /* entries of a factor for each of the matrix: room for them */
+#define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
+#define NARROW 4        /* entries of both factors a column up to which they are a line's */
 #define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
 
 void sd_sparse_free(sd_sparse *lu)
@@ -30,15 +33,10 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     size_t m = (size_t)n, all = (size_t)rows;
     lu->n = n;
     lu->rows = rows;
-    lu->l_room = lu->u_room = 4 * (int64_t)column[n] + n;
     lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    lu->inverse = calloc(2 * m + all + 1, sizeof(sd_number));
-    lu->l_row = malloc((size_t)lu->l_room * sizeof(int32_t));
-    lu->u_row = malloc((size_t)lu->u_room * sizeof(int32_t));
-    lu->l_value = malloc((size_t)lu->l_room * sizeof(sd_number));
-    lu->u_value = malloc((size_t)lu->u_room * sizeof(sd_number));
-    if (!lu->order || !lu->l_start || !lu->inverse || !lu->l_row || !lu->u_row || !lu->l_value || !lu->u_value) {
+    lu->inverse = calloc(m + all + 1, sizeof(sd_number));
+    if (!lu->order || !lu->l_start || !lu->inverse) {
         sd_sparse_free(lu);
         return NULL;
     }
@@ -130,6 +128,26 @@ static void leave(sd_sparse *lu)
     lu->l_row = lu->u_row = NULL;
     lu->l_value = lu->u_value = NULL;
     lu->l_room = lu->u_room = 0;
+}
+
+/* room for factors of which nothing is known but the entries of their matrix */
+static int begin(sd_sparse *lu, int64_t entries)
+{
+    int64_t room = ROOM * entries + lu->n;
+    return grow(room, &lu->l_room, &lu->l_row, &lu->l_value) || grow(room, &lu->u_room, &lu->u_row, &lu->u_value);
+}
+
+/* lets go of what the columns of one factor have not taken */
+static void fit(int64_t taken, int64_t *room, int32_t **rows, sd_number **values)
+{
+    size_t kept = (size_t)taken + 1;
+    if ((int64_t)kept >= *room)
+        return;
+    int32_t *r = realloc(*rows, kept * sizeof *r);
+    *rows = r ? r : *rows;
+    sd_number *v = realloc(*values, kept * sizeof *v);
+    *values = v ? v : *values;
+    *room = (int64_t)kept;
 }
 
 /* with room for the search */
@@ -238,7 +256,11 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     lu->count = lu->mark + rows;
     for (int32_t e = 0; e < column[lu->n]; e++)
         lu->count[row[e]]++;
-    int failed = pivot_all(lu, column, row, value);
+    int failed = lu->l_room == 0 && begin(lu, column[lu->n]) ? 2 : pivot_all(lu, column, row, value);
+    if (!failed && lu->n > SMALL) {
+        fit(lu->l_start[lu->n], &lu->l_room, &lu->l_row, &lu->l_value);
+        fit(lu->u_start[lu->n], &lu->u_room, &lu->u_row, &lu->u_value);
+    }
     free(lu->stack);
     lu->stack = lu->head = lu->mark = lu->count = NULL;
     return failed;
@@ -284,6 +306,51 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     return 0;
 }
 
+/* work[place] -= part, where those at two places are held apart */
+static inline __attribute__((always_inline)) void lessen(int32_t place, int32_t one, int32_t two, sd_number part,
+                                                         sd_number *at_one, sd_number *at_two, sd_number *work)
+{
+    if (place == two)
+        *at_two -= part;
+    else if (place == one)
+        *at_one -= part;
+    else
+        work[place] -= part;
+}
+
+/* The solution of sd_sparse_solve from its right side in work; narrow: what the next two places wait for stays in
+ * registers, for along a line each waits for one of those before it. */
+static inline __attribute__((always_inline)) void substitute(const sd_sparse *lu, sd_number *x, sd_number *work,
+                                                             const double *column_scale, const int narrow)
+{
+    int32_t n = lu->n;
+    sd_number next = n > 0 ? work[0] : 0.0, behind = n > 1 ? work[1] : 0.0;
+    for (int32_t k = 0; k < n; k++) {
+        sd_number v = work[k] = narrow ? next : work[k];
+        next = behind;
+        behind = narrow && k + 2 < n ? work[k + 2] : 0.0;
+        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
+            if (narrow)
+                lessen(lu->l_row[l], k + 1, k + 2, lu->l_value[l] * v, &next, &behind, work);
+            else
+                work[lu->l_row[l]] -= lu->l_value[l] * v;
+    }
+    next = n > 0 ? work[n - 1] : 0.0;
+    behind = n > 1 ? work[n - 2] : 0.0;
+    for (int32_t k = n - 1; k >= 0; k--) {
+        sd_number v = (narrow ? next : work[k]) * lu->inverse[k];
+        int32_t c = lu->order[k];
+        next = behind;
+        behind = narrow && k > 1 ? work[k - 2] : 0.0;
+        x[c] = column_scale ? v * column_scale[c] : v;
+        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
+            if (narrow)
+                lessen(lu->u_row[p], k - 1, k - 2, lu->u_value[p] * v, &next, &behind, work);
+            else
+                work[lu->u_row[p]] -= lu->u_value[p] * v;
+    }
+}
+
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
@@ -291,18 +358,10 @@ void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double 
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];
     }
-    for (int32_t k = 0; k < n; k++) {
-        sd_number v = work[k];
-        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
-            work[lu->l_row[l]] -= lu->l_value[l] * v;
-    }
-    for (int32_t k = n - 1; k >= 0; k--) {
-        sd_number v = work[k] * lu->inverse[k];
-        int32_t c = lu->order[k];
-        x[c] = column_scale ? v * column_scale[c] : v;
-        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
-            work[lu->u_row[p]] -= lu->u_value[p] * v;
-    }
+    if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
+        substitute(lu, x, work, column_scale, 1);
+    else
+        substitute(lu, x, work, column_scale, 0);
 }
 
 void sd_sparse_basic(const sd_sparse *lu, const sd_number *b, sd_number *x, sd_number *work)

@@ -19,7 +19,7 @@ typedef struct sd_sparse {
     sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
     int64_t l_room, u_room;
     int32_t *stack, *head, *mark, *count; /* [rows] search, while pivots are chosen */
-    sd_number *x;                /* [n + rows + 1] */
+    sd_number *x;                /* [rows + 1] */
     int pivoted;                 /* a valid pattern exists */
     int diagonal;                /* row c pivots in column c wherever its entry will do: the order is one of A + A^T */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */

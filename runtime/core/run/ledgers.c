@@ -1,4 +1,5 @@
 /* Ledgers: see ledgers.h. */
+#include "linear/lanes.h"
 #include "run/ledgers.h"
 
 #include <math.h>
@@ -67,21 +68,37 @@ static int32_t changed(const sd_ledgers *ledgers, int32_t k)
     return found;
 }
 
+/* most := the largest magnitude so far of each element; whether the sign of any says something of an inertia */
+static SD_WIDE int32_t note_most(int32_t elements, const double *restrict value, double *restrict most,
+                                 const int32_t *restrict inertia)
+{
+    int32_t any = SD_NO_INERTIA;
+    for (int32_t i = 0; i < elements; i++) {
+        double size = fabs(value[i]);
+        most[i] = size <= most[i] ? most[i] : size;
+        any |= inertia[i];
+    }
+    return any;
+}
+
+/* a modulus may be negative from the start: what was positive must not become so */
+static void note_signs(sd_ledgers *ledgers)
+{
+    for (int32_t i = 0; i < ledgers->elements; i++) {
+        if (ledgers->inertia[i] == SD_INERTIA && ledgers->value[i] > NEGATIVE * ledgers->most[i])
+            ledgers->inertia[i] = SD_POSITIVE;
+        if (ledgers->inertia[i] == SD_POSITIVE && ledgers->value[i] < -NEGATIVE * ledgers->most[i] && ledgers->lost < 0)
+            ledgers->lost = i;
+    }
+}
+
 void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const double *yd, const double *audit)
 {
     if (ledgers->contents) {
         memset(ledgers->value, 0, (size_t)ledgers->elements * sizeof(double));
         ledgers->contents->rows(&ledgers->contents->frame, t, y, yd, ledgers->value);
-        for (int32_t i = 0; i < ledgers->elements; i++) {
-            if (!(fabs(ledgers->value[i]) <= ledgers->most[i]))
-                ledgers->most[i] = fabs(ledgers->value[i]);
-            /* a modulus may be negative from the start: what was positive must not become so */
-            if (ledgers->inertia[i] == SD_INERTIA && ledgers->value[i] > NEGATIVE * ledgers->most[i])
-                ledgers->inertia[i] = SD_POSITIVE;
-            if (ledgers->inertia[i] == SD_POSITIVE && ledgers->value[i] < -NEGATIVE * ledgers->most[i] &&
-                ledgers->lost < 0)
-                ledgers->lost = i;
-        }
+        if (note_most(ledgers->elements, ledgers->value, ledgers->most, ledgers->inertia))
+            note_signs(ledgers);
     }
     for (int32_t k = 0; k < ledgers->count; k++) {
         double now = rows_of(audit, k)[0];

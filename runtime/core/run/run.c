@@ -17,7 +17,7 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
         return NULL;
     size_t n = (size_t)(extended > stepper->n ? extended : stepper->n) + 8, m = (size_t)observed + 8;
     size_t a = (size_t)audited + 8;
-    run->memory = calloc(4 * n + 3 * m + 5 * a, sizeof(double));
+    run->memory = calloc(2 * n + 3 * m + 5 * a, sizeof(double));
     if (!run->memory) {
         free(run);
         return NULL;
@@ -28,9 +28,7 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
     run->observed = observed;
     run->point = run->memory;
     run->point_d = run->point + n;
-    run->aux = run->point_d + n;
-    run->aux_d = run->aux + n;
-    run->values = run->aux_d + n;
+    run->values = run->point_d + n;
     run->largest = run->values + m;
     run->slope = run->largest + m;
     run->audited = audited;
@@ -67,8 +65,8 @@ static void weigh(sd_run *run, double weight)
 
 static void sample(sd_run *run, double t)
 {
-    run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
-    audit(run, t, run->aux, run->aux_d, run->sample);
+    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    audit(run, t, run->point, run->point_d, run->sample);
 }
 
 /* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node, and 0 at
@@ -119,17 +117,17 @@ static void integrate_nodes(sd_run *run, double part)
         if (weight == 0.0)
             continue;
         if (stepper->show)
-            stepper->show(stepper->self, k, run->aux, run->aux_d);
-        const double *y = stepper->show ? run->aux : stepper->node_y[k];
-        audit(run, from + stepper->node[k] * h, y, stepper->show ? run->aux_d : stepper->node_yd[k], run->sample);
+            stepper->show(stepper->self, k, run->point, run->point_d);
+        const double *y = stepper->show ? run->point : stepper->node_y[k];
+        audit(run, from + stepper->node[k] * h, y, stepper->show ? run->point_d : stepper->node_yd[k], run->sample);
         weigh(run, h * weight);
     }
     for (int32_t k = 2; stepper->moves && k < run->audited; k++)
         run->integral[k] += stepper->moves[k];
 }
 
-/* run->integral [audited]: of the powers from the start of the last step to `to`, within that step; 1: aux, aux_d are the
- * point there */
+/* run->integral [audited]: of the powers from the start of the last step to `to`, within that step; 1: point, point_d hold
+ * the point there */
 static int integrate(sd_run *run, double to)
 {
     static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
@@ -181,9 +179,9 @@ static void integrate_cut(sd_run *run, double to)
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
     for (int k = 0; k < (high ? 5 : 3) && run->audit && half > 0.0; k++) {
         double t = middle + node[high][k] * half;
-        run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
-        sd_settle_point(run->settle, t, run->aux, run->aux_d);
-        audit(run, t, run->aux, run->aux_d, run->sample);
+        run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+        sd_settle_point(run->settle, t, run->point, run->point_d);
+        audit(run, t, run->point, run->point_d, run->sample);
         weigh(run, half * weight[high][k]);
     }
 }
@@ -254,12 +252,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
             dissipated = run->integral[2];
             supplied = run->integral[3];
         }
-        if (there) {
-            memcpy(run->point, run->aux, (size_t)run->stepper->n * sizeof(double));
-            memcpy(run->point_d, run->aux_d, (size_t)run->stepper->n * sizeof(double));
-        } else {
+        if (!there)
             run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-        }
     }
     int compared = !at_step && (int32_t)kind & SD_COMPARED && run->observe_rate;
     if (compared) {
@@ -307,6 +301,9 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     run->rows_written++;
     if (compared)
         emit_compared(run, row);
+    for (int k = 0; k < 7; k++) /* what is watched at other points does not see this row's */
+        if (run->audit_at[k] >= 0)
+            run->point[run->audit_at[k]] = 0.0;
 }
 
 /* kind of the row at the end of a step, or at the start */
@@ -390,12 +387,12 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
 {
     double *old = run->sample, *new = run->end;
     size_t written = (size_t)run->written * sizeof(double);
-    memcpy(run->aux, before, written);
-    memcpy(run->aux_d, before_d, written);
-    audit(run, run->t_to, run->aux, run->aux_d, old);
-    memcpy(run->aux, y, written);
-    memcpy(run->aux_d, yd, written);
-    audit(run, t, run->aux, run->aux_d, new);
+    memcpy(run->point, before, written);
+    memcpy(run->point_d, before_d, written);
+    audit(run, run->t_to, run->point, run->point_d, old);
+    memcpy(run->point, y, written);
+    memcpy(run->point_d, yd, written);
+    audit(run, t, run->point, run->point_d, new);
     run->supplied += (new[0] + new[1]) - (old[0] + old[1]);
     if (run->ledgers)
         sd_ledgers_jump(run->ledgers, old, new);
@@ -406,11 +403,11 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
 
 void sd_run_observe(sd_run *run, double t, double *values)
 {
-    run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
+    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
     if (run->settle)
-        sd_settle_point(run->settle, t, run->aux, run->aux_d);
+        sd_settle_point(run->settle, t, run->point, run->point_d);
     memset(values, 0, (size_t)run->observed * sizeof *values);
-    run->observe->rows(&run->observe->frame, t, run->aux, run->aux_d, values);
+    run->observe->rows(&run->observe->frame, t, run->point, run->point_d, values);
 }
 
 /* whether something watched changes within the last step */
@@ -419,9 +416,9 @@ static int changes(sd_run *run, double from)
     const sd_stepper *stepper = run->stepper;
     for (int part = 1; part <= SD_PARTS && run->watches; part++) {
         double t = part == SD_PARTS ? *stepper->t : from + (*stepper->t - from) * part / SD_PARTS;
-        stepper->dense(stepper->self, t, run->aux, run->aux_d);
+        stepper->dense(stepper->self, t, run->point, run->point_d);
         memset(run->values, 0, (size_t)run->observed * sizeof(double));
-        run->observe->rows(&run->observe->frame, t, run->aux, run->aux_d, run->values);
+        run->observe->rows(&run->observe->frame, t, run->point, run->point_d, run->values);
         for (int32_t i = 0; i < run->watches; i++)
             if (run->watch[i].side * run->values[run->watch[i].row] < -run->watch[i].tolerance)
                 return 1;
@@ -446,12 +443,12 @@ static void measure(sd_run *run, double from, double t)
     if (run->audit && run->sampled) {
         memcpy(run->after, run->sample, (size_t)run->audited * sizeof(double));
     } else if (run->audit) {
-        run->stepper->dense(run->stepper->self, t, run->aux, run->aux_d);
-        audit(run, t, run->aux, run->aux_d, run->after);
+        run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+        audit(run, t, run->point, run->point_d, run->after);
     }
     if (run->ledgers) {
         sd_ledgers_add(run->ledgers, run->integral);
-        sd_ledgers_note(run->ledgers, t, run->aux, run->aux_d, run->after);
+        sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after);
     }
     /* powers at the start of the next step are kept apart until the rows of this one are written */
     run->pending = 1;

@@ -361,19 +361,7 @@ void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
         value[j] = c *= gamma;
         gamma = (delta + bdf->psi[j - 1]) / bdf->psi[j];
     }
-    for (int32_t first = 0; first < bdf->n; first += SD_PIECE) {
-        int32_t n = bdf->n - first < SD_PIECE ? bdf->n - first : SD_PIECE;
-        double *restrict out = y + first, *restrict out_d = yd + first;
-        memcpy(out, bdf->phi[0] + first, (size_t)n * sizeof *y);
-        memset(out_d, 0, (size_t)n * sizeof *yd);
-        for (int32_t j = 1; j <= k; j++) {
-            const double *restrict phi = bdf->phi[j] + first;
-            for (int32_t i = 0; i < n; i++) {
-                out[i] += value[j] * phi[i];
-                out_d[i] += rate[j] * phi[i];
-            }
-        }
-    }
+    sd_bdf_interpolate(bdf, k, value, rate, y, yd);
     if (bdf->taken == 0)
         memcpy(yd, bdf->yd, (size_t)bdf->n * sizeof *yd);
 }

@@ -19,7 +19,6 @@
 #include "steppers/stepper.h"
 
 #define SD_MAX_ORDER 5
-#define SD_PIECE 512 /* unknowns of which all differences fit the nearest cache */
 
 typedef struct sd_bdf {
     sd_system *system;
@@ -71,6 +70,8 @@ void sd_bdf_matrix(sd_bdf *bdf);
 double sd_bdf_move(sd_bdf *bdf);
 void sd_bdf_orders(const sd_bdf *bdf, double *norm);
 double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus);
+void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, const double *rate, double *y,
+                        double *yd);
 void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const double *beta);
 void sd_bdf_shift(sd_bdf *bdf);
 /* controller.c */

@@ -61,6 +61,41 @@ SD_WIDE double sd_bdf_move(sd_bdf *bdf)
     return n ? sqrt(SD_TOTAL(sum) / n) : 0.0;
 }
 
+static inline __attribute__((always_inline)) void interpolate(const sd_bdf *bdf, const int32_t order, const double *value,
+                                                              const double *rate, double *restrict y, double *restrict yd)
+{
+    const double *phi[SD_MAX_ORDER + 1];
+    double a[SD_MAX_ORDER + 1], b[SD_MAX_ORDER + 1];
+    for (int32_t k = 0; k <= order; k++) {
+        phi[k] = bdf->phi[k];
+        a[k] = value[k];
+        b[k] = rate[k];
+    }
+    for (int32_t i = 0; i < bdf->n; i++) {
+        double x = phi[0][i], slope = 0.0;
+        for (int32_t k = 1; k <= order; k++) {
+            x += a[k] * phi[k][i];
+            slope += b[k] * phi[k][i];
+        }
+        y[i] = x;
+        yd[i] = slope;
+    }
+}
+
+/* y, yd [n] := sums of the differences up to an order, times value and times rate [order + 1]; the first one counts once */
+SD_WIDE void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, const double *rate, double *y,
+                                double *yd)
+{
+    switch (order) {
+    case 0: interpolate(bdf, 0, value, rate, y, yd); break;
+    case 1: interpolate(bdf, 1, value, rate, y, yd); break;
+    case 2: interpolate(bdf, 2, value, rate, y, yd); break;
+    case 3: interpolate(bdf, 3, value, rate, y, yd); break;
+    case 4: interpolate(bdf, 4, value, rate, y, yd); break;
+    default: interpolate(bdf, 5, value, rate, y, yd);
+    }
+}
+
 /* differences [first, last] times their beta, or over it */
 SD_WIDE void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const double *beta)
 {

@@ -29,7 +29,8 @@ static void follow(sd_expanded *expanded)
 static void show(const void *self, int32_t k, double *y, double *yd)
 {
     const sd_expanded *expanded = self;
-    sd_condensed_show(expanded->condensed, expanded->inner->node_y[k], expanded->inner->node_yd[k], y, yd);
+    expanded->inner->show(expanded->inner->self, k, expanded->z, expanded->zd);
+    sd_condensed_show(expanded->condensed, expanded->z, expanded->zd, y, yd);
 }
 
 static int step(void *self)
@@ -100,7 +101,7 @@ sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, i
     expanded->face.dense = dense;
     expanded->face.refine = inner->refine ? refine : NULL;
     expanded->face.start = start;
-    expanded->face.show = inner->node_y ? show : NULL;
+    expanded->face.show = inner->show ? show : NULL;
     return expanded;
 }
 

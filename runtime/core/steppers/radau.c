@@ -44,6 +44,17 @@ static void start(void *radau, double t, const double *y, const double *yd, doub
     sd_radau_start(radau, t, y, yd, h);
 }
 
+/* the stages of the last accepted step, before it was projected; y, yd [n] */
+static void show(const void *self, int32_t s, double *y, double *yd)
+{
+    const sd_radau *radau = self;
+    sd_radau_combine(radau->used->stages, radau->n, radau->used->inverse[s], radau->kept, yd);
+    for (int32_t i = 0; i < radau->n; i++) {
+        y[i] = radau->last[i] + radau->kept[s][i];
+        yd[i] /= radau->h_used;
+    }
+}
+
 sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const *complex_linear, int32_t stages)
 {
     sd_radau *radau = calloc(1, sizeof *radau);
@@ -51,10 +62,11 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->unknowns + 1;
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
-                          &radau->slope[2], &radau->point, &radau->point_d, &radau->y, &radau->rate, &radau->ee,
-                          &radau->weight, &radau->newton_weight, &radau->scale, &radau->terms, &radau->pull, &radau->first};
-    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full, radau->stage, radau->stage_d};
-    size_t number = sizeof vectors / sizeof *vectors, sets = sizeof of_stages / sizeof *of_stages;
+                          &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->newton_weight,
+                          &radau->scale, &radau->pull, &radau->terms, &radau->first}; /* the last ones: of steep laws */
+    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full};
+    size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
+           sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
     radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
@@ -87,8 +99,8 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     radau->most_stages = stages;
     radau->method = radau->used = sd_radau_methods;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
-                                  &radau->taken, step, dense, refine, start, stages, NULL, NULL, radau->stage,
-                                  radau->stage_d, NULL, NULL, NULL, NULL, NULL, 1};
+                                  &radau->taken, step, dense, refine, start, stages, NULL, NULL, NULL, NULL,
+                                  NULL, NULL, NULL, NULL, NULL, 1, show};
     return radau;
 }
 
@@ -303,21 +315,13 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     radau->h_used = h;
     note_pulls(radau);
     for (int s = 0; s < method->stages; s++) {
-        sd_radau_combine(method->stages, radau->n, method->inverse[s], radau->z, radau->stage_d[s]);
-        for (int32_t i = 0; i < radau->n; i++) {
-            radau->stage[s][i] = radau->phi[i] + radau->z[s][i];
-            radau->stage_d[s][i] /= h;
-        }
-    }
-    memcpy(radau->phi, radau->stage[method->stages - 1], size);
-    memcpy(radau->yd, radau->stage_d[method->stages - 1], size);
-    memcpy(radau->slope[0], radau->yd, size);
-    for (int s = 0; s < method->stages; s++) {
         double *swap = radau->kept[s];
         radau->kept[s] = radau->z[s];
         radau->z[s] = swap;
     }
     radau->used = method;
+    show(radau, method->stages - 1, radau->phi, radau->yd);
+    memcpy(radau->slope[0], radau->yd, size);
     show_nodes(radau);
     double t = radau->t + h;
     radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;
@@ -338,14 +342,14 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
 static void project(sd_radau *radau)
 {
     size_t size = (size_t)radau->n * sizeof(double);
-    memcpy(radau->point, radau->phi, size);
-    memcpy(radau->point_d, radau->yd, size);
-    if (sd_settle_point(radau->project, radau->t, radau->point, radau->point_d))
+    memcpy(radau->y, radau->phi, size);
+    memcpy(radau->rate, radau->yd, size);
+    if (sd_settle_point(radau->project, radau->t, radau->y, radau->rate))
         return;
-    memcpy(radau->phi, radau->point, size);
+    memcpy(radau->phi, radau->y, size);
     for (int32_t i = 0; i < radau->n; i++)
         if (radau->smooth[i])
-            radau->slope[0][i] = radau->yd[i] = radau->point_d[i];
+            radau->slope[0][i] = radau->yd[i] = radau->rate[i];
 }
 
 int sd_radau_step(sd_radau *radau)

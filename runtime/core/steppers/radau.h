@@ -81,10 +81,9 @@ typedef struct sd_radau {
     double *slope[SD_POINTS]; /* [n] derivatives at phi, last, before, for values within the step */
     int32_t refined[SD_POINTS];                     /* they are settled */
     double *z[SD_STAGES], *kept[SD_STAGES];         /* of this step, of the last accepted one */
-    double *stage[SD_STAGES], *stage_d[SD_STAGES];  /* y, yd of the last accepted step, before it was projected */
     double *d[SD_STAGES];                           /* right sides and corrections */
-    double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it */
-    double *point, *point_d;  /* [written and more] */
+    double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it; of steep
+                                                     * laws alone, like first and terms */
     double *first;            /* [n] d[0] while a correction is tried */
     double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */

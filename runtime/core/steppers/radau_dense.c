@@ -184,16 +184,16 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
     const double *value[SD_POINTS] = {radau->phi, radau->last, radau->before};
     double t[SD_POINTS] = {radau->t, radau->t - radau->h_used, radau->t - radau->h_used - radau->h_before};
     size_t size = (size_t)radau->n * sizeof(double);
-    int32_t n = radau->n < settle->whole ? radau->n : settle->whole;
+    int32_t n = settle->seen || radau->n < settle->unknowns ? radau->n : settle->unknowns;
     for (int k = 0; k < SD_POINTS && k <= radau->taken; k++) {
         if (radau->refined[k])
             continue;
-        memcpy(radau->point, value[k], size);
-        memcpy(radau->point_d, radau->slope[k], size);
-        if (sd_settle_point(settle, t[k], radau->point, radau->point_d) == 0)
+        memcpy(radau->y, value[k], size);
+        memcpy(radau->rate, radau->slope[k], size);
+        if (sd_settle_point(settle, t[k], radau->y, radau->rate) == 0)
             for (int32_t i = 0; i < n; i++)
                 if (radau->smooth[i])
-                    radau->slope[k][i] = radau->point_d[i];
+                    radau->slope[k][i] = radau->rate[i];
         radau->refined[k] = 1;
     }
 }

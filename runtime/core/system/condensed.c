@@ -1,5 +1,6 @@
 /* Elimination of unknowns that are constant sums of others: see condensed.h. */
 #include "system/condensed.h"
+#include "linear/lanes.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +19,7 @@ static inline void evaluate_one(const sd_straight *straight, double *x, int rate
 }
 
 /* x := factors * sources + constant, up to three terms in one pass over memory */
-static void evaluate(const sd_straight *straight, double *x, int rate)
+static inline __attribute__((always_inline)) void evaluate(const sd_straight *straight, double *x, int rate)
 {
     int32_t n = straight->number, terms = straight->terms;
     double *restrict out = x + straight->place;
@@ -46,7 +47,7 @@ static void evaluate(const sd_straight *straight, double *x, int rate)
         out[i] += c[i];
 }
 
-void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
+SD_WIDE void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
 {
     for (int32_t s = 0; s < condensed->straights; s++) {
         if (condensed->straight[s].number == 1)

@@ -24,15 +24,15 @@
 
 enum { NONE, MATRIX, BASIS };
 
-sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole)
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
 {
     sd_settle *settle = calloc(1, sizeof *settle);
     if (!settle)
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
-    size_t all = system->left ? (size_t)whole + 8 : 0;
+    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0;
     size_t most = linear && (size_t)linear->entries > 2 * m ? (size_t)linear->entries : 2 * m;
-    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 6 * n + 4 * all, sizeof(double));
+    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 6 * n + 2 * kept, sizeof(double));
     if (!settle->memory) {
         free(settle);
         return NULL;
@@ -54,7 +54,6 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, in
     settle->met = settle->step + n + m;
     settle->matrix = settle->met + n;
     settle->room = settle->matrix + most + 1;
-    settle->whole = whole;
     return settle;
 }
 
@@ -430,7 +429,7 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
     const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
     if (!condensed)
         return settle_unknowns(settle, t, y, yd);
-    double *z = settle->room + 2 * settle->whole, *zd = z + settle->whole;
+    double *z = settle->room, *zd = z + settle->unknowns + 8;
     sd_condensed_gather(condensed, y, z);
     sd_condensed_gather(condensed, yd, zd);
     int failed = settle_unknowns(settle, t, z, zd);
@@ -446,7 +445,7 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
 {
     if (!settle->seen)
         return settle_whole(settle, t, y, yd);
-    double *whole = settle->room, *whole_d = whole + settle->whole;
+    double *whole = settle->seen->y, *whole_d = settle->seen->yd; /* taken before its rows are evaluated there, made behind them */
     sd_condensed_expand(settle->seen, y, whole, 0);
     sd_condensed_expand(settle->seen, yd, whole_d, 1);
     int failed = settle_whole(settle, t, whole, whole_d);

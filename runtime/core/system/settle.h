@@ -49,16 +49,14 @@ typedef struct sd_settle {
                                         rate of another; norm of the constraint rows */
     int64_t calls, failures;         /* calls - failures > 0: a point has been met */
     const struct sd_condensed *seen;       /* points are handed over as this system has them; NULL: with all unknowns */
-    double *room;                    /* [2][unknowns of the whole system] for points with all of them, and kept ones */
-    int32_t whole;                   /* unknowns of a point: those of the system, or of the one that it is condensed from */
+    double *room;                    /* [2][unknowns] for the kept ones of a point with all of them */
     int (*provide)(void);            /* of large ones: makes `linear` and its places when they are wanted first; 0 done */
     double *taken;                   /* the matrix of such a one */
     double drift;                    /* norm of the constraint rows before the last call moved the point */
     double contracted;               /* largest residual beside the one before it, of the steps of the last call */
 } sd_settle;
 
-/* whole: unknowns of a point, more than the system's where that is condensed */
-sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates, int32_t whole);
+sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);
 /* takes the factors of the saddle-point matrix; 2: no memory */
 int sd_settle_take(sd_settle *settle, sd_linear *linear);
 /* The basis: pattern of G^T, order of its columns, the rows; places as above; determined: of what follows from the state
