@@ -1,8 +1,8 @@
 """An accuracy asked for, met by an estimate of the global error.
 
 A draft with longer steps is followed by a run at the tolerance that should do, a tenth to a hundredth of it or, where
-the draft took many steps, less, and both are compared at instants of the draft's own rows; a run behind them at instants of the last one's.
-Where little happens in a draft of radau, the run behind it is one of the bdf.
+the draft took many steps, less, and both are compared at instants of the draft's own rows; a run behind them at
+instants of the last one's.  Where little happens in a draft of radau, the run behind it is one of the bdf.
 With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
 measured over three runs, at most what the method's law credits.  Where the estimate misses what was asked, a finer run
 follows and is compared with the last one.
@@ -26,6 +26,8 @@ RUNS = 7
 COARSEST = 1e-2
 LOOSEST = 1e-1
 """Tolerance of a draft at most."""
+TENTH = 0.1
+"""Of the tolerance of a draft as loose as any: a run with less need not follow."""
 SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
 RETRIED = (1.0, 0.1, 1e-2)
@@ -121,10 +123,13 @@ STEEP = Law(40.0, 0.87, 0.75, 2e-14, growth=1.0, ratio=0.1, loosest=1e-4, most=1
 diodes, transistors).
 """
 
+OF_THREE_STAGES = Law(3.0, 0.9, 0.65, 1e-17, ratio=0.01, little=0.02)
+"""Of radau there, which takes no more stages: a tolerance a hundredth as large costs it twice the steps."""
+
 
 def law_of(method: str, *, steep: bool) -> Law:
     """What follows from the tolerance of a method on a model."""
-    return STEEP if steep and method == "bdf" else LAWS[method]
+    return {"bdf": STEEP, "radau": OF_THREE_STAGES}.get(method, LAWS[method]) if steep else LAWS[method]
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,7 +316,8 @@ def control(
     number = 1
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
-    tolerance = max(min(tolerance, law.ratio * last.tolerance), law.far * last.tolerance, law.finest)
+    ratio = max(law.ratio, TENTH) if last.tolerance >= law.loosest else law.ratio
+    tolerance = max(min(tolerance, ratio * last.tolerance), law.far * last.tolerance, law.finest)
     usual = first is None and LIGHTLY <= wanted < 1.0 and not doubted
     light = _agreed(run, last, lighter, target, wanted) if lighter is not None and usual else None
     if light is not None:
