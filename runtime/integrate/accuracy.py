@@ -111,7 +111,7 @@ LAWS = {
     # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3;
     # with more stages a hundredth of a tolerance costs it a tenth to a third of a run: a run that much finer than its
     # draft costs less than every fourth one that misses
-    "radau": Law(21.0, 0.9, 0.65, 1e-17, ratio=0.01, little=0.02),
+    "radau": Law(21.0, 0.9, 0.6, 1e-17, ratio=0.01, little=0.02),
     # of order 8 a tolerance a quarter as large costs a sixth of a run, a miss costs one: a gain of 40 left a third run
     # to one model in five, 160 to one in fifty; the credit of a wider ratio pays for the looser draft
     "dopri": Law(160.0, 1.0, 0.9, 2e-14, ratio=0.05),
@@ -123,7 +123,7 @@ STEEP = Law(40.0, 0.87, 0.75, 2e-14, growth=1.0, ratio=0.1, loosest=1e-4, most=1
 diodes, transistors).
 """
 
-OF_THREE_STAGES = Law(3.0, 0.9, 0.65, 1e-17, ratio=0.01, little=0.02)
+OF_THREE_STAGES = Law(3.0, 0.9, 0.6, 1e-17, ratio=0.01, little=0.02)
 """Of radau there, which takes no more stages: a tolerance a hundredth as large costs it twice the steps."""
 
 
@@ -211,7 +211,7 @@ class _Estimate:
     def __init__(self, law: Law, target: Floats) -> None:
         self.law, self.target = law, target
         self.over = self.apart = np.inf
-        self._deep = 1.0
+        self._deep, self._unknown = 1.0, False
         self._before: tuple[float, float] | None = None
         self._power: float | None = None
 
@@ -221,8 +221,9 @@ class _Estimate:
         """
         step = float(np.log10(coarse.tolerance / fine.tolerance))
         apart, over = difference(coarse, fine, self.target)
-        lost = apart > DIFFER and over > FAR_OFF and step < DEEP
-        self._deep = _affordable(coarse, fine) if lost else 1.0
+        lost = apart > DIFFER and over > FAR_OFF
+        self._deep = _affordable(coarse, fine) if lost and step < DEEP else 1.0
+        self._unknown = lost and step >= DEEP
         shrink = None
         if shorter is not None:
             part = shorter**BY_STEPS
@@ -249,6 +250,8 @@ class _Estimate:
 
         What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
         """
+        if self._unknown:  # the coarser run says nothing of a much finer one: another beside that will
+            return max(FIRST_DROP * tolerance, self.law.finest)
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
         drop = max(AIM * self.over, TINY) ** (-1.0 / power)
         least, most = (FIRST_DROP, self.law.little) if self._power is None else (1e-3, LEFT)
