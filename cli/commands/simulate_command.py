@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -82,10 +83,12 @@ def _summary(ran: Ran) -> str:
     form = {"None": "not known"} | ({"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {})
     method = f"{o.method} ({o.reason})" if o.reason else o.method
     how = (ran.prepared.formulation, method, f"index {form.get(str(o.index), o.index)}", ran.prepared.backend)
+    balance = _last(o.samples.energy)  # a draft that an interruption left has none
+    audited = f"energy balance {balance:.2e} J, " if math.isfinite(balance) else ""
     lines = [
         f"{ran.target.name}: {', '.join(how)}",
         f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
-        f"  energy balance {_last(o.samples.energy):.2e} J, constraints {_last(o.samples.constraints):.1e}",
+        f"  {audited}constraints {_last(o.samples.constraints):.1e}",
         *(f"  {text}" for text in _conserved(ran)),
         f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
     ]

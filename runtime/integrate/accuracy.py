@@ -1,8 +1,8 @@
 """An accuracy asked for, met by an estimate of the global error.
 
-A draft is followed by a run at the tolerance that should do, a tenth or a twentieth of it or, where the draft took many
-steps, less, and both are compared at instants of the draft's own rows; a run behind them at instants of the last one's.
-Where little happens in a draft of radau, the run behind it is one of the bdf.
+A draft with longer steps is followed by a run at the tolerance that should do, a tenth to a hundredth of it or, where
+the draft took many steps, less, and both are compared at instants of the draft's own rows; a run behind them at
+instants of the last one's.  Where little happens in a draft of radau, the run behind it is one of the bdf.
 With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
 measured over three runs, at most what the method's law credits.  Where the estimate misses what was asked, a finer run
 follows and is compared with the last one.
@@ -26,6 +26,8 @@ RUNS = 7
 COARSEST = 1e-2
 LOOSEST = 1e-1
 """Tolerance of a draft at most."""
+TENTH = 0.1
+"""Of the tolerance of a draft as loose as any: a run with less need not follow."""
 SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
 RETRIED = (1.0, 0.1, 1e-2)
@@ -39,11 +41,19 @@ SHORT, SHORT_CREDIT = 60, 0.75
 FIRST_DROP = 1e-2
 AIM, LEFT = 2.0, 0.3
 """How far below what was asked the next run aims, and the most that is left of its tolerance."""
+DIFFER, FAR_OFF, DEEP, TWICE, DEEPEST = 0.3, 10.0, 3.0, 2.0, 1e-6
+"""Difference of two runs, and times what was asked, that says only that they have nothing in common (the phase of a
+relaxation oscillation is lost), their tolerances less than these decades apart: the next one is then as small as
+doubles the work, by what the last drop cost, at least this part."""
 SLOWEST = 0.75
 """The least power with which errors are taken to fall when the next tolerance is chosen."""
 STRETCH = 1.5
 """Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
 differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
+DRAFT = 3.0
+"""Longest step of a draft over that of the run behind it: its tolerance holds its error, and where the longest step
+holds both runs, what no step can see differs by more than the safety.  CPU of a price's two runs over that with 1.5:
+0.97 (46 seed models), with 5 the same."""
 HOLDS, SHORTEN = 1.2, 1.0 / 32.0
 """Steps of a run over those of the longest length, up to which that length holds them and the tolerance does not (what
 algebra alone determines has no error that a step could test), in both runs of a pair; the least that the next run's is
@@ -56,8 +66,8 @@ TAME = 1e-6
 draft where Newton's failures say so before."""
 TINY = 1e-30
 """An estimate beside what was asked below which it counts as none."""
-QUIET, AGREE = 1.35, 2.0
-"""Steps of a draft over those of its longest step, up to which little happens in it: a lighter method then follows, and
+QUIET, AGREE = 5, 2.0
+"""Steps of a draft beyond those of its longest step, up to which little happens in it: a lighter method follows, and
 a run of its own differs from the draft by its own error, AGREE times of which is the estimate (on 175 runs of eleven
 models the estimate was 1 to 13 times the error, mostly 2)."""
 LIGHTLY = 1e-5
@@ -99,8 +109,9 @@ LAWS = {
     # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3)
     "bdf": Law(50.0, 1.0, 0.7, 2e-14),
     # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3;
-    # with more stages a hundredth of a tolerance costs it a third of a run
-    "radau": Law(5.0, 0.9, 0.65, 1e-17, ratio=0.05, little=0.02),
+    # with more stages a hundredth of a tolerance costs it a tenth to a third of a run: a run that much finer than its
+    # draft costs less than every fourth one that misses
+    "radau": Law(21.0, 0.9, 0.6, 1e-17, ratio=0.01, little=0.02),
     # of order 8 a tolerance a quarter as large costs a sixth of a run, a miss costs one: a gain of 40 left a third run
     # to one model in five, 160 to one in fifty; the credit of a wider ratio pays for the looser draft
     "dopri": Law(160.0, 1.0, 0.9, 2e-14, ratio=0.05),
@@ -112,10 +123,13 @@ STEEP = Law(40.0, 0.87, 0.75, 2e-14, growth=1.0, ratio=0.1, loosest=1e-4, most=1
 diodes, transistors).
 """
 
+OF_THREE_STAGES = Law(3.0, 0.9, 0.6, 1e-17, ratio=0.01, little=0.02)
+"""Of radau there, which takes no more stages: a tolerance a hundredth as large costs it twice the steps."""
+
 
 def law_of(method: str, *, steep: bool) -> Law:
     """What follows from the tolerance of a method on a model."""
-    return STEEP if steep and method == "bdf" else LAWS[method]
+    return {"bdf": STEEP, "radau": OF_THREE_STAGES}.get(method, LAWS[method]) if steep else LAWS[method]
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +196,7 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
     tried = 0
     while True:
         try:
-            return run(min(max(RETRIED[tried] * tolerance, law.finest) / law.ratio, law.loosest), STRETCH * LONGEST)
+            return run(min(max(RETRIED[tried] * tolerance, law.finest) / law.ratio, law.loosest), DRAFT * LONGEST)
         except SolverFailure as failure:
             tried += 1
             if tried == len(RETRIED) or _limited(failure) or failure.cause == "stiff":
@@ -197,6 +211,7 @@ class _Estimate:
     def __init__(self, law: Law, target: Floats) -> None:
         self.law, self.target = law, target
         self.over = self.apart = np.inf
+        self._deep, self._unknown = 1.0, False
         self._before: tuple[float, float] | None = None
         self._power: float | None = None
 
@@ -206,6 +221,9 @@ class _Estimate:
         """
         step = float(np.log10(coarse.tolerance / fine.tolerance))
         apart, over = difference(coarse, fine, self.target)
+        lost = apart > DIFFER and over > FAR_OFF
+        self._deep = _affordable(coarse, fine) if lost and step < DEEP else 1.0
+        self._unknown = lost and step >= DEEP
         shrink = None
         if shorter is not None:
             part = shorter**BY_STEPS
@@ -232,10 +250,18 @@ class _Estimate:
 
         What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
         """
+        if self._unknown:  # the coarser run says nothing of a much finer one: another beside that will
+            return max(FIRST_DROP * tolerance, self.law.finest)
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
         drop = max(AIM * self.over, TINY) ** (-1.0 / power)
         least, most = (FIRST_DROP, self.law.little) if self._power is None else (1e-3, LEFT)
-        return max(float(np.clip(drop, least, most)) * tolerance, self.law.finest)
+        return max(min(float(np.clip(drop, least, most)), self._deep) * tolerance, self.law.finest)
+
+
+def _affordable(coarse: Sampled, fine: Sampled) -> float:
+    """Part of the tolerance at which a run takes TWICE the steps, as they grew from the coarser run to the finer."""
+    growth = np.log(max(fine.steps, 1) / max(coarse.steps, 1)) / np.log(coarse.tolerance / fine.tolerance)
+    return float(np.clip(TWICE ** (-1.0 / max(growth, 1e-2)), DEEPEST, FIRST_DROP))
 
 
 def _held(run: Sampled, longest: float) -> bool:
@@ -245,7 +271,7 @@ def _held(run: Sampled, longest: float) -> bool:
 
 def _quiet(draft: Sampled) -> bool:
     """Whether little happens in a draft."""
-    return draft.steps * STRETCH * LONGEST <= QUIET
+    return draft.steps <= 1.0 / (DRAFT * LONGEST) + QUIET
 
 
 def _agreed(run: Run, draft: Sampled, lighter: Lighter, target: Floats, wanted: float) -> Achieved | None:
@@ -293,7 +319,8 @@ def control(
     number = 1
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
-    tolerance = max(min(tolerance, law.ratio * last.tolerance), law.far * last.tolerance, law.finest)
+    ratio = max(law.ratio, TENTH) if last.tolerance >= law.loosest else law.ratio
+    tolerance = max(min(tolerance, ratio * last.tolerance), law.far * last.tolerance, law.finest)
     usual = first is None and LIGHTLY <= wanted < 1.0 and not doubted
     light = _agreed(run, last, lighter, target, wanted) if lighter is not None and usual else None
     if light is not None:

@@ -251,6 +251,8 @@ class Integration:
             method.stages, method.balances = first, int(self._steep_balances)
         else:
             method.patience = request.stiff_steps
+        if request.method == "dopri":
+            method.spare = request.spare_steps
         if request.method == "energy":
             self._audit = self.system.observer("audit")
             method.audit = None if self._audit is None else c.addressof(self._audit)
@@ -357,6 +359,7 @@ class Integration:
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps, run.apart = int(request.sample_steps), request.apart
         run.rough, run.bare = request.settled_to, int(self._bare and not request.audited)
+        run.unsummed = int(request.draft and not request.audited and request.events is None and self._unread)
         if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
         run.projected = self._projected()
@@ -369,6 +372,13 @@ class Integration:
         follows = frozenset(written[~self._keeps].tolist())
         read = [(kernel.reads, kernel.rates) for kernel in description.blocks.get("observe", ())]
         return all(reads is not None and not (reads & follows) and rates == frozenset() for reads, rates in read)
+
+    @property
+    def _unread(self) -> bool:
+        """Whether nothing that is observed reads the audit, whose integrals are then for the run that is kept."""
+        audit = frozenset(self.system.description.families_of("audit"))
+        blocks = [self.system.description.blocks.get(name, ()) for name in ("observe", "observe_scale")]
+        return all(k.reads is not None and not (k.reads & audit) for block in blocks for k in block)
 
     def drain(self, sink: Sink) -> None:
         """Rows so far go to the sink."""

@@ -31,7 +31,8 @@ class Request:
     [s]: longest step, None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the
     integration restarts (segments.py); least_norm: rows hold the least multipliers of redundant constraints;
     stiff_steps: dopri and energy give up
-    where stability holds it to more steps than these; settled_to: scaled residual that will do for rows
+    where stability holds it to more steps than these, dopri also where a system that is much faster than its motion
+    takes it more than spare_steps and those it took (0: never); settled_to: scaled residual that will do for rows
     by which runs are compared and nothing else, of a draft for all, 0: round-off; audited: they are compared by the
     audit's members too;
     condense: what constant sums define leaves the system (condense/);
@@ -59,6 +60,7 @@ class Request:
     events: Plan | None = None
     begin: tuple[Floats, NDArray[np.bool_]] | None = None
     stiff_steps: float = 1e5
+    spare_steps: float = 0.0
     settled_to: float = 0.0
     draft: bool = False
     audited: bool = False

@@ -37,6 +37,9 @@ HELD = 100
 """Steps that a dopri which stability holds may still have to take before method auto tries another."""
 STIFF = 1e5
 """Steps that a stiff dopri which was asked for still takes."""
+SPARE, FACTORED = 1.0 / LONGEST, 100
+"""Steps that dopri may still take on a system much faster than its motion: no more than any method takes; unknowns of a
+system of which radau's factors are cheap enough for it to take over."""
 
 ROUGH = 1e-2
 """Of the tolerance: scaled residual of rows by which runs are compared."""
@@ -218,6 +221,7 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stiff_steps=HELD if options.method == "auto" else STIFF,
+            spare_steps=SPARE if draft and options.method == "auto" and self.system.unknowns <= FACTORED else 0.0,
             settled_to=ROUGH * rtol if self.controlled else 0.0,
             draft=draft,
             # of steep laws Newton fails at any tolerance

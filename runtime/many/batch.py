@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import pairs
-from sysdyn.runtime.integrate.accuracy import STRETCH, Achieved, Law
+from sysdyn.runtime.integrate.accuracy import DRAFT, Achieved, Law
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
@@ -384,7 +384,7 @@ class Batch:
         many.form_jy, many.form_jyd = (self._kept(np.zeros(system.pattern.entries + 1)) for _ in range(2))
         many.found = self._kept(np.zeros(system.unknowns + 1))
         for k in (0, 1):
-            self._fill(k, min((STRETCH, 1.0)[k] * longest * span, options.longest or np.inf))
+            self._fill(k, min((DRAFT, 1.0)[k] * longest * span, options.longest or np.inf))
         many.column = self._kept(np.array([column.place for column in runs.columns], dtype=np.int32))
         many.target = self._kept(self._targets)
         families = system.description.families

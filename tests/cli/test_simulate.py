@@ -201,13 +201,26 @@ def test_backends_agree(tmp_path):
     np.testing.assert_allclose(c["x"].values, numpy["x"].values, atol=2e-4)
 
 
+@pytest.mark.parametrize("expect", ["", "expect always: abs(audit.energy) <= 1 J"])
+def test_a_draft_left_alone_tells_its_balance_only_where_it_is_asked_for(expect, tmp_path, capsys):
+    """Integrals of powers are for the run that is kept, and for what reads them."""
+    scene = f"scene alone of pendulum {{\n time 0 s to 6 s\n trace x every 10 ms\n {expect}\n}}\n"
+    gallery = Path(__file__).parents[2] / "models/gallery/pendulum.sd"
+    path = write(tmp_path, gallery.read_text().split("scene", 1)[0] + scene)
+    assert run(["simulate", path, "--max-steps", "21", "-o", "out.h5"]) == 3
+    said = capsys.readouterr()
+    assert "that of a coarser run to the end" in said.err
+    assert ("energy balance" in said.out + said.err) is bool(expect)
+    assert "nan" not in said.out + said.err
+
+
 def test_limits_leave_a_readable_trace(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
-    assert run(["simulate", path, "--max-steps", "10", "-o", "out.h5"]) == 3
+    assert run(["simulate", path, "--max-steps", "5", "-o", "out.h5"]) == 3
     assert "the limit of steps is reached" in capsys.readouterr().err
     trace = Trace.open("out.h5")
     assert not trace.final
-    assert trace.statistics["steps"] == 10
+    assert trace.statistics["steps"] == 5
     assert run(["simulate", write(tmp_path, ENDLESS), "--max-wall", "300 ms", "-o", "out.h5"]) == 3
     assert "the limit of wall time is reached" in capsys.readouterr().err
     assert not Trace.open("out.h5").final

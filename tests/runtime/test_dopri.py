@@ -135,6 +135,16 @@ def test_stiffness_is_seen(tmp_path):
     assert simulated(tmp_path, stiff(100.0), method="dopri").method == "dopri"
 
 
+def test_a_system_much_faster_than_its_motion_is_left_to_radau(tmp_path):
+    """What follows at 100/s a motion of 1/s holds an explicit method to short steps, though none is at the boundary."""
+    left = simulated(tmp_path, stiff(100.0), index="0", accuracy=1e-6)
+    other = Trace.open(tmp_path / "t.h5")["a"][-1]
+    held = simulated(tmp_path, stiff(100.0), method="dopri", accuracy=1e-6)
+    assert (left.method, held.method) == ("radau", "dopri")
+    assert left.statistics["steps"] < 0.5 * held.statistics["steps"]
+    assert abs(Trace.open(tmp_path / "t.h5")["a"][-1] - other) < 2e-6
+
+
 def test_index_zero_takes_dopri_and_dopri_index_zero(tmp_path):
     for options in ({"index": "0"}, {"method": "dopri"}, {"index": "0", "method": "dopri"}):
         outcome = simulated(tmp_path, models.pendulum(), accuracy=1e-9, at=tuple(INSTANTS), **options)

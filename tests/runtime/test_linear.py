@@ -130,7 +130,7 @@ def test_least_degree_fills_little_more_than_the_library(n):
 
 def replayed(matrix, *, machine=True):
     """A solver that has seen enough matrices near this one to have an order of its own."""
-    lib.core.sd_code_allow(int(machine))
+    lib.core.sd_code_allow(2 * machine)
     solver = Solver(matrix)
     lib.core.sd_linear_replayed(solver.linear)
     rng = np.random.default_rng(1)
@@ -188,7 +188,7 @@ def test_machine_code_and_interpreter_agree_to_the_bit():
 
 def complex_solutions(matrix, b, *, machine):
     """Solutions beside a complex matrix and others near it, each with its own values, as a run makes them."""
-    lib.core.sd_code_allow(int(machine))
+    lib.core.sd_code_allow(2 * machine)
     pattern = [np.ascontiguousarray(item, np.int32) for item in (matrix.indptr, matrix.indices)]
     linear = lib.core.sd_linear_z_new(b.size, *map(lib.pointer, pattern), None)
     lib.core.sd_linear_z_replayed(linear)

@@ -18,6 +18,8 @@
 #else
 #define NUMBERS SD_REAL_NUMBERS
 #endif
+#define WRITING 40000      /* operations interpreted for the time that machine code takes to be made, */
+#define WRITTEN 100        /* and for each operation that it has: written earlier it costs a short run more than it saves */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
@@ -247,7 +249,17 @@ static void prepare(sd_elimination *e)
     measure_columns(e);
     e->ready = 1;
     write_constants(e->cell + constants(e));
-    e->code = sd_code_new(&e->factor, &e->solve, e->inside, NUMBERS);
+    e->interpreted = 0;
+}
+
+/* machine code once the list has been interpreted for as long as that takes to be written: at most twice the least */
+static void write_code(sd_elimination *e)
+{
+    int64_t operations = e->factor.sums + e->factor.pairs + e->solve.sums + e->solve.pairs;
+    int64_t before = e->interpreted, due = sd_code_early() ? 0 : WRITING + WRITTEN * operations;
+    e->interpreted += operations;
+    if (before <= due && e->interpreted > due)
+        e->code = sd_code_new(&e->factor, &e->solve, e->inside, NUMBERS);
 }
 
 void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
@@ -330,6 +342,8 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
 #pragma GCC unroll 4
     for (int32_t k = 0; k < e->n; k++)
         magnitudes[k] = scale ? scale[e->pivot_column[k]] : 1.0;
+    if (!e->code)
+        write_code(e);
     if (e->code)
         e->code->factor((sd_number *)values, e->cell);
     else

@@ -46,6 +46,7 @@ typedef struct sd_elimination {
     int32_t *pivot_row, *pivot_column; /* [n] */
     double *weak;                /* [n] least size of each pivot, scaled, as its column was when the order was found */
     sd_list factor, solve;
+    int64_t interpreted;         /* operations so far */
     sd_code *code;               /* NULL: interpreted */
 } sd_elimination;
 

@@ -14,6 +14,11 @@ void sd_code_allow(int allowed)
     permitted = allowed;
 }
 
+int sd_code_early(void)
+{
+    return permitted > 1;
+}
+
 #if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(SD_INTERPRETED)
 #include <sys/mman.h>
 

@@ -28,7 +28,8 @@ struct sd_code {
  * bits of magnitudes.  NULL where there is none. */
 sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers);
 void sd_code_free(sd_code *code);
-/* 0: from now on lists are interpreted (tests) */
+/* from now on lists are interpreted (0), written where that pays (1), or at once (2; tests) */
 void sd_code_allow(int allowed);
+int sd_code_early(void);
 
 #endif

@@ -247,7 +247,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
     } else {
         int there = 0;
-        if (!at_step) {
+        if (!at_step && !run->unsummed) {
             there = integrate(run, t);
             dissipated = run->integral[2];
             supplied = run->integral[3];
@@ -271,6 +271,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     audit(run, t, run->point, run->point_d, out);
     if (!run->started)
         run->stored = out[0] + out[1];
+    if (run->unsummed)
+        dissipated = supplied = NAN;
     double energy = out[0] + out[1] - run->stored + dissipated - supplied;
     double constraints = run->settle ? run->settle->constraints : 0.0;
     double head[SD_ROW_HEAD] = {label, kind, out[0], out[1], dissipated, supplied, energy, constraints};
@@ -434,7 +436,9 @@ static void measure(sd_run *run, double from, double t)
     run->sampled = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
-    if (t < *run->stepper->t && run->settle && !run->stepper->part_y)
+    if (run->unsummed)
+        memset(run->integral, 0, (size_t)run->audited * sizeof(double));
+    else if (t < *run->stepper->t && run->settle && !run->stepper->part_y)
         integrate_cut(run, t);
     else
         integrate(run, t);

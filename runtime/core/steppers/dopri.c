@@ -17,6 +17,8 @@
 #define SOON 8           /* the same where the end is FAR times further than patience lasts */
 #define FAR 10.0
 #define SMOOTH 6         /* steps inside it that show the contrary */
+#define QUICKER 4.0      /* times the rate at which the motion bends: what holds the step is a system that is that much faster,
+                            for no stage of an explicit method knows the slope that the others come to */
 #define REFUSED 50       /* steps refused beyond those taken: kinks that the method cannot cross with its order */
 
 static int step(void *dopri)
@@ -126,7 +128,7 @@ void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd
     dopri->h = fmin(dopri->fixed_h > 0.0 ? dopri->fixed_h : h, dopri->h_max);
     dopri->h_used = 0.0;
     dopri->error_accepted = 1e-4;
-    dopri->rejected = dopri->stiff = dopri->smooth = dopri->dense = 0;
+    dopri->rejected = dopri->stiff = dopri->smooth = dopri->outrun = dopri->even = dopri->dense = 0;
 }
 
 /* slopes of stage s at its point, from those of the stage before as a guess */
@@ -219,17 +221,33 @@ static int attempt(sd_dopri *dopri, double *error)
     return cause ? cause : slopes(dopri, SD_DOPRI_STAGES, SD_DOPRI_STAGES - 1, dopri->t + h);
 }
 
+/* Counts steps with `sign`, which SMOOTH steps in a row without it clear. */
+static void count(int32_t *with, int32_t *without, int sign)
+{
+    *with += sign;
+    *without = sign ? 0 : *without + 1;
+    if (*without == SMOOTH)
+        *with = 0;
+}
+
+/* 1: the error test holds the step far below what the motion asks for (ratio: (h |lambda|)^2), and the end is further
+ * than what another method would take anew */
+static int is_outrun(sd_dopri *dopri, double ratio)
+{
+    double bend = squares(dopri, dopri->rate[SD_DOPRI_STAGES], dopri->rate[0]);
+    double size = squares(dopri, dopri->rate[SD_DOPRI_STAGES], NULL);
+    count(&dopri->outrun, &dopri->even, dopri->h < dopri->h_max && ratio * size > QUICKER * QUICKER * bend);
+    return dopri->outrun >= STIFF && dopri->t_end - dopri->t > fmax(dopri->spare, (double)dopri->steps) * dopri->h;
+}
+
 /* 1: the step is held to the region of stability, and the end is far */
 static int is_stiff(sd_dopri *dopri)
 {
     double far = squares(dopri, dopri->y[SD_DOPRI_STAGES], dopri->y[SD_DOPRI_STAGES - 1]);
     double turn = squares(dopri, dopri->rate[SD_DOPRI_STAGES], dopri->rate[SD_DOPRI_STAGES - 1]);
-    if (far > 0.0 && dopri->h * sqrt(turn / far) > BOUNDARY) {
-        dopri->smooth = 0;
-        dopri->stiff++;
-    } else if (++dopri->smooth == SMOOTH) {
-        dopri->stiff = 0;
-    }
+    if (dopri->spare > 0.0 && far > 0.0 && is_outrun(dopri, dopri->h * dopri->h * turn / far))
+        return 1;
+    count(&dopri->stiff, &dopri->smooth, far > 0.0 && dopri->h * sqrt(turn / far) > BOUNDARY);
     double steps = (dopri->t_end - dopri->t) / dopri->h;
     return dopri->stiff >= (steps > FAR * dopri->patience ? SOON : STIFF) && steps > dopri->patience;
 }

@@ -30,9 +30,11 @@ typedef struct sd_dopri {
     double *met;              /* [n] max |y| */
     const int32_t *test, *power; /* [n] as in bdf.h */
     double patience;          /* steps still to be taken above which a stiff run is given up */
+    double spare;             /* the same of one whose system is faster than its motion; 0: never */
     /* state of the integration */
     double t, h, h_used, error_accepted;
-    int32_t rejected, dense, stiff, smooth; /* dense: the interpolant of the last step is there */
+    int32_t rejected, dense;  /* dense: the interpolant of the last step is there */
+    int32_t stiff, smooth, outrun, even; /* steps counted */
     double *phi, *yd;         /* [n] the last accepted point */
     double *y[SD_DOPRI_ALL], *rate[SD_DOPRI_ALL]; /* [n] stages of the last step: point, slopes; y[0]: its start */
     double *f[SD_DOPRI_DENSE]; /* [n] the interpolant */
