@@ -310,7 +310,7 @@ class Integration:
         return largest, sizes
 
     def last(self) -> tuple[Floats, Floats, Floats]:
-        """y and yd at the end of the last step, the largest |y| met [unknowns]."""
+        """Y and yd at the end of the last step, the largest |y| met [unknowns]."""
         return (*self.method.point(), self._sizes()[0])
 
     def _projected(self) -> int | None:
