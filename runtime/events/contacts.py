@@ -49,10 +49,13 @@ class NoActiveSetError(Exception):
 
 
 class Contacts:
-    """The active set and the senses of a model; p: its parameters, where senses stand."""
+    """The active set and the senses of a model; p: its parameters, where senses stand; starting: a start is sought."""
 
-    def __init__(self, plan: Plan, system: System, observer: Observer, p: Floats) -> None:
+    def __init__(
+        self, plan: Plan, system: System, observer: Observer, p: Floats, *, starting: bool = False
+    ) -> None:
         self.contacts = contacts = plan.contacts
+        self.starting = starting
         self.system, self.observer, self.p = system, observer, p
         self.switches = system.description.switches
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
@@ -161,6 +164,10 @@ class Contacts:
     def wrong(self, values: Floats, impulses: Floats) -> int:
         """The first contact whose condition does not hold; -1 where all do."""
         return next(self._wrongs(values, impulses), -1)
+
+    def fits(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> bool:
+        """Whether every condition holds at what was found (y, yd, impulses) behind y."""
+        return self.wrong(self.observer(t, *found[:2]), found[2]) < 0 and not self.backwards(t, y, found)
 
     def _wrongs(self, values: Floats, impulses: Floats) -> Iterator[int]:
         """Contacts whose condition does not hold."""
@@ -292,7 +299,7 @@ class Contacts:
             if found is None:
                 break
             values = self.observer(t, found[0], found[1])
-            wrong = list(self._wrongs(values, found[2]))
+            wrong = sorted({*self._wrongs(values, found[2]), *self.backwards(t, y, found)})
             if not wrong:
                 return found[0], found[1]
             if again and self._done(t, wrong, y, found):  # from behind their impulses on
@@ -318,13 +325,30 @@ class Contacts:
         held = [k for k in wrong if self.active[k]]
         if any(found[2][self.multiplier[k]] <= 0.0 for k in held):
             return False
-        open_ = [self.contacts[k].value for k in wrong if not self.active[k]]
-        form, still = self.system.form, found[0].copy()
+        passed = self._passed(t, y, found)
+        return all(passed[k] > 0.0 for k in wrong if not self.active[k])
+
+    def _passed(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
+        """Impulses of flow [contacts]: what passed inequalities of flows where displacements jumped; none at a start,
+        where they are sought.
+        """
+        form, passed = self.system.form, np.zeros(len(self.contacts))
+        moved = (found[0] - y)[form.k_q]
+        if self.starting or not moved.any():
+            return passed
+        still = found[0].copy()
         still[form.k_f] = 0.0
-        passed = still.copy()
-        passed[form.k_f] = (found[0] - y)[form.k_q]
-        both = (self.system.observe(t, point, found[1])[open_] for point in (passed, still))
-        return bool((np.subtract(*both) > 0.0).all())
+        flowing = still.copy()
+        flowing[form.k_f] = moved
+        rows = [c.value for c in self.contacts]
+        both = (self.system.observe(t, point, found[1])[rows] for point in (flowing, still))
+        return np.asarray(np.where([c.kind == "psi" for c in self.contacts], np.subtract(*both), 0.0))
+
+    def backwards(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> list[int]:
+        """Open inequalities of flows through which an impulse went backwards."""
+        passed, zero = self._passed(t, y, found), self.observer.zero
+        least = [-zero(c.value) * self.time for c in self.contacts]
+        return [int(k) for k in np.flatnonzero((passed < least) & ~self.active & ~self.barred)]
 
     def _beside(
         self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]
@@ -341,7 +365,7 @@ class Contacts:
             if open_ or self.state() in seen:
                 continue
             found = self._settled_by(t, y, yd, settle)
-            if found is not None and self.wrong(self.observer(t, *found[:2]), found[2]) < 0:
+            if found is not None and self.fits(t, y, found):
                 return found
             if found is not None and first is None:
                 first = found, self.active.copy()

@@ -136,6 +136,6 @@ class Determined:
             except NoActiveSetError:
                 return None
         found = settle(t, *point)
-        if found is None or self.contacts.wrong(self.contacts.observer(t, *found[:2]), found[2]) >= 0:
+        if found is None or not self.contacts.fits(t, point[0], found):
             return None
         return found[:2]

@@ -375,8 +375,8 @@ class Handler:
         self.contacts.become(after)
         found = self.restart.struck(t, *point)
         if found is not None:
-            values = self.observer(t, *found[:2])
-            fits = self.contacts.wrong(values, found[2]) < 0 and (key[1] or self._decided(before[0], values))
+            fits = self.contacts.fits(t, point[0], found)
+            fits = fits and (bool(key[1]) or self._decided(before[0], self.observer(t, *found[:2])))
             if fits and self.determined.leaves(t, *found[:2]) == 0:
                 return found[0], found[1]
         self.contacts.active[:], self.p[:] = before

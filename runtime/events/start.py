@@ -24,7 +24,7 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
     """
     if not plan.contacts:
         return consistent_start(system, t0, until=until)
-    contacts = Contacts(plan, system, Observer(system), system.description.p)
+    contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
     contacts.begin()
     zeros = np.zeros(system.form.written)
     values = contacts.observer(t0, zeros, zeros)

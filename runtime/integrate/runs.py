@@ -43,7 +43,7 @@ system of which radau's factors are cheap enough for it to take over."""
 
 ROUGH = 1e-2
 """Of the tolerance: scaled residual of rows by which runs are compared."""
-APART = 0.25
+APART = 0.1
 """Of a step: rows of a draft are no nearer to each other.  With one a step the rows between the steps of others are not
 seen: an amplifier then was estimated 500 times too good."""
 FORETOLD = 0.01

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.points import uniform
 from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.start.start import ConsistentState
 
@@ -36,8 +37,8 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
 
 def _nudges(number: int) -> list[tuple[Floats, Floats]]:
     """Parts by which values are moved, and times by which rates are, at the start and beside it."""
-    random = np.random.default_rng(0)
-    return [(random.uniform(0.5, 1.0, number), random.uniform(1.0, 2.0, number)) for _ in range(2)]
+    drawn = [(uniform(number, 0, k * number), uniform(number, 1, k * number)) for k in range(2)]
+    return [(0.5 + 0.5 * part, 1.0 + times) for part, times in drawn]
 
 
 def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:

@@ -94,4 +94,4 @@ def test_a_draft_in_which_newton_fails_is_given_up(tmp_path, published):
     wanted = published.rober() if callable(published.rober) else published.rober
     assert run.met
     assert [run.trace[f"y{k}"][-1] for k in wanted.ref] == pytest.approx([*wanted.ref.values()], rel=1e-2)
-    assert run.trace.statistics["newton_failures"] < 80
+    assert run.trace.statistics["newton_failures"] < 100

@@ -18,8 +18,8 @@
 #else
 #define NUMBERS SD_REAL_NUMBERS
 #endif
-#define WRITING 40000      /* operations interpreted for the time that machine code takes to be made, */
-#define WRITTEN 100        /* and for each operation that it has: written earlier it costs a short run more than it saves */
+#define MAKING 40000       /* operations interpreted for the time that machine code takes to be made, */
+#define MAKING_ONE 100     /* and for each operation that it has: made earlier it costs a short run more than it saves */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
@@ -256,7 +256,7 @@ static void prepare(sd_elimination *e)
 static void write_code(sd_elimination *e)
 {
     int64_t operations = e->factor.sums + e->factor.pairs + e->solve.sums + e->solve.pairs;
-    int64_t before = e->interpreted, due = sd_code_early() ? 0 : WRITING + WRITTEN * operations;
+    int64_t before = e->interpreted, due = sd_code_early() ? 0 : MAKING + MAKING_ONE * operations;
     e->interpreted += operations;
     if (before <= due && e->interpreted > due)
         e->code = sd_code_new(&e->factor, &e->solve, e->inside, NUMBERS);

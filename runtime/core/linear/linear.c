@@ -37,7 +37,7 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
     linear->place = !linear->pivot || order ? NULL : linear->pivot + m;
     linear->rank = n;
     if (order)
-        linear->sparse = sd_sparse_new(n, n, column, order);
+        linear->sparse = sd_sparse_new(n, n, order);
     else
         linear->dense = calloc(m * m + 1, sizeof(sd_number));
     if (!linear->row_scale || !linear->work || !linear->pivot || !(order ? (void *)linear->sparse : (void *)linear->dense)) {

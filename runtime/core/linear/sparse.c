@@ -25,7 +25,7 @@ void sd_sparse_free(sd_sparse *lu)
     free(lu);
 }
 
-sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const int32_t *order)
+sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order)
 {
     sd_sparse *lu = calloc(1, sizeof *lu);
     if (!lu)
@@ -35,7 +35,7 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const i
     lu->rows = rows;
     lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    lu->inverse = calloc(m + all + 1, sizeof(sd_number));
+    lu->inverse = calloc(m + (m > all ? m : all) + 1, sizeof(sd_number));
     if (!lu->order || !lu->l_start || !lu->inverse) {
         sd_sparse_free(lu);
         return NULL;

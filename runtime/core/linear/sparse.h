@@ -19,7 +19,7 @@ typedef struct sd_sparse {
     sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
     int64_t l_room, u_room;
     int32_t *stack, *head, *mark, *count; /* [rows] search, while pivots are chosen */
-    sd_number *x;                /* [rows + 1] */
+    sd_number *x;                /* [the larger of n and rows, + 1] */
     int pivoted;                 /* a valid pattern exists */
     int diagonal;                /* row c pivots in column c wherever its entry will do: the order is one of A + A^T */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
@@ -29,7 +29,7 @@ typedef struct sd_sparse {
     int32_t bad_row, bad_column;
 } sd_sparse;
 
-sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *column, const int32_t *order);
+sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order);
 void sd_sparse_free(sd_sparse *lu);
 /* choose pivots and pattern: 0 done, 1 singular, 2 memory */
 int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value);

@@ -33,7 +33,7 @@ static void refine(sd_sparse *lu, const int32_t *column, const int32_t *row, con
 int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                   const int32_t *order, double least, int64_t most, const double *b, double *x)
 {
-    sd_sparse *lu = sd_sparse_new(rows, columns, column, order);
+    sd_sparse *lu = sd_sparse_new(rows, columns, order);
     double *rest = malloc(((size_t)rows + (size_t)columns + 1) * sizeof *rest);
     int failed = lu && rest ? 0 : 2;
     if (!failed) {
@@ -53,7 +53,7 @@ int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const in
 int sd_left_open(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                  const int32_t *order, double least, int64_t most, double *x)
 {
-    sd_sparse *lu = sd_sparse_new(rows, columns, column, order);
+    sd_sparse *lu = sd_sparse_new(rows, columns, order);
     double *rest = calloc(2 * (size_t)rows + (size_t)columns + 1, sizeof *rest);
     double *none = rest + rows + columns; /* A x = 0 */
     int failed = lu && rest ? 0 : 2;

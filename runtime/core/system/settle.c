@@ -82,7 +82,7 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
                     const int32_t *place_y, const int32_t *place_yd, int32_t determined)
 {
     int32_t n = settle->unknowns + settle->rates;
-    settle->basis = sd_sparse_new(n, settle->rows, column, order);
+    settle->basis = sd_sparse_new(n, settle->rows, order);
     settle->lift = calloc((size_t)n + (size_t)column[settle->rows] + 1, sizeof(double));
     if (!settle->basis || !settle->lift)
         return 2;
