@@ -180,21 +180,31 @@ class Starter:
         self.settled.failure.check()
 
     @remembered
+    def _slopes(self, t: float, x: Floats) -> Floats:
+        """Values of the matrix before rows are summed."""
+        values = np.zeros(self.equations.rows.size)
+        self._ask(lib.core.sd_start_jacobian, t, x, values)
+        return values
+
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
-        known, values = self.equations, np.zeros(self.equations.rows.size)
-        self._ask(lib.core.sd_start_jacobian, t, x, values)
+        known, values = self.equations, self._slopes(t, x)
         if not self.summed:
             return values
         full = np.zeros((self.settled.rows, known.unknowns))
         np.add.at(full, (known.rows, known.columns), values)
-        values[np.isin(known.rows, self._summed)] = 0.0
-        return np.append(values, self._sums @ full[self._summed])
+        alone = np.where(np.isin(known.rows, self._summed), 0.0, values)
+        return np.append(alone, self._sums @ full[self._summed])
 
     def row_scale(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """One over the size of the terms of each row [rows], by the larger of magnitudes and values."""
-        terms = np.abs(self.jacobian(t, x)) * np.maximum(scale, np.abs(x))[self.columns]
-        size = np.bincount(self.rows, weights=terms, minlength=self.settled.rows)
+        """One over the size of the terms of each row [rows], by the larger of magnitudes and values; of sums over that
+        of what is summed, which may cancel.
+        """
+        known = self.equations
+        terms = np.abs(self._slopes(t, x)) * np.maximum(scale, np.abs(x))[known.columns]
+        size = np.bincount(known.rows, weights=terms, minlength=self.settled.rows)
+        if self.summed:
+            size[self._places] = np.abs(self._sums) @ size[self._summed]
         return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
 
     def with_sums(self, values: Floats) -> Floats:
