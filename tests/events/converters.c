@@ -14,12 +14,12 @@ typedef struct branch {
 } branch;
 
 typedef struct source {
-    int32_t node, none;
+    int32_t node;
     double r, amplitude, frequency, phase;
 } source;
 
 typedef struct valve {
-    int32_t kind, a, b, none;
+    int32_t kind, a, b;
     double r, delay, period, width; /* in series (of a MOSFET: its channel); gate */
 } valve;
 

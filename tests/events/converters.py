@@ -5,13 +5,10 @@ backward Euler (converters.c).
 from __future__ import annotations
 
 import ctypes as c
-import subprocess
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
+from compiled import library
 
 SPAN, ROWS, STEPS = 0.06, 60, (120_000, 480_000)
 KINDS = ("diode", "switch", "thyristor", "mosfet")
@@ -23,12 +20,12 @@ class _Branch(c.Structure):
 
 
 class _Source(c.Structure):
-    _fields_ = [("node", c.c_int32), ("none", c.c_int32), *((k, c.c_double) for k in ("r", "amplitude", "f", "phase"))]
+    _fields_ = [("node", c.c_int32), *((k, c.c_double) for k in ("r", "amplitude", "f", "phase"))]
 
 
 class _Valve(c.Structure):
     _fields_ = [
-        *((k, c.c_int32) for k in ("kind", "a", "b", "none")),
+        *((k, c.c_int32) for k in ("kind", "a", "b")),
         *((k, c.c_double) for k in ("r", "delay", "period", "width")),
     ]
 
@@ -114,13 +111,13 @@ class Converter:
         for k, branch in enumerate(self.branches):
             net.branch[k] = _Branch(*branch)
         for k, (node, *rest) in enumerate(self.sources):
-            net.source[k] = _Source(node, 0, *rest)
+            net.source[k] = _Source(node, *rest)
         for k, (kind, a, b, *rest) in enumerate(self.valves):
-            net.valve[k] = _Valve(KINDS.index(kind), a, b, 0, *rest)
+            net.valve[k] = _Valve(KINDS.index(kind), a, b, *rest)
         found = np.zeros((2, ROWS + 1, len(self.traced)))
         for steps, rows in zip(STEPS, found, strict=True):
             into = c.c_void_p(rows.ctypes.data)
-            assert _library().converter(c.byref(net), c.c_double(SPAN), c.c_int64(steps), ROWS, into) == 0
+            assert library("converters").converter(c.byref(net), c.c_double(SPAN), c.c_int64(steps), ROWS, into) == 0
         apart = found[1] - found[0]
         return found[1] + apart / 3.0, np.abs(apart).max(axis=0)
 
@@ -153,12 +150,3 @@ def drawn(number: int) -> Converter:
         bare = r.random() < 0.3 and kind in ("diode", "thyristor")
         valves.append((kind, *ends(), 0.0 if bare else size(-0.5, 1), *gate))
     return Converter([size(-5, -3) for _ in range(n)], branches, sources, valves)
-
-
-@cache
-def _library() -> c.CDLL:
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "converters.so"
-        source = Path(__file__).with_name("converters.c")
-        subprocess.run(["gcc", "-O2", "-shared", "-fPIC", "-o", str(file), str(source), "-lm"], check=True)
-        return c.CDLL(str(file))

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import ctypes as c
-import subprocess
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
+from compiled import library
 
 SPAN, ROWS, STEPS = 2.0, 200, 400_000
 KINDS = ("friction", "ratchet", "wall", "latch")
@@ -102,7 +99,7 @@ class Shafts:
         arrays = [c.c_void_p(np.ascontiguousarray(m).ctypes.data) for m in (*matrices, load)]
         last = [c.c_void_p(item.ctypes.data) for item in (q, v, rows)]
         kicked = c.c_void_p(kick.ctypes.data)
-        _library().shafts(n, len(self.contacts), *arrays, contacts, kicked, c.c_double(SPAN), STEPS, ROWS, *last)
+        library("moreau").shafts(n, len(self.contacts), *arrays, contacts, kicked, c.c_double(SPAN), STEPS, ROWS, *last)
         return rows[:, :n], rows[:, n:]
 
 
@@ -141,13 +138,3 @@ def _numbers(kind: str, r: np.random.Generator, size) -> tuple[float, float, flo
         case "latch":
             return float(np.round(r.uniform(0.1, 1.6), 2)), 0.0, 0.0
     return 0.0, 0.0, 0.0
-
-
-@cache
-def _library() -> c.CDLL:
-    """Compiled once a process: others compile their own."""
-    with TemporaryDirectory() as folder:
-        library = Path(folder) / "moreau.so"
-        source = Path(__file__).with_name("moreau.c")
-        subprocess.run(["gcc", "-O2", "-shared", "-fPIC", str(source), "-o", str(library), "-lm"], check=True)
-        return c.CDLL(str(library))
