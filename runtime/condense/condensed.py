@@ -20,6 +20,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
 from sysdyn.runtime.numerics.points import distinct
@@ -354,6 +355,18 @@ class Forms:
             return column_order(stepped.pattern, leaving=bool(whole.form.scales))
 
         return whole.once(("order", *stepped.key), made)
+
+    def completed(self, t: float, y: Floats) -> Floats:
+        """Y [unknowns as written] at t (s) with the displacements that nothing reads where their constraints want them:
+        runs do not integrate those, and what moves charge at once passes all of a node's.
+        """
+        whole, still = self.settled.whole, np.zeros(y.size)
+        unread = np.isin(np.arange(y.size), self.settled.sums.unread)
+        row, column = whole.pattern.row, whole.pattern.columns_of()
+        entry = np.flatnonzero(unread[column] & whole.of_groups("phi")[row])
+        rows, at = np.unique(row[entry], return_inverse=True)
+        slope, miss = whole.jacobian(t, y, still)[0][entry], whole.residual(t, y, still)[rows]
+        return y + least_norm((rows.size, y.size), (at, column[entry], slope), -miss)
 
 
 class _Condenser:

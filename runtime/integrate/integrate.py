@@ -474,14 +474,15 @@ class Integration:
             found = still(self.settler, t, (y, yd), self._keeps, self.magnitude[:n])
             if found is not None:
                 return found
-        return self.restart.across(t, y, yd)
+        return self.restart.across(t, y if self.forms is None else self.forms.completed(t, y), yd)
 
     def _share(self, y: Floats) -> None:
         """What a method of fewer unknowns knows of their sizes becomes known of all at a point y."""
         if self.forms is None:
             return
         kept, (_, magnitude, met) = self.forms.stepped.kept, self._stepped[1]
-        np.maximum(self._met, np.abs(y), out=self._met)
+        for sizes in (self._met, self.magnitude):
+            np.maximum(sizes, np.abs(y), out=sizes)
         self.magnitude[kept], self._met[kept] = magnitude, met
 
     def _hand_down(self) -> None:

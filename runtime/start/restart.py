@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.least_change import solve
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.displacements import Displacements
 from sysdyn.runtime.start.impulses import Impulses
 from sysdyn.runtime.start.settled import HELD, Settler
-from sysdyn.runtime.start.starter import Starter, problem_of
+from sysdyn.runtime.start.start import behind
+from sysdyn.runtime.start.starter import Starter
 
 STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
@@ -27,8 +27,6 @@ SLACK = 1e-6
 """Of its magnitude: what a state may move by where rows hold only nearly."""
 ROUND_OFF = 1e-14
 """Of its magnitude: what a search moves an unknown by that stays where it is."""
-EXACT = 1e-9
-"""Scaled residual with which the slower search is content."""
 
 
 def still(
@@ -64,7 +62,7 @@ class Restart:
     def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there."""
         magnitude = self.magnitude(y.size)
-        impulse = np.zeros(y.size)
+        impulse, before = np.zeros(y.size), y
         same, moved = _held(self.settler, t, (y, yd), magnitude)
         moved &= self.state
         if same is not None and not moved.any():  # no state need jump: there is no impulse
@@ -84,7 +82,8 @@ class Restart:
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
         if done and self._stays(found, y, magnitude):
             return found, rate, impulse
-        searched = self._search(t, y, yd)
+        # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
+        searched = self._search(t, np.where(self.state, y, before), yd)
         return (*searched, impulse) if searched is not None and self._stays(searched[0], y, magnitude) else None
 
     def _stays(self, found: Floats, y: Floats, magnitude: Floats) -> bool:
@@ -116,16 +115,16 @@ class Restart:
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
     def _search(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
-        """The same by Gauss-Newton with shortened steps: first with the state held, then with everything free."""
+        """The same as a start finds it: first with the state held, then with everything free."""
         starter = Starter(self.settler.system.another("3"))
+        starter.every &= ~starter.groups("initial")
         guess = starter.unknowns(t, y, yd)
         # a rate of a multiplier that is zero because its constraint does not hold stays zero
         idle, state = np.zeros((2, guess.size), dtype=bool)
         idle[starter.n : starter.first] = np.isin(starter.rates, starter.system.idle_multipliers())
         guess[idle], state[: y.size] = 0.0, self.state
         for held in (state, np.zeros_like(state)):
-            rows, free = starter.every & ~starter.groups("initial"), ~(idle | held)
-            best = solve(problem_of(starter, t, guess, guess, rows=rows, free=free), guess)
-            if best.residual < EXACT:
-                return starter.expand(best.x)
+            found = behind(starter, t, guess, ~(idle | held))
+            if found is not None:
+                return starter.expand(found)
         return None

@@ -54,7 +54,8 @@ class ConsistentState:
     """y, yd [unknowns as written] at t; residual: largest scaled row.
 
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
-    found it; "" of a state that was not sought from guesses.
+    found it; "" of a state that was not sought from guesses.  zeros: where y is what round-off left of a zero (None:
+    nowhere), by which nothing else is sized: a slope that such a current makes would have temperatures of 1e19 K balance.
     """
 
     t: float
@@ -63,6 +64,7 @@ class ConsistentState:
     moved: tuple[tuple[str, float, float, str], ...]
     residual: float
     strategy: str = ""
+    zeros: Mask | None = None
 
     def for_form(self, system: System) -> tuple[Floats, Floats]:
         """y, yd in the layout of an index form: new multipliers are zero.  Read-only where they are the state's own."""
@@ -71,6 +73,14 @@ class ConsistentState:
         y, yd = np.zeros(system.unknowns), np.zeros(system.unknowns)
         y[: self.y.size], yd[: self.y.size] = self.y, self.yd
         return y, yd
+
+    def without_noise(self, y: Floats) -> Floats:
+        """Its y in any layout with these zeros."""
+        if self.zeros is None:
+            return y
+        clean = y.copy()
+        clean[: self.zeros.size][self.zeros] = 0.0
+        return clean
 
 
 def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Floats:
@@ -114,8 +124,11 @@ def _rescaled(
 
 
 def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
-    """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution."""
-    size = starter.row_scale(t, magnitudes, starter.scale(t, magnitudes))[starter.every]
+    """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution: those of
+    noise beside their like are no less than that.
+    """
+    scale = np.maximum(starter.scale(t, magnitudes), NOISE * starter.largest_alike(magnitudes))
+    size = starter.row_scale(t, magnitudes, scale)[starter.every]
     return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
 
 
@@ -221,6 +234,17 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("largest_scales", _in_largest_scales),
 )
 """Globalisation: what is tried, in this order, until all rows hold."""
+
+
+def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
+    """A point behind a jump at which all rows hold that must, from x; None where none was found.  Steep laws may lie far
+    behind it: a step of 10 V across a diode.
+    """
+    for strategy in (_newton, _walked):
+        found, holds = strategy(starter, t, x, x, free)
+        if holds:
+            return found.x
+    return None
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
@@ -347,8 +371,9 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
         raise _explain(starter, t0, guess, free, best)
     y, yd = starter.expand(best.x)
     moved = tuple(_moved(starter, t0, best.x, starter.scale(t0, best.x)))
+    zeros = (starter.without_noise(best.x, starter.scale(t0, guess)) == 0.0)[: y.size]
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess, free
         system.trim()
-    return ConsistentState(t0, y, yd, moved, best.residual, strategy)
+    return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros)

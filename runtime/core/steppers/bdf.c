@@ -160,6 +160,17 @@ static int rows_hold(sd_bdf *bdf, double t)
     return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, all, bdf->terms) < 0;
 }
 
+/* Every steep row is as small as round-off of the unknowns' magnitudes, by slopes at the point itself, lets it be (see
+ * radau_newton.c) */
+static int rows_at_round_off(sd_bdf *bdf, double t)
+{
+    if (bdf->linear->rank < bdf->n)
+        return 0;
+    sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
+    return sd_first_astray(bdf->system, t, bdf->y, bdf->yd, bdf->delta, bdf->jy, bdf->jyd, 1.0 / bdf->cj, bdf->magnitude,
+                           SD_ROUND_OFF, bdf->terms) < 0;
+}
+
 /* the residual in delta is finite; else bad_row says where not */
 static int finite(sd_bdf *bdf)
 {
@@ -189,8 +200,8 @@ static int cause_of(sd_bdf *bdf, double t, int corrections)
 /* Newton's iteration from the prediction with the present factors */
 static int iterate(sd_bdf *bdf, double t)
 {
-    double first = 0.0;
-    int converged = 0, judged = bdf->system->scales > 0;
+    double first = 0.0, before = 0.0;
+    int converged = 0, idle = 0, judged = bdf->system->scales > 0;
     for (int m = 0; m < ITERATIONS + judged; m++) {
         double *d = bdf->delta;
         sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
@@ -199,7 +210,7 @@ static int iterate(sd_bdf *bdf, double t)
             return SD_STOPPED;
         if (judged && !finite(bdf)) /* rows are judged, and columns may be left out of the correction */
             return SD_NONFINITE;
-        if (converged && rows_hold(bdf, t))
+        if (converged && (rows_hold(bdf, t) || (idle && rows_at_round_off(bdf, t))))
             return SD_FINE;
         if (m == ITERATIONS)
             break;
@@ -221,6 +232,8 @@ static int iterate(sd_bdf *bdf, double t)
             if (rate > SLUGGISH)
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
+        idle = m > 0 && size <= SD_ROUND_OFF / bdf->rtol && !(size < SLOW * before);
+        before = size;
         /* a first correction is not believed beyond this, however fast earlier steps converged */
         double contraction = m == 0 ? fmax(bdf->contraction, TRUST) : bdf->contraction;
         converged = converged || contraction * size <= NEWTON_TOLERANCE;

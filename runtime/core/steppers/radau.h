@@ -125,8 +125,9 @@ void sd_radau_extrapolate(sd_radau *radau, double h);
  * that of three stages */
 double sd_radau_norm(const sd_radau *radau, const double *x);
 double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method);
-/* radau_systems.c: out [n] := sum of weight[j] v[j] over the stages; then as they say there */
+/* radau_systems.c: out [n] := sum of weight[j] v[j] over the stages; y, rate [n] := those of a stage; then as they say there */
 void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out);
+void sd_radau_stage(const sd_radau *radau, int s, double *y, double *rate);
 int sd_radau_factorise(sd_radau *radau, int at_end);
 int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);

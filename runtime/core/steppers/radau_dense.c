@@ -216,7 +216,7 @@ int sd_radau_astray(sd_radau *radau)
         }
         sd_residual(radau->system, at, radau->y, radau->rate, radau->d[0]);
         if (sd_first_astray(radau->system, at, radau->y, radau->rate, radau->d[0], radau->jy, radau->jyd, radau->h,
-                            radau->magnitude, radau->terms) >= 0)
+                            radau->magnitude, 1.0, radau->terms) >= 0)
             return 1;
     }
     return 0;

@@ -81,23 +81,26 @@ static int factorise_all(sd_radau *radau)
     return failed;
 }
 
+void sd_radau_stage(const sd_radau *radau, int s, double *y, double *rate)
+{
+    const sd_radau_method *method = radau->method;
+    double weight[SD_STAGES];
+    for (int j = 0; j < method->stages; j++)
+        weight[j] = method->inverse[s][j] / radau->h;
+    sd_radau_combine(method->stages, radau->n, weight, radau->z, rate);
+    for (int32_t i = 0; i < radau->n; i++)
+        y[i] = radau->phi[i] + radau->z[s][i];
+}
+
 /* J, E where they are not old, and the factors of J + gamma/h E and all J + lambda/h E.  Taken at the last accepted point, or
  * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
 int sd_radau_factorise(sd_radau *radau, int at_end)
 {
     sd_system *system = radau->system;
-    const sd_radau_method *method = radau->method;
-    int last = method->stages - 1;
     if (!radau->old_jacobian) {
-        double h = radau->h;
-        if (at_end) {
-            sd_radau_combine(last + 1, radau->n, method->inverse[last], radau->z, radau->rate);
-            for (int32_t i = 0; i < radau->n; i++) {
-                radau->y[i] = radau->phi[i] + radau->z[last][i];
-                radau->rate[i] /= h;
-            }
-        }
-        sd_jacobian(system, at_end ? radau->t + h : radau->t, at_end ? radau->y : radau->phi,
+        if (at_end)
+            sd_radau_stage(radau, radau->method->stages - 1, radau->y, radau->rate);
+        sd_jacobian(system, at_end ? radau->t + radau->h : radau->t, at_end ? radau->y : radau->phi,
                     at_end ? radau->rate : radau->yd, radau->jy, radau->jyd);
         if (*system->stop)
             return SD_STOPPED;
@@ -121,14 +124,8 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
 /* d of stage s := its residual, of `system`, by way of y and rate */
 static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, double *rate)
 {
-    const sd_radau_method *method = radau->method;
-    double weight[SD_STAGES];
-    for (int j = 0; j < method->stages; j++)
-        weight[j] = method->inverse[s][j] / radau->h;
-    sd_radau_combine(method->stages, radau->n, weight, radau->z, rate);
-    for (int32_t i = 0; i < radau->n; i++)
-        y[i] = radau->phi[i] + radau->z[s][i];
-    sd_residual(system, radau->t + method->c[s] * radau->h, y, rate, radau->d[s]);
+    sd_radau_stage(radau, s, y, rate);
+    sd_residual(system, radau->t + radau->method->c[s] * radau->h, y, rate, radau->d[s]);
 }
 
 /* The later half of the stages, in a system beside the radau's own; the others in that. */

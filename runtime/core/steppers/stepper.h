@@ -8,6 +8,8 @@
 #include "system/assembly.h"
 #include "system/settle.h"
 
+#include <float.h>
+
 #define SD_NODES 7
 
 enum sd_cause {
@@ -52,6 +54,7 @@ typedef struct sd_stepper {
     void (*show)(const void *self, int32_t k, double *y, double *yd);
 } sd_stepper;
 
+#define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the magnitudes of unknowns */
 #define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */
 
 /* The largest |y| met so far, and the magnitude that grows with it. */
