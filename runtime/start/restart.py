@@ -25,6 +25,8 @@ GUESSES = (0.0, *(sign * size for size in (1.0, 0.1, 1e-2, 1e-3, 10.0) for sign 
 """Of their magnitudes: what flows without inertia and implicit efforts are moved by before a state is."""
 SLACK = 1e-6
 """Of its magnitude: what a state may move by where rows hold only nearly."""
+NEXT_TO_ZERO = 1e-6
+"""Of its magnitude: what follows and is less says nothing of its size."""
 ROUND_OFF = 1e-14
 """Of its magnitude: what a search moves an unknown by that stays where it is."""
 
@@ -118,7 +120,9 @@ class Restart:
         """The same as a start finds it: first with the state held, then with everything free."""
         starter = Starter(self.settler.system.another("3"))
         starter.every &= ~starter.groups("initial")
-        guess = starter.unknowns(t, y, yd)
+        # nothing is known behind a jump by what was next to zero before it, rates least of all
+        near = ~self.state & (np.abs(y) < NEXT_TO_ZERO * self.magnitude(y.size))
+        guess = starter.unknowns(t, np.where(near, 0.0, y), np.zeros_like(yd))
         # a rate of a multiplier that is zero because its constraint does not hold stays zero
         idle, state = np.zeros((2, guess.size), dtype=bool)
         idle[starter.n : starter.first] = np.isin(starter.rates, starter.system.idle_multipliers())

@@ -45,6 +45,10 @@ NOTED = 1e-9
 """Of its size: a move of a guess that is told."""
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
+LEAST_PART = 1e-6
+"""Of misses: less is not faded out at once."""
+FOLLOWED, NEARLY = 12, 1e-4
+"""Iterations in which Newton's method follows what fades, and the scaled residual at which it has."""
 EXPLAINED = 0.1
 """Share of the work of a search that explaining what was not found may take."""
 
@@ -55,7 +59,7 @@ class ConsistentState:
 
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
     found it; "" of a state that was not sought from guesses.  zeros: where y is what round-off left of a zero (None:
-    nowhere), by which nothing else is sized: a slope that such a current makes would have temperatures of 1e19 K balance.
+    nowhere), by which nothing else is sized: a slope made of such a current would have 1e19 K balance a voltage.
     """
 
     t: float
@@ -236,11 +240,26 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
 """Globalisation: what is tried, in this order, until all rows hold."""
 
 
-def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
-    """A point behind a jump at which all rows hold that must, from x; None where none was found.  Steep laws may lie far
-    behind it: a step of 10 V across a diode.
+def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Along what fades of the rows' misses at x, as fast as Newton's method follows; then everything at once (Newton's
+    homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.
     """
-    for strategy in (_newton, _walked):
+    miss, done, part = starter.residual(t, x), 0.0, 0.5
+    while done < 1.0 and part > LEAST_PART and not starter.work.done:
+        left = (1.0 - min(done + part, 1.0)) * miss
+        rows = problem_of(starter, t, x, x, rows=starter.every, free=free)
+        rows = replace(rows, residual=lambda z, left=left: starter.residual(t, z) - left, core=None)
+        found = solve(rows, x, FOLLOWED)
+        follows = found.residual < NEARLY
+        x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
+    return _rescaled(starter, t, x, guess, free)
+
+
+def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
+    """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
+    a diode makes steep laws lie far behind it.
+    """
+    for strategy in (_newton, _walked, _led):
         found, holds = strategy(starter, t, x, x, free)
         if holds:
             return found.x
