@@ -136,7 +136,7 @@ class SampledRows:
             return self._leaf(node, args, inside, which, points)
 
         found = evaluate(roots, lookup)
-        sizes = magnitudes(roots, lookup) if careful else found
+        sizes = magnitudes(roots, lookup, self.binding.parameters.table_size) if careful else found
         for (k, c, _), result, large in zip(scaled, found, sizes, strict=True):
             where = rows[k][some]
             for target, array in ((value, c * np.asarray(result, dtype=float)), (size, np.abs(c * np.asarray(large)))):

@@ -7,7 +7,7 @@ a power of it inherits that (first-order propagation of relative errors, with th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from sysdyn.compiler.model.interpret import Lookup, Value, evaluate
@@ -28,14 +28,18 @@ EXACT = ("const", "param", "var", "time", "index", "reduce")
 """What `rounding` takes as it is."""
 
 
-def magnitudes(roots: Sequence[Node], lookup: Lookup) -> list[Value]:
-    """Magnitude of each expression, at least that of its value; sums over ranges count as their value."""
+def magnitudes(roots: Sequence[Node], lookup: Lookup, table_size: Callable[[Node], float]) -> list[Value]:
+    """Magnitude of each expression, at least that of its value; sums over ranges count as their value.  table_size: of
+    the terms that a table's value is made of.
+    """
     nodes = [n for n in topological_unbound(roots) if n.op != "index"]
     with np.errstate(all="ignore"):
         value = dict(zip(nodes, evaluate(nodes, lookup), strict=True))
         found: dict[Node, Value] = {}
         for node in nodes:
             found[node] = np.maximum(_own(node, value, found), np.abs(np.asarray(value[node], dtype=float)))
+            if node.op == "table":
+                found[node] = found[node] + table_size(node)
     return [found[root] for root in roots]
 
 

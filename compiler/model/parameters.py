@@ -166,6 +166,16 @@ class Parameters:
             return self.start
         raise ModelError([Diagnostic("E807", f"{to_text(node)} is not known before the start", None)])
 
+    def table_size(self, node: Node) -> float:
+        """What rounding of a table node's value is relative to: the largest of its pieces' terms, which cancel at the
+        right ends.
+        """
+        table, orders = self._tables[node.data[0]], node.data[1]
+        size = float(np.abs(table.values).max(initial=0.0))
+        for points, order in zip(table.points, orders if isinstance(orders, tuple) else (orders,), strict=False):
+            size /= float(np.diff(points).min(initial=np.inf)) ** order
+        return size
+
     def _gather(self, name: str, values: NDArray[np.float64], args: list[Value]) -> Value:
         """Elements of an array; an index outside is E805."""
         at = []

@@ -240,16 +240,20 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
 """Globalisation: what is tried, in this order, until all rows hold."""
 
 
+def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Floats]:
+    """Rows that hold where those of the start are missed by so much."""
+    return lambda x: starter.residual(t, x) - miss
+
+
 def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """Along what fades of the rows' misses at x, as fast as Newton's method follows; then everything at once (Newton's
     homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.
     """
     miss, done, part = starter.residual(t, x), 0.0, 0.5
     while done < 1.0 and part > LEAST_PART and not starter.work.done:
-        left = (1.0 - min(done + part, 1.0)) * miss
         rows = problem_of(starter, t, x, x, rows=starter.every, free=free)
-        rows = replace(rows, residual=lambda z, left=left: starter.residual(t, z) - left, core=None)
-        found = solve(rows, x, FOLLOWED)
+        left = _faded(starter, t, max(1.0 - done - part, 0.0) * miss)
+        found = solve(replace(rows, residual=left, core=None), x, FOLLOWED)
         follows = found.residual < NEARLY
         x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
     return _rescaled(starter, t, x, guess, free)

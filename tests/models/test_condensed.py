@@ -5,7 +5,7 @@ import pytest
 from model_runs import FOUR, trace_of
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
-from sysdyn.api import load
+from sysdyn.api import load, simulate
 from sysdyn.cli.main import run
 from sysdyn.runtime.condense import condensed as condensing
 from sysdyn.runtime.integrate import integrate
@@ -252,3 +252,40 @@ def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, sou
     assert all(pieces == 2 and unknowns < 1.2 * N for pieces, unknowns in seen)
     assert not any(whole)
     assert np.abs(trace["audit.constraints"].values).max() < 1e-12
+
+
+JUMPING = """from std.electrical import capacitor, resistor, voltage
+model ladder {
+  node a, b, c, d: electrical
+  V: voltage(v = if t < 1 ms then 1 V*t/(1 ms) else 5 V) a -> ground
+  C1: capacitor(C = 1 uF) a -> b
+  C2: capacitor(C = 2 uF) b -> ground
+  R1: resistor(R = 1 kohm) a -> b
+  R2: resistor(R = 2 kohm) b -> ground
+  R3: resistor(R = 500 ohm) b -> c
+  C3: capacitor(C = 1 uF) c -> ground
+  R4: resistor(R = 700 ohm) c -> d
+  C4: capacitor(C = 3 uF) d -> ground
+  init C1.e = 0 V; init C2.e = 0 V; init C3.e = 0 V; init C4.e = 0 V
+}
+scene s of ladder {
+  time 0 s to 2 ms
+  trace b.e, c.e, d.e every 0.25 ms
+  accuracy 1e-8
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_charge_jumps_where_resistors_have_passed_charge_that_nothing_reads(tmp_path, formulation):
+    (tmp_path / "ladder.sd").write_text(JUMPING)
+    trace = simulate(tmp_path / "ladder.sd", formulation=formulation, output=tmp_path / "out.h5")
+    store = np.diag([3e-6, 1e-6, 3e-6])
+    leak = np.array([[1e-3 + 5e-4 + 2e-3, -2e-3, 0], [-2e-3, 2e-3 + 1 / 700, -1 / 700], [0, -1 / 700, 1 / 700]])
+    grow = np.zeros((5, 5))  # of b, c, d, the source and its rate
+    grow[:3, :3], grow[:3, 3], grow[0, 4], grow[3, 4] = np.linalg.solve(store, -leak), [1e-3 / 3e-6, 0, 0], 1 / 3, 1
+    before = expm(1e-3 * grow) @ [0, 0, 0, 0, 1e3]
+    after = expm(0.75e-3 * grow) @ (before * [1, 1, 1, 0, 0] + [4.0 / 3.0, 0, 0, 5, 0])
+    for k, name in enumerate(["b.e", "c.e", "d.e"]):
+        assert trace[name].values[4] - before[k] == pytest.approx(4.0 / 3.0 if k == 0 else 0.0, abs=1e-8)
+        assert trace[name].values[7] == pytest.approx(after[k], abs=2e-8)

@@ -232,7 +232,7 @@ static int iterate(sd_bdf *bdf, double t)
             if (rate > SLUGGISH)
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
-        idle = m > 0 && size <= SD_ROUND_OFF / bdf->rtol && !(size < SLOW * before);
+        idle = m > 0 && size <= STAGNANT && !(size < SLOW * before);
         before = size;
         /* a first correction is not believed beyond this, however fast earlier steps converged */
         double contraction = m == 0 ? fmax(bdf->contraction, TRUST) : bdf->contraction;

@@ -93,7 +93,6 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
     double tolerance = newton_tolerance(radau);
     double before = 0.0, ratio_before = 0.0, trust = 1.0;
-    double least = SD_ROUND_OFF / radau->tolerance;
     int patient = full || radau->fixed_h > 0.0;
     *retry = 0.5;
     int usual = sd_radau_iterations(radau), most = patient ? PATIENT : usual, converged = 0, idle = 0;
@@ -127,7 +126,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
                 return SD_NEWTON;
             }
         }
-        idle = m > 1 && size <= least && !(size < SLOW * before);
+        idle = m > 1 && size <= STAGNANT * tolerance && !(size < SLOW * before);
         before = fmax(size, DBL_MIN);
         /* far up an exponential every correction is small */
         converged = converged || (trust * size <= tolerance && !(full && m == 1));
