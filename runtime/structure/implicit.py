@@ -39,7 +39,8 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
         np.maximum.at(largest, columns, values)
         return np.asarray(largest[implicit])
 
-    size = balanced(system, y, system.jacobian(state.t, y, yd)[0])[implicit]
+    clean = state.without_noise(y)
+    size = balanced(system, clean, system.jacobian(state.t, clean, yd)[0])[implicit]
     here = slopes(y)
     found = np.ones(implicit.size, dtype=bool)
     for nudge in NUDGES:
@@ -49,6 +50,8 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
         found &= np.isfinite(there) & (there > 0.0) & (here <= VANISHING * there)
     if not found.any() or system.rows > DENSE:
         return ()
+    beside = y.copy()
+    beside[implicit[found]] += NUDGES[-1] * size[found]
     iterated = (system.dense(np.add(*system.jacobian(state.t, point, yd))) for point in (y, beside))
     at, off = (decomposed(matrix)[1][-1] for matrix in equilibrated(*iterated))
     if at > VANISHING * off:

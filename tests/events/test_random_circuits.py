@@ -1,8 +1,8 @@
-"""Random circuits with bends and jumps of their source against Radau IIA on modified nodal equations (circuits.py)."""
+"""Random circuits with bends and jumps of their source against Radau IIA on modified nodal equations (random_circuits.py)."""
 
 import numpy as np
 import pytest
-from circuits import AMBIENT, drawn
+from random_circuits import AMBIENT, drawn
 from sysdyn import api
 
 NUMBERS = range(60)
