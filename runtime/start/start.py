@@ -58,7 +58,7 @@ class ConsistentState:
     """y, yd [unknowns as written] at t; residual: largest scaled row.
 
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
-    found it; "" of a state that was not sought from guesses.  zeros: where y is what round-off left of a zero (None:
+    found it; "" of a state that was not sought from guesses.  zeros: where y is what the search left of a zero (None:
     nowhere), by which nothing else is sized: a slope made of such a current would have 1e19 K balance a voltage.
     """
 
@@ -394,7 +394,8 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
         raise _explain(starter, t0, guess, free, best)
     y, yd = starter.expand(best.x)
     moved = tuple(_moved(starter, t0, best.x, starter.scale(t0, best.x)))
-    zeros = (starter.without_noise(best.x, starter.scale(t0, guess)) == 0.0)[: y.size]
+    largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
+    zeros = (np.abs(best.x) <= EXACT * largest)[: y.size]
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess, free
