@@ -1,4 +1,4 @@
-"""Random circuits with bends and jumps of their source against Radau IIA on modified nodal equations (random_circuits.py)."""
+"""Random circuits with bends and jumps of their source against Radau IIA (random_circuits.py)."""
 
 import numpy as np
 import pytest
