@@ -272,7 +272,18 @@ class Condensed:
         made.kinematics, made.column, made.row = int(here.sum()), None, None  # nothing reads its pattern
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
         made.k_scale = self._hold(np.ones(here.size))
+        made.call = c.addressof(self._calls(kept))
         return made
+
+    def _calls(self, kept: Mask) -> c.Array[lib.Call]:
+        """The calls of the whole system without loops that add to rows that are not kept alone."""
+        whole = self.whole
+        calls = (lib.Call * max(len(whole.form.calls), 1))()
+        for k, planned in enumerate(whole.form.calls):
+            calls[k] = whole.calls[k]
+            whole.spare_loops(calls[k], planned.block, kept, planned.to)
+        self._keep += [calls, whole.slots]  # the places that the calls write to
+        return calls
 
     def _make(self) -> None:
         whole = self.whole

@@ -30,7 +30,7 @@ _ORDERS = _D * (MAX_ORDER + 2)
 class Frame(c.Structure):
     """sd_frame."""
 
-    _fields_ = [("p", _P), ("ix", _P), ("at", _P), ("to", _P)]
+    _fields_ = [("p", _P), ("ix", _P), ("at", _P), ("to", _P), ("spared", _P)]
 
 
 class Call(c.Structure):
@@ -156,6 +156,7 @@ class Stepper(c.Structure):
         *[(name, _P) for name in ["moves", "part_moves"]],
         ("collocated", _I),
         ("show", _P),
+        ("values", _P),
     ]
 
 
@@ -543,10 +544,12 @@ class Run(c.Structure):
         ("written", _I),
         ("observed", _I),
         ("audited", _I),
+        ("audit", _P),
+        ("powers", _P),
+        ("rated", _I),
         *[
             (name, _P)
             for name in [
-                "audit",
                 "observe",
                 "observe_rate",
                 "observe_scale",

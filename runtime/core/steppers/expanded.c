@@ -49,6 +49,13 @@ static void dense(const void *self, double t, double *y, double *yd)
     sd_condensed_show(expanded->condensed, expanded->z, expanded->zd, y, yd);
 }
 
+static void values(const void *self, double t, double *y)
+{
+    const sd_expanded *expanded = self;
+    expanded->inner->values(expanded->inner->self, t, expanded->z);
+    sd_condensed_expand(expanded->condensed, expanded->z, y, 0);
+}
+
 static void refine(void *self, sd_settle *settle)
 {
     sd_expanded *expanded = self;
@@ -102,6 +109,7 @@ sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, i
     expanded->face.refine = inner->refine ? refine : NULL;
     expanded->face.start = start;
     expanded->face.show = inner->show ? show : NULL;
+    expanded->face.values = inner->values ? values : NULL;
     return expanded;
 }
 
