@@ -32,6 +32,8 @@ Between steep laws small matrices may leave columns open (numerics/ordering.py),
 a circuit of diodes of less than 20 unknowns crawled."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
+LONG, MOST_ALIKE = 64, 2
+"""Unknowns of a stretch that is asked whether each of its terms, so many at most, has one factor."""
 DEFINED = "leaves runs: a constant sum of others"
 UNREAD = "leaves runs: nothing reads it"
 OBSERVING = ("observe", "observe_rate", "audit", "ledger")
@@ -130,8 +132,12 @@ class Straights:
         assert first is not None
         for k, (low, high, source) in enumerate(zip(begin.tolist(), ends.tolist(), offset.tolist(), strict=True)):
             place, entry = int(found.place[low]), int(found.start[low])
-            made[k] = lib.Straight(place, high - low, int(count[low]), first + 4 * source, at + 8 * entry, None)
+            made[k] = lib.Straight(place, high - low, int(count[low]), 0, first + 4 * source, at + 8 * entry, None)
         self.array, self.number = made, int(begin.size)
+        long = np.flatnonzero((ends - begin >= LONG) & (terms_of > 0) & (terms_of <= MOST_ALIKE))
+        sizes = (ends - begin)[long] * terms_of[long]
+        entries = found.start[begin[long]]
+        self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
 
     def renew(self, found: Sums) -> None:
         """Takes the numbers of other sums of the same structure."""
@@ -143,6 +149,9 @@ class Straights:
         for k in np.flatnonzero(some != self._some):
             self.array[int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
         self._some = some
+        for number, entry, size in self._long:
+            factor = self._factors[entry : entry + size].reshape(self.array[number].terms, -1)
+            self.array[number].alike = int((factor == factor[:, :1]).all())
 
     def fix(self) -> None:
         """Lets go of what only other numbers would need."""

@@ -345,7 +345,8 @@ class Integration:
         if self._least_norm is not None:
             run.least_norm = self._least_norm.address
         self._calls["powers"] = system.powers()
-        run.rated = int(any(k.rates is None or k.rates for k in system.description.blocks.get("audit", ())))
+        audited = [k for name in ("audit", "ledger") for k in system.description.blocks.get(name, ())]
+        run.rated = int(any(k.rates is None or k.rates for k in audited))
         for name, call in self._calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
         self._audit_at = system.once("audited", lambda: _audited(system))

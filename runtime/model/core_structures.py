@@ -95,7 +95,10 @@ class Span(c.Structure):
 class Straight(c.Structure):
     """sd_straight."""
 
-    _fields_ = [("place", _I), ("number", _I), ("terms", _I), ("source", _P), ("factor", _P), ("constant", _P)]
+    _fields_ = [
+        *[(name, _I) for name in ["place", "number", "terms", "alike"]],
+        *[(name, _P) for name in ["source", "factor", "constant"]],
+    ]
 
 
 class Condensed(c.Structure):

@@ -70,15 +70,14 @@ static void weigh(sd_run *run, double weight)
         run->integral[k] += weight * run->sample[k];
 }
 
-/* powers within the last step: point is there, and point_d where they read it */
-static void sample(sd_run *run, double t)
+/* point at t within the last step, and point_d where what is audited reads it */
+static void look(sd_run *run, double t)
 {
     const sd_stepper *stepper = run->stepper;
     if (stepper->values && !run->rated)
         stepper->values(stepper->self, t, run->point);
     else
         stepper->dense(stepper->self, t, run->point, run->point_d);
-    powers(run, t, run->point, run->point_d);
 }
 
 /* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node, and 0 at
@@ -139,7 +138,7 @@ static void integrate_nodes(sd_run *run, double part)
 }
 
 /* run->integral [audited]: of the powers from the start of the last step to `to`, within that step; 1: point, point_d hold
- * the point there */
+ * the point there; sampled: sample and point do, which is the end of the step */
 static int integrate(sd_run *run, double to)
 {
     static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
@@ -166,14 +165,19 @@ static int integrate(sd_run *run, double to)
     memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
     weigh(run, half / 6.0);
     for (int k = -1; k <= 1; k += 2) {
-        sample(run, middle + k * inner * half);
+        double t = middle + k * inner * half;
+        look(run, t);
+        powers(run, t, run->point, run->point_d);
         weigh(run, 5.0 * half / 6.0);
     }
-    stepper->dense(stepper->self, to, run->point, run->point_d);
+    run->sampled = to == *stepper->t;
+    if (run->sampled)
+        look(run, to);
+    else
+        stepper->dense(stepper->self, to, run->point, run->point_d);
     audit(run, to, run->point, run->point_d, run->sample);
     weigh(run, half / 6.0);
-    run->sampled = to == *stepper->t;
-    return 1;
+    return !run->sampled;
 }
 
 /* The same where an event ends the step at `to`: Gauss's rule of degree 5, after many nodes 9, on settled points.  Within

@@ -52,8 +52,10 @@ static void dense(const void *self, double t, double *y, double *yd)
 static void values(const void *self, double t, double *y)
 {
     const sd_expanded *expanded = self;
-    expanded->inner->values(expanded->inner->self, t, expanded->z);
-    sd_condensed_expand(expanded->condensed, expanded->z, y, 0);
+    const sd_stepper *inner = expanded->inner;
+    if (t != *inner->t)
+        inner->values(inner->self, t, expanded->z);
+    sd_condensed_expand(expanded->condensed, t != *inner->t ? expanded->z : inner->y, y, 0);
 }
 
 static void refine(void *self, sd_settle *settle)
