@@ -21,7 +21,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.matching import matched
-from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
+from sysdyn.runtime.numerics.ordering import SMALL, Order, any_order, paired_order, with_pairs
 from sysdyn.runtime.numerics.points import distinct
 from sysdyn.values import dataclass
 
@@ -161,7 +161,8 @@ class Straights:
 class Condensed:
     """The kept unknowns and rows of a system; what Method and Settler ask of a System, with places of its own.
 
-    kept, kept_rows: their places in the whole system; core: the core's structure of it.
+    kept, kept_rows: their places in the whole system; core: the core's structure of it; paired: row k belongs to
+    unknown k; own_rows [unknowns]: where not every unknown has a row, those that are sure (-1: none).
     """
 
     def __init__(
@@ -173,6 +174,7 @@ class Condensed:
         self.kept, self.kept_rows = found.kept, kept_rows.astype(np.int32)
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
+        self.own_rows: Ints | None = None
         self._keep: list[object] = []
         columns = self._products()
         self._lay_out(columns)
@@ -204,6 +206,7 @@ class Condensed:
         rest, _ = compress(open_.size, left.size, [where])
         found = matched(rest)
         if (found < 0).any():
+            self.own_rows = own.astype(np.int32)
             return False
         own[left] = open_[found]
         self.kept_rows, self.paired = self.kept_rows[own], True
@@ -364,14 +367,15 @@ class Forms:
     stepped: Condensed
     settled: Condensed
 
-    def order(self) -> Ints | None:
+    def order(self) -> Order:
         """Elimination order of the stepped form's matrices [kept], found once."""
         stepped, whole = self.stepped, self.stepped.whole
 
-        def made() -> Ints | None:
+        def made() -> Order:
             if stepped.paired:
-                return paired_order(stepped.pattern)
-            return column_order(stepped.pattern, leaving=bool(whole.form.scales))
+                return Order(paired_order(stepped.pattern), paired=True)
+            order = any_order(stepped.pattern, leaving=bool(whole.form.scales))
+            return with_pairs(stepped.pattern, order, stepped.own_rows)
 
         return whole.once(("order", *stepped.key), made)
 

@@ -115,6 +115,12 @@ class Condensed(c.Structure):
     ]
 
 
+class Order(c.Structure):
+    """sd_order."""
+
+    _fields_ = [*[(name, _P) for name in ["columns", "own", "otherwise"]], ("most", _L), ("paired", _I)]
+
+
 class Linear(c.Structure):
     """sd_linear."""
 
@@ -143,6 +149,7 @@ class Linear(c.Structure):
         ("pivoted", _I),
         ("replayed", _I),
         ("elimination", _P),
+        ("otherwise", _P),
     ]
 
 
