@@ -164,7 +164,7 @@ def _call(name: str, k: int, call: Call) -> str:
     dy, dyd = (
         f"sd_{call.block}_{part}" if slots.size else "NULL" for part, slots in (("dy", call.dy), ("dyd", call.dyd))
     )
-    frame = f"{{NULL, ix, {name}_at_{k}, {name}_to_{k}}}"
+    frame = f"{{NULL, ix, {name}_at_{k}, {name}_to_{k}, NULL}}"
     numbers = f"{call.dy.size}, {call.dyd.size}, {name}_dy_{k}, {name}_dyd_{k}"
     return f"    {{sd_{call.block}_rows, {dy}, {dyd}, {frame}, {numbers}}},"
 

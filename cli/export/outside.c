@@ -204,7 +204,7 @@ int sd_outputs(double t, const double *y, const double *yd, const double *p, dou
     if (refused(p))
         return -1;
 #if OBSERVED
-    const sd_frame frame = {p, ix, observe_at, observe_to};
+    const sd_frame frame = {p, ix, observe_at, observe_to, NULL};
     double *inside = calloc(2 * (size_t)EXTENDED + OBSERVED + AUDITED + MEASURES, sizeof *inside);
     double *rates = inside + EXTENDED, *found = rates + EXTENDED, *meters = found + OBSERVED;
     if (!inside)
@@ -227,7 +227,7 @@ int sd_outputs(double t, const double *y, const double *yd, const double *p, dou
     memcpy(rates, yd, WRITTEN * sizeof *inside);
 #endif
 #if AUDITED
-    const sd_frame measured = {p, ix, observe_at, audit_to};
+    const sd_frame measured = {p, ix, observe_at, audit_to, NULL};
     sd_audit_rows(&measured, t, inside, rates, meters);
 #endif
     for (int k = 0; k < MEASURES; k++)
@@ -253,7 +253,7 @@ static int groups_of(enum sd_kind kind, double *p, double *y)
         double *v = malloc(((size_t)group->entries + 1) * sizeof *v);
         if (!v)
             return -1;
-        const sd_frame frame = {p, following_ix, written_at, written_at};
+        const sd_frame frame = {p, following_ix, written_at, written_at, NULL};
         group->values(&frame, sd_t0, y, y, v);
         double *into = kind == SD_INITIAL ? y : p;
         for (int32_t k = 0; kind == SD_CONSTANT && k < group->used; k++)

@@ -325,7 +325,8 @@ def _block(name: str, part: str, program: Program, calls: dict[int, tuple[str, .
     lines = [head]
     for k, later in zip(numbers, [*numbers[1:], -1], strict=True):
         routine = program.routines[k]
-        lines += [f"    {call}" for call in calls[k]]
+        asked = f"if (!frame->spared || !frame->spared[{routine.kernel}]) " if part == "rows" and routine.loops else ""
+        lines += [f"    {asked}{call}" for call in calls[k]]
         last = later < 0 or program.routines[later].kernel != routine.kernel
         if part != "rows" and not routine.loops and last:
             lines.append(f"    v += {routine.entries};")

@@ -22,7 +22,7 @@ from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
-from sysdyn.runtime.numerics.ordering import SMALL, column_order, paired_order
+from sysdyn.runtime.numerics.ordering import SMALL, Order, any_order, paired_order, with_pairs
 from sysdyn.runtime.numerics.points import distinct
 from sysdyn.values import dataclass
 
@@ -33,6 +33,8 @@ Between steep laws small matrices may leave columns open (numerics/ordering.py),
 a circuit of diodes of less than 20 unknowns crawled."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
+LONG, MOST_ALIKE = 64, 2
+"""Unknowns of a stretch that is asked whether each of its terms, so many at most, has one factor."""
 DEFINED = "leaves runs: a constant sum of others"
 UNREAD = "leaves runs: nothing reads it"
 OBSERVING = ("observe", "observe_rate", "audit", "ledger")
@@ -131,8 +133,12 @@ class Straights:
         assert first is not None
         for k, (low, high, source) in enumerate(zip(begin.tolist(), ends.tolist(), offset.tolist(), strict=True)):
             place, entry = int(found.place[low]), int(found.start[low])
-            made[k] = lib.Straight(place, high - low, int(count[low]), first + 4 * source, at + 8 * entry, None)
+            made[k] = lib.Straight(place, high - low, int(count[low]), 0, first + 4 * source, at + 8 * entry, None)
         self.array, self.number = made, int(begin.size)
+        long = np.flatnonzero((ends - begin >= LONG) & (terms_of > 0) & (terms_of <= MOST_ALIKE))
+        sizes = (ends - begin)[long] * terms_of[long]
+        entries = found.start[begin[long]]
+        self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
 
     def renew(self, found: Sums) -> None:
         """Takes the numbers of other sums of the same structure."""
@@ -144,6 +150,9 @@ class Straights:
         for k in np.flatnonzero(some != self._some):
             self.array[int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
         self._some = some
+        for number, entry, size in self._long:
+            factor = self._factors[entry : entry + size].reshape(self.array[number].terms, -1)
+            self.array[number].alike = int((factor == factor[:, :1]).all())
 
     def fix(self) -> None:
         """Lets go of what only other numbers would need."""
@@ -153,7 +162,8 @@ class Straights:
 class Condensed:
     """The kept unknowns and rows of a system; what Method and Settler ask of a System, with places of its own.
 
-    kept, kept_rows: their places in the whole system; core: the core's structure of it.
+    kept, kept_rows: their places in the whole system; core: the core's structure of it; paired: row k belongs to
+    unknown k; own_rows [unknowns]: where not every unknown has a row, those that are sure (-1: none).
     """
 
     def __init__(
@@ -165,6 +175,7 @@ class Condensed:
         self.kept, self.kept_rows = found.kept, kept_rows.astype(np.int32)
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
+        self.own_rows: Ints | None = None
         self._keep: list[object] = []
         columns = self._products()
         self._lay_out(columns)
@@ -196,6 +207,7 @@ class Condensed:
         rest, _ = compress(open_.size, left.size, [where])
         found = matched(rest)
         if (found < 0).any():
+            self.own_rows = own.astype(np.int32)
             return False
         own[left] = open_[found]
         self.kept_rows, self.paired = self.kept_rows[own], True
@@ -273,7 +285,18 @@ class Condensed:
         made.kinematics, made.column, made.row = int(here.sum()), None, None  # nothing reads its pattern
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
         made.k_scale = self._hold(np.ones(here.size))
+        made.call = c.addressof(self._calls(kept))
         return made
+
+    def _calls(self, kept: Mask) -> c.Array[lib.Call]:
+        """The calls of the whole system without loops that add to rows that are not kept alone."""
+        whole = self.whole
+        calls = (lib.Call * max(len(whole.form.calls), 1))()
+        for k, planned in enumerate(whole.form.calls):
+            calls[k] = whole.calls[k]
+            whole.spare_loops(calls[k], planned.block, kept, planned.to)
+        self._keep += [calls, whole.slots]  # the places that the calls write to
+        return calls
 
     def _make(self) -> None:
         whole = self.whole
@@ -345,14 +368,15 @@ class Forms:
     stepped: Condensed
     settled: Condensed
 
-    def order(self) -> Ints | None:
+    def order(self) -> Order:
         """Elimination order of the stepped form's matrices [kept], found once."""
         stepped, whole = self.stepped, self.stepped.whole
 
-        def made() -> Ints | None:
+        def made() -> Order:
             if stepped.paired:
-                return paired_order(stepped.pattern)
-            return column_order(stepped.pattern, leaving=bool(whole.form.scales))
+                return Order(paired_order(stepped.pattern), paired=True)
+            order = any_order(stepped.pattern, leaving=bool(whole.form.scales))
+            return with_pairs(stepped.pattern, order, stepped.own_rows)
 
         return whole.once(("order", *stepped.key), made)
 

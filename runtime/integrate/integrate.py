@@ -35,7 +35,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.ordering import order_of
+from sysdyn.runtime.numerics.ordering import Order, order_of
 from sysdyn.runtime.start.restart import Restart, still
 from sysdyn.runtime.start.settled import Settler, flows_open
 from sysdyn.runtime.start.start import ConsistentState
@@ -188,15 +188,10 @@ class Integration:
     def _linear(self) -> None:
         if self.request.method in ON_UNDERLYING:
             self.underlying = Underlying(self._solved, self.magnitude)
-            self.linear, self._order = self.underlying.linear, None
+            self.linear, self._order = self.underlying.linear, Order(None)
             return
-        pattern = self.stepped.pattern
         self._order = order_of(self.system) if self.forms is None else self.forms.order()
-        self.linear = lib.core.sd_linear_new(
-            pattern.unknowns, *(lib.pointer(item) for item in (pattern.column, pattern.row, self._order))
-        )
-        if not self.linear:
-            raise MemoryError
+        self.linear = self._order.linear(self.stepped.pattern)
 
     @property
     def _keeps(self) -> NDArray[np.bool_]:
@@ -344,6 +339,9 @@ class Integration:
         self._least_norm = LeastNorm(self.settler.system) if request.least_norm else None
         if self._least_norm is not None:
             run.least_norm = self._least_norm.address
+        self._calls["powers"] = system.powers()
+        audited = [k for name in ("audit", "ledger") for k in system.description.blocks.get(name, ())]
+        run.rated = int(any(k.rates is None or k.rates for k in audited))
         for name, call in self._calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
         self._audit_at = system.once("audited", lambda: _audited(system))

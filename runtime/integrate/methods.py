@@ -11,15 +11,15 @@ from typing import Any
 from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.ordering import Order
 
 
 class Method:
     """One of "bdf", "radau", "dopri", "energy" on one system.
 
-    linear: the core's real factorisation; order: its column order (None: dense); underlying: for dopri and energy;
+    linear: the core's real factorisation; order: of its matrices; underlying: for dopri and energy;
     stages: of radau, at most.
     Of a condensed system it steps what is kept, and shows every unknown.
     """
@@ -29,7 +29,7 @@ class Method:
         name: str,
         system: System | Condensed,
         linear: Any,
-        order: Ints | None,
+        order: Order,
         underlying: Underlying | None = None,
         stages: int = 3,
     ) -> None:
@@ -38,7 +38,7 @@ class Method:
         self.complex: tuple[int, ...] = ()
         self._core: Any = None
         if name == "radau":
-            self.complex = tuple(_complex_linear(system.pattern, order) for _ in range(stages // 2))
+            self.complex = tuple(order.complex_linear(system.pattern) for _ in range(stages // 2))
             pairs = (c.c_void_p * lib.PAIRS)(*self.complex)
             self._core = lib.core.sd_radau_new(c.byref(system.core), linear, pairs, stages)
         elif name == "energy":
@@ -57,10 +57,6 @@ class Method:
         self._n = system.unknowns
         if isinstance(system, Condensed):
             self._n = system.whole.unknowns
-            if system.paired:
-                lib.core.sd_linear_paired(linear)
-                for item in self.complex:
-                    lib.core.sd_linear_z_paired(item)
             condensed = c.addressof(system.condensed)
             self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
             if not self.expanded:
@@ -102,11 +98,3 @@ class Method:
             getattr(lib.core, f"sd_{self.name}_free")(self._core)
         for item in getattr(self, "complex", ()):
             lib.core.sd_linear_z_free(item)
-
-
-def _complex_linear(pattern: Pattern, order: Ints | None) -> int:
-    places = (lib.pointer(item) for item in (pattern.column, pattern.row, order))
-    made = lib.core.sd_linear_z_new(pattern.unknowns, *places)
-    if not made:
-        raise MemoryError
-    return int(made)

@@ -8,7 +8,7 @@ from sysdyn.runtime.integrate.unknown_roles import Roles, roles, without_rate
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import magnitudes, unresolved
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.ordering import order_of
+from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.start.start import ConsistentState
 
 UNRESOLVED = 8.0
@@ -61,7 +61,7 @@ class Origin:
     def sized(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
         if self._sized is None or self._sized[0] != t_end:
-            far = self.jy, self.jyd, self.yd, order_of(self.system)
+            far = self.jy, self.jyd, self.yd, net_order_of(self.system).address
             y = self.start.without_noise(self.y)
             self._sized = t_end, magnitudes(self.system, self.t, t_end, y, self.yd, far)
         return self._sized[1]

@@ -26,7 +26,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.scales import confirmed, sizing
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.ordering import order_of
+from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.simulate import alternatives, close, counted, form_name, formed
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
@@ -380,7 +380,7 @@ class Batch:
         sizes = sizing(system)
         self._alive.append(sizes)
         many.system, many.sizing = c.addressof(system.core), c.addressof(sizes.core)
-        many.order = lib.pointer(order_of(system))
+        many.order = net_order_of(system).address
         many.form_jy, many.form_jyd = (self._kept(np.zeros(system.pattern.entries + 1)) for _ in range(2))
         many.found = self._kept(np.zeros(system.unknowns + 1))
         for k in (0, 1):

@@ -30,7 +30,7 @@ _ORDERS = _D * (MAX_ORDER + 2)
 class Frame(c.Structure):
     """sd_frame."""
 
-    _fields_ = [("p", _P), ("ix", _P), ("at", _P), ("to", _P)]
+    _fields_ = [("p", _P), ("ix", _P), ("at", _P), ("to", _P), ("spared", _P)]
 
 
 class Call(c.Structure):
@@ -95,7 +95,10 @@ class Span(c.Structure):
 class Straight(c.Structure):
     """sd_straight."""
 
-    _fields_ = [("place", _I), ("number", _I), ("terms", _I), ("source", _P), ("factor", _P), ("constant", _P)]
+    _fields_ = [
+        *[(name, _I) for name in ["place", "number", "terms", "alike"]],
+        *[(name, _P) for name in ["source", "factor", "constant"]],
+    ]
 
 
 class Condensed(c.Structure):
@@ -110,6 +113,12 @@ class Condensed(c.Structure):
         ("products", _L),
         *[(name, _P) for name in ["from_", "to", "share", "y", "yd", "r", "slope"]],
     ]
+
+
+class Order(c.Structure):
+    """sd_order."""
+
+    _fields_ = [*[(name, _P) for name in ["columns", "own", "otherwise"]], ("most", _L), ("paired", _I)]
 
 
 class Linear(c.Structure):
@@ -140,6 +149,7 @@ class Linear(c.Structure):
         ("pivoted", _I),
         ("replayed", _I),
         ("elimination", _P),
+        ("otherwise", _P),
     ]
 
 
@@ -156,6 +166,7 @@ class Stepper(c.Structure):
         *[(name, _P) for name in ["moves", "part_moves"]],
         ("collocated", _I),
         ("show", _P),
+        ("values", _P),
     ]
 
 
@@ -543,10 +554,12 @@ class Run(c.Structure):
         ("written", _I),
         ("observed", _I),
         ("audited", _I),
+        ("audit", _P),
+        ("powers", _P),
+        ("rated", _I),
         *[
             (name, _P)
             for name in [
-                "audit",
                 "observe",
                 "observe_rate",
                 "observe_scale",

@@ -143,7 +143,7 @@ class Reference:
 class Kernel:
     """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration; reads,
     rates: families of unknowns and of their derivatives that it reads, curved: row families to which it adds more than
-    constants and constants times unknowns (None: not known).
+    constants and constants times unknowns (None: not known); rows: what a loop adds to, of a kernel without loops none.
     """
 
     loops: tuple[tuple[Index, Index], ...]
@@ -152,6 +152,7 @@ class Kernel:
     reads: frozenset[int] | None = None
     rates: frozenset[int] | None = None
     curved: frozenset[int] | None = None
+    rows: tuple[Reference, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,8 +231,9 @@ def _kernel(value: Mapping[str, Any]) -> Kernel:
     loops = tuple(
         (_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ()))
     )
-    told = (frozenset(value[name]) if name in value else None for name in ("reads", "rates", "curved"))
-    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), *told)
+    reads, rates, curved = (frozenset(value[name]) if name in value else None for name in ("reads", "rates", "curved"))
+    rows = tuple(_reference(row) for row in value.get("rows", ())) if loops else ()
+    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), reads, rates, curved, rows)
 
 
 def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Index, Ints, Kernel, Reference, Shape
+from sysdyn.runtime.model.description import Index, Ints, Kernel, Reference, Shape, count
 from sysdyn.runtime.model.failures import ContractError
 from sysdyn.values import dataclass
 
@@ -149,6 +149,24 @@ def places(
     return Places(
         np.concatenate(all_rows) if all_rows else empty, np.concatenate(all_columns) if all_columns else empty
     )
+
+
+def spared(
+    kernels: Sequence[Kernel], read: NDArray[np.bool_], ix: Ints, shapes: Sequence[Shape], to: Ints
+) -> Ints:
+    """1 for each loop of a block [kernels] that adds to none of the rows that are read [rows].  shapes, to: of row
+    families.
+    """
+    found = np.zeros(len(kernels), dtype=np.int32)
+    for k, kernel in enumerate(kernels):
+        if kernel.rows:
+            sizes = ((row, int(to[row.family]), count(shapes[row.family])) for row in kernel.rows)
+            some = [(row, first) for row, first, size in sizes if read[first : first + size].any()]
+            loops = _iterations(kernel, ix) if some else []
+            number = loops[0].size if loops else 0
+            places = (first + _positions(row, shapes[row.family], loops, number, ix) for row, first in some)
+            found[k] = not any(read[place].any() for place in places)
+    return found
 
 
 def joined(parts: Sequence[Places]) -> Places:

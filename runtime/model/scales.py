@@ -32,7 +32,7 @@ _PARTS = np.array([1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)])
 """Of the span: where rows are asked how far they moved, the first to tell how fast."""
 RUNGS = 1e-3 ** np.arange(4)
 """Of the time scale: steps of implicit Euler that tell how far unknowns get."""
-Far = tuple[Floats, Floats, Floats, Ints | None]
+Far = tuple[Floats, Floats, Floats, int]
 _HOLDS = ("phi", "psi")
 """Beginnings of the names of groups of constraints."""
 _SWEEPS = 8
@@ -200,12 +200,13 @@ def magnitudes(
     """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s].
 
     far: the motion linearised at the start, which says how far each unknown gets (sd_relaxed, start/sizing.h): dF/dy,
-    dF/dyd [entries], rates [unknowns], the order of the columns; None: as its rate says.
+    dF/dyd [entries], rates [unknowns], the address of an order of elimination; None: as its rate
+    says.
     """
     span = max(t_end - t0, 0.0) or 1.0
     a, b = (system._buffer(np.where(np.isfinite(item), item, 0.0)) for item in (y, yd))
     found, tau = np.zeros(system.unknowns), np.zeros(1)
-    motion = map(lib.pointer, (None, None, None, None) if far is None else far)
+    motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
     core = c.byref(sizing(system).core), c.byref(system.core)
     if lib.core.sd_magnitudes(*core, t0, span, lib.pointer(a), lib.pointer(b), *motion, *answers):

@@ -19,7 +19,7 @@ from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, de
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
 from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
-from sysdyn.runtime.model.patterns import Pattern, Places, compress, joined, places, read_only
+from sysdyn.runtime.model.patterns import Pattern, Places, compress, joined, places, read_only, spared
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
@@ -321,7 +321,7 @@ class System:
         tables = Tables(self.description.p, self.description.ix, at, to)
         made = self.carrier.bind(block, tables, Extent(self.form.extended, rows, n_dy, n_dyd), self.failure)
         self._keep.append((tables, made))
-        frame = lib.Frame(*(lib.pointer(item) for item in (tables.p, tables.ix, at, to)))
+        frame = lib.Frame(*(lib.pointer(item) for item in (tables.p, tables.ix, at, to)), None)
         return lib.Call(
             rows=made.rows,
             dy=made.dy,
@@ -364,6 +364,27 @@ class System:
             return None
         table, number = self.observed_rows(block)
         return self.call(block, self.form.at, table, max(number, 1))
+
+    def powers(self) -> lib.Call | None:
+        """The call of audit without loops of energies alone: what is integrated; None where there is no audit."""
+        return self.own("powers", self._powers)
+
+    def _powers(self) -> lib.Call | None:
+        call = self._observer("audit")
+        if call is not None:
+            to, number = self.observed_rows("audit")
+            read = np.ones(number, dtype=bool)
+            read[:2] = read[4::4] = False
+            self.spare_loops(call, "audit", read, to)
+        return call
+
+    def spare_loops(self, call: lib.Call, block: str, read: Mask, to: Ints) -> None:
+        """Tells a call which rows are read [rows]; to: where those of each family begin."""
+        shapes = [row.shape for row in self.description.rows]
+        found = spared(self.description.blocks[block], read, self.description.ix, shapes, to)
+        if found.any():
+            self._keep.append(found)
+            call.frame.spared = lib.pointer(found)
 
     def observed_rows(self, block: str) -> tuple[Ints, int]:
         """First row of each row family of an observing block, and their number."""

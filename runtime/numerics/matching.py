@@ -8,10 +8,14 @@ from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.patterns import Pattern
 
 
-def matched(pattern: Pattern) -> Ints:
-    """The row of each column [unknowns]; -1 where none is left for it, whatever the values."""
-    found, looks = np.zeros(pattern.unknowns, dtype=np.int32), np.zeros(1, dtype=np.int64)
-    places = (lib.pointer(array) for array in (pattern.column, pattern.row, found, looks))
-    if lib.core.sd_match(pattern.rows, pattern.unknowns, *places) < 0:
+def matched(pattern: Pattern, given: Ints | None = None) -> Ints:
+    """The row of each column [unknowns]; -1 where none is left for it, whatever the values.
+
+    given [unknowns]: such rows, which stay but where one has to make room.
+    """
+    found = np.zeros(pattern.unknowns, dtype=np.int32) if given is None else given.astype(np.int32)
+    looks = np.zeros(1, dtype=np.int64)
+    places = lib.pointer(pattern.column), lib.pointer(pattern.row), given is not None
+    if lib.core.sd_match(pattern.rows, pattern.unknowns, *places, lib.pointer(found), lib.pointer(looks)) < 0:
         raise MemoryError
     return found

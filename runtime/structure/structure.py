@@ -19,7 +19,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
-from sysdyn.runtime.numerics.ordering import order_of
+from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, independent, nearby, reactions, vanished
@@ -125,15 +125,12 @@ def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...]
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models)."""
-    pattern, order = system.pattern, order_of(system)
+    pattern, order = system.pattern, net_order_of(system)
     columns = pattern.columns_of()
     row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), (pattern.rows, pattern.unknowns))
     scale = row[pattern.row] * column[columns]
     del columns, row, column
-    places = lib.pointer(pattern.column), lib.pointer(pattern.row), lib.pointer(order)
-    linear = lib.core.sd_linear_new(pattern.unknowns, *places)
-    if not linear:
-        raise MemoryError
+    linear = order.linear(pattern)
     try:
         for rate in RATES:
             index = _growth(linear, lambda cj: (jy + cj * jyd) * scale, rate)

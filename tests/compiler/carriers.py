@@ -14,7 +14,7 @@ _serial = itertools.count()
 
 
 class Frame(ctypes.Structure):
-    _fields_ = [(n, ctypes.c_void_p) for n in ("p", "ix", "at", "to")]
+    _fields_ = [(n, ctypes.c_void_p) for n in ("p", "ix", "at", "to", "spared")]
 
 
 def sizes(patterns, ix):
@@ -58,13 +58,15 @@ class Carrier:
 
 
 class CCarrier(Carrier):
+    spared = None
+
     def __init__(self, program, form, binding):
         super().__init__(program, form, binding)
         self.library = ctypes.CDLL(str(build(emit_c(program, form), ("-O1", *FLAGS))))
 
     def call(self, name, t, y, yd, out):
         b = self.binding
-        frame = Frame(*(a.ctypes.data for a in (b.p, b.ix, self.at, self.to)))
+        frame = Frame(*(a.ctypes.data for a in (b.p, b.ix, self.at, self.to)), self.spared and self.spared.data)
         function = getattr(self.library, f"sd_{name}")
         function.restype = None
         pointers = [ctypes.c_void_p(a.ctypes.data) for a in (y, yd, out)]

@@ -212,3 +212,24 @@ def test_angles_are_turned_once_and_kept_for_each_thread(tmp_path):
 
     with ThreadPoolExecutor(2) as pool:
         assert max(pool.map(worst, (1, 2))) < 1e-13 * max(np.abs(e).max() for e in expected)
+
+
+def test_what_a_spared_loop_adds_is_left_out_and_nothing_else():
+    """Of a chain each block's loops, one spared after the other: what is missing adds up to what all of them add."""
+    with x.fresh():
+        model = compile_network(chain(5))
+        c = CCarrier(model.program, model.form, model.bind())
+    y, yd = np.random.default_rng(0).normal(size=(2, c.at[-1]))
+    for block in model.program.blocks():
+        loops = np.array([bool(pattern.loops) for pattern in c.patterns[block]])
+
+        def rows(spared, block=block):
+            c.spared = np.array(spared, dtype=np.int32).ctypes
+            return c.rows(block, 0.3, y, yd)
+
+        whole, rest = rows(0 * loops), rows(loops)
+        c.spared = None
+        assert c.rows(block, 0.3, y, yd).tobytes() == whole.tobytes()
+        missing = sum(whole - rows(np.arange(loops.size) == k) for k in range(loops.size))
+        np.testing.assert_allclose(rest + missing, whole, atol=1e-12)
+        assert loops.any() == bool(missing.any())

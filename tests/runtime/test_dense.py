@@ -8,6 +8,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.numerics import ordering, rank
+from sysdyn.runtime.numerics.matching import matched
 
 
 def of_rank(random, m, n, k, spread):
@@ -68,7 +69,7 @@ def fill(matrix, order):
 def test_order_is_a_permutation_that_fills_little(kind):
     matrix = grid(20) if kind == "grid" else csc_array(diags_array([1.0] * 3, offsets=[-1, 0, 1], shape=(400, 400)))
     n = matrix.shape[0]
-    order = ordering._large(Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)))
+    order = ordering._large(Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)))[0]
     assert np.array_equal(np.sort(order), np.arange(n))
     found = fill(matrix, order)
     assert found <= (3 * n if kind == "line" else 0.7 * fill(matrix, np.arange(n)))
@@ -80,11 +81,17 @@ def test_matchings_are_as_large_as_can_be():
         m, n = random.integers(1, 25, 2)
         a = csc_array((random.random((m, n)) < random.uniform(0.02, 0.3)).astype(float))
         column, row, found = a.indptr.astype(np.int32), a.indices.astype(np.int32), np.zeros(n, dtype=np.int32)
-        number = lib.core.sd_match(m, n, *map(lib.pointer, (column, row, found, np.zeros(1, dtype=np.int64))))
+        looks = np.zeros(1, dtype=np.int64)
+        places, answers = (lib.pointer(column), lib.pointer(row)), (lib.pointer(found), lib.pointer(looks))
+        number = lib.core.sd_match(m, n, *places, 0, *answers)
         assert number == (maximum_bipartite_matching(a.tocsr(), perm_type="row") >= 0).sum()
         there = np.flatnonzero(found >= 0)
         assert np.unique(found[there]).size == there.size == number
         assert (a.toarray()[found[there], there] != 0.0).all()
+        given = np.where(random.random(n) < 0.5, found, -1)
+        other = matched(Pattern(m, n, column, row), given)
+        assert (other >= 0).sum() == number
+        assert np.isin(found[given >= 0], other).all()  # a row that had a partner has one
 
 
 @pytest.mark.parametrize("kind", ["line", "grid", "backwards", "random"])
@@ -100,8 +107,9 @@ def test_a_matching_looks_at_each_entry_a_few_times(kind):
     a = csc_array(a)
     a.sum_duplicates()
     looks, found = np.zeros(1, dtype=np.int64), np.zeros(n, dtype=np.int32)
-    arrays = a.indptr.astype(np.int32), a.indices.astype(np.int32), found, looks
-    number = lib.core.sd_match(n, n, *map(lib.pointer, arrays))
+    column, row = a.indptr.astype(np.int32), a.indices.astype(np.int32)
+    answers = lib.pointer(found), lib.pointer(looks)
+    number = lib.core.sd_match(n, n, lib.pointer(column), lib.pointer(row), 0, *answers)
     assert number == (maximum_bipartite_matching(a.tocsr(), perm_type="row") >= 0).sum()
     assert looks[0] < 12 * a.nnz
 

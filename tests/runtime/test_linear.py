@@ -2,11 +2,11 @@ import ctypes
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array, random_array
+from scipy.sparse import csc_array, diags_array, eye_array, kron, random_array
 from scipy.sparse.linalg import splu
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.patterns import Pattern
-from sysdyn.runtime.numerics.ordering import DENSE, column_order, least_degree
+from sysdyn.runtime.numerics.ordering import DENSE, Order, any_order, column_order, least_degree, with_pairs
 
 
 class Solver:
@@ -275,3 +275,36 @@ def test_a_run_of_its_own_knows_nothing_of_matrices_before():
     lib.core.sd_linear_pivoted.restype = ctypes.c_void_p
     assert solver.factor(matrix.data) == 0
     assert not solver.linear.contents.replayed
+
+
+@pytest.mark.parametrize("faint", [False, True])
+def test_rows_of_a_net_that_pivot_in_columns_of_their_own(faint):
+    """A grid whose rows are shuffled: pairs are found and fill a third; where they are faint, any row pivots."""
+    m, rng = 60, np.random.default_rng(5)
+    line = diags_array([-1.0, 2.1, -1.0], offsets=[-1, 0, 1], shape=(m, m))
+    grid = csc_array(kron(eye_array(m), line) + kron(line, eye_array(m)))
+    rows = rng.permutation(m * m)
+    matrix = csc_array(grid[rows])
+    matrix.sort_indices()
+    pattern = Pattern(m * m, m * m, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
+    own = np.argsort(rows).astype(np.int32)
+    given = np.where(rng.random(m * m) < 0.9, own, -1)
+    order = with_pairs(pattern, any_order(pattern), given)
+    assert order.paired
+    assert order.filled < 0.4 * order.most
+    values = matrix.data.copy()
+    if faint:  # pairs would fill all the same
+        values[matrix.indices == np.repeat(order.own, np.diff(matrix.indptr))] *= 1e-9
+        order = Order(order.columns, order.filled, True, order.own, order.otherwise, 2 * order.filled)
+    linear = order.linear(pattern)
+    try:
+        for _ in range(2):
+            assert lib.core.sd_linear_factor(linear, lib.pointer(values), None) == 0
+            side = rng.normal(size=m * m)
+            found = side.copy()
+            lib.core.sd_linear_solve(linear, lib.pointer(found))
+            there = csc_array((values, matrix.indices, matrix.indptr), shape=matrix.shape) @ found
+            assert np.abs(there - side).max() < 1e-12 * np.abs(found).max()
+        assert bool(linear.contents.otherwise) != faint
+    finally:
+        lib.core.sd_linear_free(linear)

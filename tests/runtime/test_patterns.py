@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.model.description import _kernel
 from sysdyn.runtime.model.failures import ContractError
-from sysdyn.runtime.model.patterns import numbered, places
+from sysdyn.runtime.model.patterns import numbered, places, spared
 
 # x[i] in rows i, columns j; loops i = 1..n, j = 1..i (ix = 1, n)
 LOOPS = [[0, 1], [0, [0, -1, 0]]]
@@ -29,6 +29,15 @@ def test_an_empty_inner_loop_and_an_offset_bound():
     tables = np.zeros(1, dtype=np.int32), np.zeros(1, dtype=np.int32)
     found = places([kernel(loops)], "dy", ix, (shapes, shapes), tables)
     assert list(zip(found.row.tolist(), found.column.tolist(), strict=True)) == [(0, 1), (0, 2), (1, 2)]
+
+
+def test_a_loop_is_spared_where_nobody_reads_a_row_of_it():
+    """Of loops over rows 0..2, over 2..4 of the same family, and what no loop goes round."""
+    ix, shapes, to = np.array([1, 3, 5], dtype=np.int32), [((1, 5),)], np.zeros(1, dtype=np.int32)
+    kernels = [kernel([[0, 1]], inner=0), kernel([[1, 2]], inner=0), _kernel({"rows": [[0, [[-1, 0, 0]]]]})]
+    for read, expected in (([0], [0, 1, 0]), ([2], [0, 0, 0]), ([4], [1, 0, 0]), ([], [1, 1, 0])):
+        rows = np.isin(np.arange(5), read)
+        assert spared(kernels, rows, ix, shapes, to).tolist() == expected
 
 
 def test_a_bound_follows_outer_loops_only():

@@ -21,7 +21,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("RunSamples", "sd_samples"), ("Modes", "sd_modes"), ("Mode", "sd_mode"), ("Held", "sd_held")]
     pairs += [("Transition", "sd_transition"), ("Contact", "sd_contact"), ("Kink", "sd_kink")]
     pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
-    pairs += [("Balance", "sd_balance"), ("Sizing", "sd_sizing")]
+    pairs += [("Balance", "sd_balance"), ("Sizing", "sd_sizing"), ("Order", "sd_order")]
     pairs += [("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
     pairs += [("Condensed", "sd_condensed"), ("Expanded", "sd_expanded"), ("Span", "sd_span")]
     pairs += [("Straight", "sd_straight"), ("Left", "sd_left")]
@@ -51,7 +51,10 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     assert [int(item) for item in found] == expected
 
 
-CONTRACTS = {1: "da7d7f02b741f1788e20489ec42b69c77a427b0fdf7e9d642f416b45c0d25392"}
+CONTRACTS = {
+    1: "da7d7f02b741f1788e20489ec42b69c77a427b0fdf7e9d642f416b45c0d25392",
+    2: "36e6b82ac6ac33ecefe0dec8ff11dfddbedf80af805d01604ce418aa781080a6",
+}
 """SHA-256 of model.h without white space, by SD_CONTRACT."""
 
 

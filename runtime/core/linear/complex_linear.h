@@ -2,17 +2,19 @@
 #ifndef SYSDYN_COMPLEX_LINEAR_H
 #define SYSDYN_COMPLEX_LINEAR_H
 
+#include "linear/linear.h"
+
 #include <complex.h>
 #include <stdint.h>
 
 typedef struct sd_linear_z sd_linear_z;
 
 sd_linear_z *sd_linear_z_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order);
+/* as sd_linear_ordered */
+sd_linear_z *sd_linear_z_ordered(int32_t n, const int32_t *column, const int32_t *row, const sd_order *order);
 void sd_linear_z_free(sd_linear_z *linear);
 /* as sd_linear_pivoted */
 int32_t *sd_linear_z_pivoted(sd_linear_z *linear);
-/* as sd_linear_paired */
-void sd_linear_z_paired(sd_linear_z *linear);
 /* as sd_linear_replayed */
 void sd_linear_z_replayed(sd_linear_z *linear);
 /* as sd_linear_factor; values may stand in sd_linear_z_values [entries], where they are scaled in place */

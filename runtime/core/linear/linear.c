@@ -50,6 +50,18 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
     return linear;
 }
 
+sd_linear *sd_linear_ordered(int32_t n, const int32_t *column, const int32_t *row, const sd_order *order)
+{
+    sd_linear *linear = sd_linear_new(n, column, row, order ? order->columns : NULL);
+    if (linear && linear->sparse && order->paired) {
+        linear->sparse->paired = 1;
+        linear->sparse->own = order->own;
+        linear->sparse->most = order->most;
+        linear->otherwise = order->otherwise;
+    }
+    return linear;
+}
+
 /* scaled := R values C with rows of largest entry 1 */
 static void equilibrate(sd_linear *linear, const sd_number *values, const double *scale)
 {
@@ -171,16 +183,30 @@ static int replay(sd_linear *linear, const sd_number *values, const double *scal
     return 1;
 }
 
+/* rows that would not pivot where they belong have filled too much: any row may from now on */
+static int without_pairs(sd_linear *linear)
+{
+    sd_sparse *lu = sd_sparse_new(linear->n, linear->n, linear->otherwise);
+    if (!lu)
+        return 2;
+    sd_sparse_free(linear->sparse);
+    linear->sparse = lu;
+    linear->otherwise = NULL;
+    return sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
+}
+
 static int sparse_factor(sd_linear *linear)
 {
-    sd_sparse *lu = linear->sparse;
     int failed = 1;
-    if (lu->pivoted)
-        failed = sd_sparse_refactor(lu, linear->column, linear->row, linear->scaled);
+    if (linear->sparse->pivoted)
+        failed = sd_sparse_refactor(linear->sparse, linear->column, linear->row, linear->scaled);
     if (failed) {
-        failed = sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
+        failed = sd_sparse_pivot(linear->sparse, linear->column, linear->row, linear->scaled);
+        if (failed == 3)
+            failed = without_pairs(linear);
         linear->pivotings++;
     }
+    const sd_sparse *lu = linear->sparse;
     linear->smallest = lu->smallest;
     linear->bad_row = lu->bad_row;
     linear->bad_column = lu->bad_column;
@@ -221,12 +247,6 @@ void sd_linear_replayed(sd_linear *linear)
 {
     if (linear->n <= SD_REPLAYED && !linear->elimination)
         linear->elimination = sd_elimination_new(linear->n, linear->column, linear->row);
-}
-
-void sd_linear_paired(sd_linear *linear)
-{
-    if (linear->sparse)
-        linear->sparse->diagonal = 1;
 }
 
 static void scaled_solve(sd_linear *linear, sd_number *x)

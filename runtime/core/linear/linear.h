@@ -17,6 +17,15 @@
 
 typedef struct sd_sparse sd_sparse;
 
+/* An order of elimination: columns [n], NULL: dense; paired: row own[c] (NULL: c) pivots in column c wherever its entry will do,
+ * and where such factors get longer than `most` entries (0: however long) the columns are taken as in `otherwise` [n], for any
+ * pivots.  Arrays of the caller. */
+typedef struct sd_order {
+    const int32_t *columns, *own, *otherwise;
+    int64_t most;
+    int32_t paired;
+} sd_order;
+
 typedef struct sd_linear {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
@@ -38,17 +47,18 @@ typedef struct sd_linear {
     int32_t pivoted;             /* 0: pivots are chosen anew */
     int32_t replayed;            /* the last factors are those of `elimination` */
     sd_elimination *elimination; /* NULL: every matrix is pivoted */
+    const int32_t *otherwise;    /* of sd_order; NULL: the order stays */
 } sd_linear;
 
 /* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */
 sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, const int32_t *order);
+/* the same by an order; NULL: dense */
+sd_linear *sd_linear_ordered(int32_t n, const int32_t *column, const int32_t *row, const sd_order *order);
 void sd_linear_free(sd_linear *linear);
 /* values [entries], scale [n] magnitudes of the unknowns or NULL.  0 done, 1 singular (bad_row, bad_column), 2 memory. */
 int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_linear_solve(sd_linear *linear, sd_number *x);
-/* row k belongs to unknown k, and pivots there where it can; of sparse ones */
-void sd_linear_paired(sd_linear *linear);
 /* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
 int32_t *sd_linear_pivoted(sd_linear *linear);
 /* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the

@@ -13,7 +13,7 @@ typedef struct {
     int64_t *start;                     /* [rows + 1] of each row in `member` */
     int32_t *length;                    /* [rows]; 0: it is gone */
     int32_t *member;                    /* [room] columns of the rows, one row behind the other */
-    int64_t used, room;
+    int64_t used, room, filled;         /* filled: lengths of the merged rows */
     int32_t *of, *own, *count;          /* rows of each column: of[own[c] .. own[c] + count[c]] */
     int32_t *score, *next, *before, *first; /* [columns]; first [columns + 1] */
     int32_t *mark, *rest;               /* [columns]; [rows] members of a row outside the pivot's */
@@ -95,6 +95,7 @@ static int merge(graph *g, int32_t c, int32_t pivot)
     }
     g->start[new] = begin;
     g->length[new] = (int32_t)(end - begin);
+    g->filled += end - begin;
     g->used = end;
     return 1;
 }
@@ -166,7 +167,8 @@ static int eliminate(graph *g, int32_t *order, int32_t place)
     }
 }
 
-int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *order)
+int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *order,
+                    int64_t *filled)
 {
     size_t n = (size_t)columns, entries = (size_t)column[columns], m = (size_t)rows + n;
     graph g = {.columns = columns, .rows = rows + columns, .made = rows, .room = (int64_t)(entries + entries / 2 + 64)};
@@ -229,6 +231,7 @@ int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const 
             enlist(&g, c, (int32_t)(score < columns ? score : columns));
         }
         failed = eliminate(&g, order, place);
+        *filled = g.filled;
     }
     free(g.start);
     free(g.length);
@@ -392,7 +395,8 @@ static int augment(Matching *g, int32_t root, int32_t pass, int32_t *const room[
     return depth >= 0;
 }
 
-int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *matched, int64_t *looks)
+int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t given, int32_t *matched,
+                 int64_t *looks)
 {
     size_t n = (size_t)columns, m = (size_t)rows, e = (size_t)column[columns];
     int32_t *room = calloc(4 * n + 4 * m + e + 3, sizeof *room);
@@ -413,12 +417,15 @@ int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int
         g.across[r + 2] = g.across[r + 1] + g.free_columns[r];
     }
     for (int32_t c = 0; c < columns; c++) {
-        matched[c] = NONE;
+        matched[c] = given ? matched[c] : NONE;
+        if (matched[c] != NONE)
+            g.of[matched[c]] = c;
         g.free_rows[c] = column[c + 1] - column[c];
         for (int32_t k = column[c]; k < column[c + 1]; k++)
             g.of_row[g.across[row[k] + 1]++] = c;
     }
-    match_what_must(&g);
+    if (!given)
+        match_what_must(&g);
     /* what a choice has left over: passes of disjoint searches, the last of which finds nothing (Pothen & Fan 1990) */
     memcpy(search[0], column, n * sizeof *column);
     for (int32_t r = 0; r < rows; r++)

@@ -9,8 +9,10 @@
 
 #include <stdint.h>
 
-/* order [columns]: the columns in the order of elimination; column [columns + 1], row: the pattern.  0; -1: no memory */
-int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *order);
+/* order [columns]: the columns in the order of elimination; column [columns + 1], row: the pattern; filled: entries of U at
+ * most, whatever the pivots (of two rows for each pair of neighbours: those of a symmetric factor).  0; -1: no memory */
+int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *order,
+                    int64_t *filled);
 
 /* peeled [rows]: 1 where a row of a matrix [rows, columns] can be taken away because it alone of those left stands in some
  * column, with an entry of `least` or more: such rows are independent of all others.  row, column, value [entries].
@@ -19,7 +21,9 @@ int32_t sd_peel(int32_t rows, int32_t columns, int32_t entries, const int32_t *r
                 const double *value, double least, int32_t *peeled);
 
 /* A maximum matching of rows and columns: matched [columns] := row of each column, -1 where none is left for it; looks: entries
- * looked at, of the order of those of the pattern for lines and nets.  Returns how many are matched; -1: no memory */
-int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *matched, int64_t *looks);
+ * looked at, of the order of those of the pattern for lines and nets; given: from the partners that stand in matched, which stay
+ * but where one has to make room.  Returns how many are matched; -1: no memory */
+int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t given, int32_t *matched,
+                 int64_t *looks);
 
 #endif

@@ -109,8 +109,9 @@ static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *large
     for (int32_t i = top; i < lu->rows; i++)
         if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
             *largest = sd_size(lu->x[lu->stack[i]]);
-    if (lu->diagonal && lu->place[c] < 0 && *largest > 0.0 && sd_size(lu->x[c]) >= THRESHOLD * *largest)
-        return c;
+    int32_t own = lu->own ? lu->own[c] : c;
+    if (lu->paired && lu->place[own] < 0 && *largest > 0.0 && sd_size(lu->x[own]) >= THRESHOLD * *largest)
+        return own;
     for (int32_t i = top; i < lu->rows && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
         if (lu->place[r] >= 0 || sd_size(lu->x[r]) < THRESHOLD * *largest)

@@ -21,7 +21,8 @@ typedef struct sd_sparse {
     int32_t *stack, *head, *mark, *count; /* [rows] search, while pivots are chosen */
     sd_number *x;                /* [the larger of n and rows, + 1] */
     int pivoted;                 /* a valid pattern exists */
-    int diagonal;                /* row c pivots in column c wherever its entry will do: the order is one of A + A^T */
+    int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T */
+    const int32_t *own;          /* [n] of the caller; NULL: row c */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
     double dropped;              /* entries of L up to this size are left out, rows in excess that agree with it; 0: none.
                                     The factors serve once: no refactorising on such a pattern */

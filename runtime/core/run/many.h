@@ -88,7 +88,7 @@ typedef struct sd_many {
     /* magnitudes */
     sd_system *system;           /* of the passes */
     const sd_sizing *sizing;
-    const int32_t *order;        /* of its columns; NULL: dense */
+    const sd_order *order;        /* of its columns; NULL: dense */
     double *form_jy, *form_jyd;  /* [entries] at the start */
     double *found;               /* [n] magnitudes of this run */
     double tau;                  /* time scale of its start [s] */

@@ -56,6 +56,13 @@ static void audit(const sd_run *run, double t, const double *y, const double *yd
         run->audit->rows(&run->audit->frame, t, y, yd, out);
 }
 
+/* run->sample [audited]: the same, energies but for those that come with powers */
+static void powers(sd_run *run, double t, const double *y, const double *yd)
+{
+    memset(run->sample, 0, (size_t)run->audited * sizeof(double));
+    run->powers->rows(&run->powers->frame, t, y, yd, run->sample);
+}
+
 /* run->integral += weight * run->sample */
 static void weigh(sd_run *run, double weight)
 {
@@ -63,10 +70,14 @@ static void weigh(sd_run *run, double weight)
         run->integral[k] += weight * run->sample[k];
 }
 
-static void sample(sd_run *run, double t)
+/* point at t within the last step, and point_d where what is audited reads it */
+static void look(sd_run *run, double t)
 {
-    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    audit(run, t, run->point, run->point_d, run->sample);
+    const sd_stepper *stepper = run->stepper;
+    if (stepper->values && !run->rated)
+        stepper->values(stepper->self, t, run->point);
+    else
+        stepper->dense(stepper->self, t, run->point, run->point_d);
 }
 
 /* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node, and 0 at
@@ -119,7 +130,7 @@ static void integrate_nodes(sd_run *run, double part)
         if (stepper->show)
             stepper->show(stepper->self, k, run->point, run->point_d);
         const double *y = stepper->show ? run->point : stepper->node_y[k];
-        audit(run, from + stepper->node[k] * h, y, stepper->show ? run->point_d : stepper->node_yd[k], run->sample);
+        powers(run, from + stepper->node[k] * h, y, stepper->show ? run->point_d : stepper->node_yd[k]);
         weigh(run, h * weight);
     }
     for (int32_t k = 2; stepper->moves && k < run->audited; k++)
@@ -127,7 +138,7 @@ static void integrate_nodes(sd_run *run, double part)
 }
 
 /* run->integral [audited]: of the powers from the start of the last step to `to`, within that step; 1: point, point_d hold
- * the point there */
+ * the point there; sampled: sample and point do, which is the end of the step */
 static int integrate(sd_run *run, double to)
 {
     static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
@@ -142,9 +153,9 @@ static int integrate(sd_run *run, double to)
         return 0;
     }
     if (stepper->part_y) {
-        sample(run, to);
+        stepper->dense(stepper->self, to, run->point, run->point_d);
         for (int32_t k = 0; k < stepper->nodes; k++) {
-            audit(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k], run->sample);
+            powers(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k]);
             weigh(run, (to - from) * stepper->node_weight[k]);
         }
         for (int32_t k = 2; stepper->part_moves && k < run->audited; k++)
@@ -154,13 +165,19 @@ static int integrate(sd_run *run, double to)
     memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
     weigh(run, half / 6.0);
     for (int k = -1; k <= 1; k += 2) {
-        sample(run, middle + k * inner * half);
+        double t = middle + k * inner * half;
+        look(run, t);
+        powers(run, t, run->point, run->point_d);
         weigh(run, 5.0 * half / 6.0);
     }
-    sample(run, to);
-    weigh(run, half / 6.0);
     run->sampled = to == *stepper->t;
-    return 1;
+    if (run->sampled)
+        look(run, to);
+    else
+        stepper->dense(stepper->self, to, run->point, run->point_d);
+    audit(run, to, run->point, run->point_d, run->sample);
+    weigh(run, half / 6.0);
+    return !run->sampled;
 }
 
 /* The same where an event ends the step at `to`: Gauss's rule of degree 5, after many nodes 9, on settled points.  Within
@@ -181,7 +198,7 @@ static void integrate_cut(sd_run *run, double to)
         double t = middle + node[high][k] * half;
         run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
         sd_settle_point(run->settle, t, run->point, run->point_d);
-        audit(run, t, run->point, run->point_d, run->sample);
+        powers(run, t, run->point, run->point_d);
         weigh(run, half * weight[high][k]);
     }
 }

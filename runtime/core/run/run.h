@@ -34,6 +34,8 @@ typedef struct sd_run {
     int32_t observed;
     int32_t audited;                  /* rows of block audit */
     const sd_call *audit;             /* NULL: no audit block */
+    const sd_call *powers;            /* the same without loops of energies alone, which no integral takes */
+    int32_t rated;                    /* blocks audit, ledger read rates */
     const sd_call *observe, *observe_rate, *observe_scale;   /* NULL where missing */
     const int32_t *audit_at;          /* [7] places of energy, kinetic, potential, dissipated, supplied, constraints,
                                          * drift */

@@ -25,7 +25,7 @@ static void group_largest(const sd_balance *b, const double *x, double *most)
         most[b->kind[k]] = sd_larger(most[b->kind[k]], x[k]);
 }
 
-int sd_relaxed(const sd_system *system, const int32_t *order, int32_t rungs, const double *rung, const double *jy,
+int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, const double *rung, const double *jy,
                const double *jyd, const double *yd, double tau, double *far)
 {
     int32_t n = system->unknowns, rows = system->rows, entries = system->entries, still = 1;
@@ -36,7 +36,7 @@ int sd_relaxed(const sd_system *system, const int32_t *order, int32_t rungs, con
     if (still || sd_first_bad(entries, jy) >= 0 || sd_first_bad(entries, jyd) >= 0)
         return 0;
     double *memory = calloc(2 * (size_t)rows + (size_t)n + (size_t)entries + 1, sizeof(double));
-    sd_linear *linear = sd_linear_new(n, system->column, system->row, order);
+    sd_linear *linear = sd_linear_ordered(n, system->column, system->row, order);
     if (!memory || !linear) {
         free(memory);
         sd_linear_free(linear);
@@ -235,7 +235,7 @@ static void carriers(const sd_sizing *s, const double *jyd, int32_t *carries)
 }
 
 int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span, const double *y, const double *yd,
-                  const double *jy, const double *jyd, const double *rate, const int32_t *order, double *found,
+                  const double *jy, const double *jyd, const double *rate, const sd_order *order, double *found,
                   double *tau)
 {
     const sd_balance *b = s->balance;

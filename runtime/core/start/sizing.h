@@ -6,6 +6,7 @@
 #define SYSDYN_SIZING_H
 
 #include "system/assembly.h"
+#include "linear/linear.h"
 #include "start/magnitudes.h"
 
 #include <stdint.h>
@@ -33,14 +34,14 @@ typedef struct sd_sizing {
  * sd_linear_new takes it; rung [rungs]: parts of tau that are tried.  0; -1: no memory.
  * A rate says little of a quantity that relaxes at once: 1 V on 1 uH behind 1 ohm makes 0.5 uWb, not 1 V times the time
  * scale of the rest.  Magnitudes taken from rates alone would hide such a transient from the error test. */
-int sd_relaxed(const sd_system *system, const int32_t *order, int32_t rungs, const double *rung, const double *jy,
+int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, const double *rung, const double *jy,
                const double *jyd, const double *yd, double tau, double *far);
 
 /* found [n]: magnitudes at (t0, y, yd) of a run over the span, *tau: the time scale of the start; y, yd with room for the
  * audit, finite.  jy, jyd [entries], rate [n], order: of sd_relaxed, what says how far unknowns get (NULL: their rates
  * alone do).  0; -1: no memory. */
 int sd_magnitudes(const sd_sizing *sizing, sd_system *system, double t0, double span, const double *y, const double *yd,
-                  const double *jy, const double *jyd, const double *rate, const int32_t *order, double *found,
+                  const double *jy, const double *jyd, const double *rate, const sd_order *order, double *found,
                   double *tau);
 
 /* divisor [n]: what each unknown is divided by to compare it with its like, by the entries jy, jyd at a point.

@@ -28,6 +28,11 @@ static void dense(const void *bdf, double t, double *y, double *yd)
     sd_bdf_dense(bdf, t, y, yd);
 }
 
+static void values(const void *bdf, double t, double *y)
+{
+    sd_bdf_dense(bdf, t, y, NULL);
+}
+
 static void start(void *bdf, double t, const double *y, const double *yd, double h)
 {
     sd_bdf_start(bdf, t, y, yd, h);
@@ -63,6 +68,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     bdf->max_order = SD_MAX_ORDER;
     bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->phi[0], bdf->yd, &bdf->taken,
                                 step, dense, NULL, start};
+    bdf->stepper.values = values;
     return bdf;
 }
 
@@ -375,6 +381,6 @@ void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
         gamma = (delta + bdf->psi[j - 1]) / bdf->psi[j];
     }
     sd_bdf_interpolate(bdf, k, value, rate, y, yd);
-    if (bdf->taken == 0)
+    if (bdf->taken == 0 && yd)
         memcpy(yd, bdf->yd, (size_t)bdf->n * sizeof *yd);
 }

@@ -55,7 +55,7 @@ sd_stepper *sd_bdf_stepper(sd_bdf *bdf);
 void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h);
 /* one accepted step, or the cause of failure */
 int sd_bdf_step(sd_bdf *bdf);
-/* y, yd [n] at any t within the last step */
+/* y, yd [n] at any t within the last step; yd NULL: y alone */
 void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd);
 
 /* coefficients.c */

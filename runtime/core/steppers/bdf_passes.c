@@ -71,7 +71,13 @@ static inline __attribute__((always_inline)) void interpolate(const sd_bdf *bdf,
         a[k] = value[k];
         b[k] = rate[k];
     }
-    for (int32_t i = 0; i < bdf->n; i++) {
+    for (int32_t i = 0; !yd && i < bdf->n; i++) {
+        double x = phi[0][i];
+        for (int32_t k = 1; k <= order; k++)
+            x += a[k] * phi[k][i];
+        y[i] = x;
+    }
+    for (int32_t i = 0; yd && i < bdf->n; i++) {
         double x = phi[0][i], slope = 0.0;
         for (int32_t k = 1; k <= order; k++) {
             x += a[k] * phi[k][i];
@@ -82,7 +88,8 @@ static inline __attribute__((always_inline)) void interpolate(const sd_bdf *bdf,
     }
 }
 
-/* y, yd [n] := sums of the differences up to an order, times value and times rate [order + 1]; the first one counts once */
+/* y, yd [n] := sums of the differences up to an order, times value and times rate [order + 1]; the first one counts once;
+ * yd NULL: not asked for */
 SD_WIDE void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, const double *rate, double *y,
                                 double *yd)
 {

@@ -49,6 +49,15 @@ static void dense(const void *self, double t, double *y, double *yd)
     sd_condensed_show(expanded->condensed, expanded->z, expanded->zd, y, yd);
 }
 
+static void values(const void *self, double t, double *y)
+{
+    const sd_expanded *expanded = self;
+    const sd_stepper *inner = expanded->inner;
+    if (t != *inner->t)
+        inner->values(inner->self, t, expanded->z);
+    sd_condensed_expand(expanded->condensed, t != *inner->t ? expanded->z : inner->y, y, 0);
+}
+
 static void refine(void *self, sd_settle *settle)
 {
     sd_expanded *expanded = self;
@@ -102,6 +111,7 @@ sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, i
     expanded->face.refine = inner->refine ? refine : NULL;
     expanded->face.start = start;
     expanded->face.show = inner->show ? show : NULL;
+    expanded->face.values = inner->values ? values : NULL;
     return expanded;
 }
 

@@ -52,6 +52,8 @@ typedef struct sd_stepper {
     int32_t collocated;        /* 1: at most SD_NODES nodes; a polynomial through them and the start serves within the step */
     /* y, yd [n] := those at node k, where they do not stand in node_y, node_yd (NULL: they do) */
     void (*show)(const void *self, int32_t k, double *y, double *yd);
+    /* y alone [n] at any t within the last step; NULL: dense gives it */
+    void (*values)(const void *self, double t, double *y);
 } sd_stepper;
 
 #define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the magnitudes of unknowns */

@@ -20,6 +20,11 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
         return;
     }
     memset(r, 0, (size_t)system->rows * sizeof *r);
+    sd_add_rows(system, t, y, yd, r);
+}
+
+void sd_add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
+{
     const int32_t *const row = system->k_row, *const q = system->k_q, *const f = system->k_f, kinematics = system->kinematics;
     const double *const scale = system->k_scale;
 #pragma GCC unroll 4

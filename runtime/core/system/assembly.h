@@ -61,6 +61,8 @@ struct sd_system {
 
 /* r := F(t, y, yd) */
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r);
+/* the same added to r, rows q' - f and held ones put there, of a system that is not condensed */
+void sd_add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r);
 /* jy := dF/dy, jyd := dF/dyd */
 void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd);
 /* one of them, of a system that is not condensed; rate: dF/dyd */

@@ -18,6 +18,24 @@ static inline void evaluate_one(const sd_straight *straight, double *x, int rate
     x[straight->place] = sum;
 }
 
+/* the same of one factor a term, up to two terms: along a line of like sections the factors would be most of what is read */
+static inline __attribute__((always_inline)) void evaluate_alike(const sd_straight *straight, double *x, int rate)
+{
+    const int32_t n = straight->number;
+    double *restrict out = x + straight->place;
+    const double *restrict c = rate ? NULL : straight->constant, *restrict a = x + straight->source[0];
+    const double *restrict b = straight->terms > 1 ? x + straight->source[1] : NULL;
+    const double fa = straight->factor[0], fb = b ? straight->factor[n] : 0.0;
+    if (b)
+        for (int32_t i = 0; i < n; i++)
+            out[i] = fa * a[i] + fb * b[i];
+    else
+        for (int32_t i = 0; i < n; i++)
+            out[i] = fa * a[i];
+    for (int32_t i = 0; c && i < n; i++)
+        out[i] += c[i];
+}
+
 /* x := factors * sources + constant, up to three terms in one pass over memory */
 static inline __attribute__((always_inline)) void evaluate(const sd_straight *straight, double *x, int rate)
 {
@@ -50,10 +68,13 @@ static inline __attribute__((always_inline)) void evaluate(const sd_straight *st
 SD_WIDE void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
 {
     for (int32_t s = 0; s < condensed->straights; s++) {
-        if (condensed->straight[s].number == 1)
-            evaluate_one(&condensed->straight[s], x, rate);
+        const sd_straight *straight = &condensed->straight[s];
+        if (straight->number == 1)
+            evaluate_one(straight, x, rate);
+        else if (straight->alike)
+            evaluate_alike(straight, x, rate);
         else
-            evaluate(&condensed->straight[s], x, rate);
+            evaluate(straight, x, rate);
     }
 }
 
@@ -110,7 +131,9 @@ static void residual(const sd_left *left, double t, const double *z, const doubl
 {
     const sd_condensed *condensed = (const sd_condensed *)left;
     place(condensed, z, zd);
-    sd_residual(condensed->full, t, condensed->y, condensed->yd, condensed->r);
+    for (int32_t s = 0; s < condensed->row_spans; s++) /* others are nobody's */
+        memset(condensed->r + condensed->row[s].full, 0, (size_t)condensed->row[s].number * sizeof *r);
+    sd_add_rows(condensed->full, t, condensed->y, condensed->yd, condensed->r);
     gather(condensed->row_spans, condensed->row, condensed->r, r);
 }
 

@@ -21,9 +21,10 @@ typedef struct sd_span {
     int32_t full, kept, number;
 } sd_span;
 
-/* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i] */
+/* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i]; alike: of factor[k * number], for
+ * the others of its term are the same */
 typedef struct sd_straight {
-    int32_t place, number, terms;
+    int32_t place, number, terms, alike;
     const int32_t *source;  /* [terms] */
     const double *factor;   /* [terms][number] */
     const double *constant; /* [number], NULL: zeros */

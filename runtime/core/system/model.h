@@ -1,4 +1,4 @@
-/* The contract between a compiled model and the runtime, version 1.
+/* The contract between a compiled model and the runtime, version 2.
  *
  * A compiled model (C library or Python module) is a set of BLOCKS.  A block is a group of rows of the
  * descriptor form; the runtime chooses which blocks stand where and so assembles every index form from
@@ -41,22 +41,24 @@
 
 #include <stdint.h>
 
-#define SD_CONTRACT 1
+#define SD_CONTRACT 2
 
 typedef struct sd_frame {
     const double *p;
     const int32_t *ix;
     const int32_t *at;
     const int32_t *to;
+    const int32_t *spared; /* [kernels of the block] 1: nobody reads the rows of this kernel, which may leave them out where
+                            * loops go round (never entries); NULL: all are read */
 } sd_frame;
 
 /* rows: r += block(t, y, yd);  entries: v = d block/dy or d block/dyd in the order of the pattern */
 typedef void sd_rows(const sd_frame *frame, double t, const double *y, const double *yd, double *r);
 typedef void sd_entries(const sd_frame *frame, double t, const double *y, const double *yd, double *v);
 
-/* A C library exports `const int sd_contract = 1` and, for each block B of its manifest, functions
+/* A C library exports `const int sd_contract = 2` and, for each block B of its manifest, functions
  *   sd_B_rows, sd_B_dy, sd_B_dyd
- * (dy, dyd only where the manifest lists entries for them).  A Python module defines CONTRACT = 1 and
+ * (dy, dyd only where the manifest lists entries for them).  A Python module defines CONTRACT = 2 and
  *   B_rows(p, ix, at, to, t, y, yd, r), B_dy(p, ix, at, to, t, y, yd, v), B_dyd(...)   on NumPy arrays.
  *
  * The manifest's "structure":
