@@ -188,7 +188,7 @@ def _whole(tables: Tables) -> Iterable[str]:
     yield ints("following_ix", tables.following_ix)
     yield ints("structural", tables.structural)
     start = tables.start
-    if start is not None or tables.state is not None:
+    if tables.state is not None:
         yield doubles("full_y", tables.full_y)
         yield doubles("full_yd", tables.full_yd)
     constants = {
@@ -276,6 +276,7 @@ def _start(start: Start) -> Iterable[str]:
     yield ints("start_initial", start.initial)
     yield ints("start_k_q", start.k_q)
     yield ints("start_k_f", start.k_f)
+    yield doubles("start_known", start.known)
     yield doubles("start_scale", start.scale)
     yield doubles("start_weight", start.weight)
     stages = []
@@ -290,6 +291,7 @@ def _start(start: Start) -> Iterable[str]:
     yield "static const sd_stage start_stage[] = {\n" + "\n".join(stages) + "\n};"
     constants = {
         "X": max(size, 1),
+        "UNKNOWNS": start.written,
         "FULL": max(system.unknowns, 1),
         "CALLS": max(len(system.calls), 1),
         "SCRATCH": _scratch(system),

@@ -199,7 +199,7 @@ def state_jacobian(tables_: Tables, system: System, t: float, y: Floats, yd: Flo
 def _scale(written: System, state: ConsistentState) -> Floats:
     """Magnitudes of the unknowns as written at the start."""
     starter = Starter(written)
-    return starter.scale(state.t, starter.unknowns(state.t, state.y, state.yd))[: starter.n]
+    return starter.scale(state.t, starter.unknowns(state.t, state.y, state.yd))[: written.form.written]
 
 
 def _observer(system: System, block: str) -> tuple[Call | None, int]:

@@ -148,7 +148,7 @@ def sd_follow(p: Any) -> _Floats:
     """The parameters p with what follows from others (param b = 2*a) and constants of integrated rows written anew."""
     m = _model()
     p = np.array(m.parameters(p))
-    y = np.zeros(m.tables["written"] + 1)
+    y = np.zeros(m.tables["system"]["extended"] + 1)
     for kind in ("parameter", "initial", "constant"):
         _groups(m, kind, p, y)
     return m.parameters(p)
@@ -285,7 +285,7 @@ def sd_start(p: Any = None) -> tuple[_Floats, _Floats]:
         return m.y0.copy(), m.yd0.copy()
     if m.tables["start"] is None:
         raise StartError("the model is too large to be started anew here: compile it with these parameters")
-    y, yd = _Seeking(m, np.array(p)).found()
+    y, yd = (item[: m.tables["written"]] for item in _Seeking(m, np.array(p)).found())
     if m.state is not None:
         y, yd = _slopes(m, m.said["t0"], y[m.state["places"]], p)
         return y[m.state["places"]], yd[m.state["places"]]
@@ -306,7 +306,7 @@ class _Seeking:
         given = np.zeros(self.n)
         _groups(m, "initial", p, given)
         self.guess = np.concatenate([given, np.zeros(len(self.rates) + len(self.missed))])
-        self.x = np.concatenate([m.full_y[: self.n], m.full_yd[self.rates], np.zeros(len(self.missed))])
+        self.x = np.array(self.tables["known"], dtype=float)
         initial = self.tables["initial"]
         self.x[initial] = given[initial]
         self.x[self.first :] = self.rows(self.x)[self.missed]

@@ -23,8 +23,7 @@ def start_tables(system: System, state: ConsistentState) -> Start | None:
     if starter.summed or max(starter.first + starter.missed.size, starter.settled.rows) > LARGEST:
         return None
     x = starter.unknowns(state.t, state.y, state.yd)
-    free = np.append(~starter.given.fixed, np.ones(x.size - starter.n, dtype=bool))
-    problem = problem_of(starter, state.t, x, x, rows=starter.every, free=free)
+    problem = problem_of(starter, state.t, x, x, rows=starter.every, free=starter.free)
     return Start(
         assembled(starter.settled),
         starter.n,
@@ -33,9 +32,10 @@ def start_tables(system: System, state: ConsistentState) -> Start | None:
         np.flatnonzero(starter.given.written).astype(np.int32),
         starter.system.form.k_q,
         starter.system.form.k_f,
+        x,
         problem.scale,
         problem.weight,
-        tuple(_stages(starter, state.t, x, free)),
+        tuple(_stages(starter, state.t, x, starter.free)),
     )
 
 

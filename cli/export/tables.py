@@ -68,8 +68,8 @@ class Stage:
 class Start:
     """How a consistent start is sought at other parameters: x = (y, yd at `rates`, what the rows `missed` miss).
 
-    scale, weight [x]: how far x moves from its guess is measured by weight/scale; initial: places of y that the text
-    gives; k_q, k_f: q' = f.
+    written: unknowns of y, those of the start alone among them; known, scale, weight [x]: x as it was bound; how far it
+    moves from its guess is measured by weight/scale; initial: places of y that the text gives; k_q, k_f: q' = f.
     """
 
     system: Assembled
@@ -79,6 +79,7 @@ class Start:
     initial: Ints
     k_q: Ints
     k_f: Ints
+    known: Floats
     scale: Floats
     weight: Floats
     stages: tuple[Stage, ...]

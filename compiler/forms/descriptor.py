@@ -18,7 +18,9 @@ from sysdyn.dsl.model.network import Shape
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 
-KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
+KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "start", "audit")
+BESIDE = ("start", "audit")
+"""Kinds behind the unknowns as written: of the start alone, and what is told of the motion."""
 AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
 BLOCKS = (
     "dynamics", "dynamics_rate", "phi_reaction", "phi_normal", "psi_reaction", "momentum", "momentum_rate", "phi",
@@ -47,7 +49,7 @@ WITHOUT_ENTRIES = frozenset((
 
 @dataclass(frozen=True, slots=True)
 class Unknowns:
-    """A family of unknowns: kind q f p s e kappa mu audit of its owner; one shape for all kinds of an owner."""
+    """A family of unknowns: kind q f p s e kappa mu start audit of its owner; one shape for all kinds of an owner."""
 
     name: str
     kind: str

@@ -63,7 +63,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     stored = add_audit(form.assembly, model, acting)
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
-    owners = (*model.coordinates, *model.unknowns, *model.states)
+    owners = (*model.coordinates, *model.unknowns, *model.states, *model.positions)
     shapes = [(f.name, f.shape) for f in owners]
     shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
     shapes += stored
@@ -196,6 +196,9 @@ class _Lowering:
             power = {n: kind == "mu" or n in integrated for n in names}
             units = {n: f"{'W' if power[n] else 'J'}/({m.labels[n]})" for n in names}
             found += [Unknowns(f"{n}.multiplier", kind, n, units[n], places[n]) for n in names]
+        for point in m.positions:
+            shown = point.name.removesuffix("start") + "q"
+            found.append(Unknowns(shown, "start", point.name, point.units["start"], point.place))
         found += [Unknowns(f"audit.{n}", "audit", n, "J", None) for n in (*AUDIT, *_drift(m))]
         return found
 

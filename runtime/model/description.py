@@ -24,7 +24,9 @@ Shape = tuple[tuple[int, int], ...]
 Index = tuple[int, int, int]
 """(loop, slot, constant): the value is (loop variable or 0) + (ix[slot] or 0) + constant; loop, slot -1: none."""
 
-KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
+KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "start", "audit")
+BESIDE = ("start", "audit")
+"""Kinds behind the unknowns as written: of the start alone, and what is told of the motion."""
 BASE = {
     "dynamics_rate": "dynamics",
     "phi_reaction": "dynamics",

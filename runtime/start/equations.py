@@ -32,13 +32,14 @@ class Equations:
     """system: as written; settled: its form "start".
 
     guessed, unsaid [rows]: guesses of block initial, those that no text says; missed: the rows of these guesses, each
-    with an unknown of its own; contents [rows]: those of them that guess what stores hold; unsettled [rows]: they need
+    with an unknown of its own; contents [rows]: those that say what stores hold; unsettled [rows]: they need
     not hold; rows, columns, structural [entries]: of the matrix; alike [unknowns]: number of the kind and unit of each;
-    member [unknowns of y]: number of the kind; first: place of the first that is missed.
+    member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them; first: place of
+    the first that is missed.
     """
 
     def __init__(self, system: System, settled: System) -> None:
-        self.n = system.form.written
+        self.n, self.written = settled.unknowns, settled.form.written
         self.rates = rates_of(settled)
         self._rows(settled)
         self.missed = np.flatnonzero(self.guessed)
@@ -48,19 +49,19 @@ class Equations:
         self.momentum, self.flow = pairs(system)
         self._entries(settled)
         self.units = self._units(settled)
-        self._kinds(system)
+        self._kinds(settled)
         self.measured = self._measured()
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _rows(self, settled: System) -> None:
-        """Rows of block initial that are guesses, and those of them that no text says, that guess contents."""
+        """Rows of block initial that are guesses, those of them that no text says, and those that say contents."""
         self.guessed, self.unsaid, self.contents = np.zeros((3, settled.rows), dtype=bool)
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
-            if group == "initial" and not rows.fixed:
-                self.guessed[first : first + rows.size] = True
-                self.unsaid[first : first + rows.size] = not rows.written
-                self.contents[first : first + rows.size] = rows.content
+            if group == "initial":
+                own = slice(first, first + rows.size)
+                self.contents[own] = rows.content
+                self.guessed[own], self.unsaid[own] = not rows.fixed, not (rows.fixed or rows.written)
 
     def _entries(self, settled: System) -> None:
         """Those of dF/dy, of dF/dy' where the derivative is an unknown, of what is missed."""
@@ -84,21 +85,21 @@ class Equations:
                 found[first : first + rows.size] = [rows.unit if rows.content else rows.owner] * rows.size
         return [found[row] for row in self.missed]
 
-    def _kinds(self, system: System) -> None:
+    def _kinds(self, settled: System) -> None:
         self.family = np.unique(self.units, return_inverse=True)[1].astype(np.int64)
-        kinds = alike(system)
+        kinds = alike(settled)
         largest = kinds.max(initial=0) + 1
         groups = kinds[: self.n], largest + kinds[self.rates], 2 * largest + self.family
         self.alike = np.concatenate(groups).astype(np.int32)
         number: dict[str, int] = {}
-        of_family = [number.setdefault(f.kind, len(number)) for f in system.description.families]
-        self.member = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: self.n]]
+        of_family = [number.setdefault(f.kind, len(number)) for f in settled.description.families]
+        self.member = np.array([*of_family, 0], dtype=np.int32)[settled.family_of]
         self.members = len(number)
 
     def _measured(self) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
         mask = np.zeros(self.n, dtype=bool)
-        own = self.structural & self.contents[self.rows] & (self.columns < self.n)
+        own = self.structural & self.contents[self.rows] & (self.columns < self.written)
         mask[self.columns[own]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask

@@ -266,7 +266,7 @@ def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[Mov
             yield _missed(starter, t, x, place)
         else:
             guess = float(given.guess[place])
-            yield starter.system.name(place), guess, float(x[place]), _asked(starter, t, x, place)
+            yield starter.settled.name(place), guess, float(x[place]), _asked(starter, t, x, place)
 
 
 def _missed(starter: Starter, t: float, x: Floats, place: int) -> Moved:
@@ -279,7 +279,7 @@ def _missed(starter: Starter, t: float, x: Floats, place: int) -> Moved:
     own = np.flatnonzero(mine & ~starter.written[starter.columns])
     if own.size == 1:
         k = int(starter.columns[own[0]])
-        return starter.system.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, t, x, k)
+        return starter.settled.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, t, x, k)
     label = starter.settled.row_label(int(row))
     return f"guess of line {label.line}", 0.0, miss, "what its two sides differ by"
 
@@ -338,17 +338,16 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     starter.work = Work(until=until)
     guess = np.concatenate([starter.given.guess, np.zeros(starter.equations.unknowns - starter.n)])
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
-        y = np.where(system.are(*STATE, "e")[: starter.n], near.y, starter.given.guess)
-        guess = starter.unknowns(t0, y, np.zeros(starter.n))
-    free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
-    guess = _guess(starter, t0, guess, free)
-    best, strategy = _attempt(starter, t0, guess, free)
+        y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
+        guess = starter.unknowns(t0, y, np.zeros(y.size))
+    guess = _guess(starter, t0, guess, starter.free)
+    best, strategy = _attempt(starter, t0, guess, starter.free)
     if not strategy:
-        raise _explain(starter, t0, guess, free, best)
+        raise _explain(starter, t0, guess, starter.free, best)
     y, yd = starter.expand(best.x)
     moved = tuple(_moved(starter, t0, best.x, starter.scale(t0, best.x)))
     if best.x.size > LARGE:
         starter.forget()
-        del starter, guess, free
+        del starter, guess
         system.trim()
     return ConsistentState(t0, y, yd, moved, best.residual, strategy)

@@ -1,7 +1,7 @@
 """What a consistent start is sought in: unknowns, equations, given values, magnitudes and weights.
 
-Unknowns: y as written and the derivatives that the settled rows read; equations: all settled rows (as written,
-phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.
+Unknowns: y as written, those of the start alone, the derivatives that the settled rows read; equations: all settled
+rows (as written, phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.
 
 A guess of an expression, or of contents that follow from several coordinates, has a row of block `initial` and an
 unknown of its own, what the row misses; these move least, and coordinates follow contents.
@@ -23,14 +23,14 @@ from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
+from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work, least_norm
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
-STATE = ("q", "f", "p", "s")
+STATE = ("q", "f", "p", "s", "start")
 WEIGHT = {"unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
 FLOOR = 1e-5
@@ -54,7 +54,7 @@ class _Given:
 
 def _given(system: System) -> _Given:
     """The initial values of a text.  InconsistentStart where two fixed ones differ."""
-    n, stated = system.form.written, sorted(system.description.initial, key=lambda item: item.fixed)
+    n, stated = system.unknowns, sorted(system.description.initial, key=lambda item: item.fixed)
     said = [(item, system.form.at[item.family] + item.positions) for item in stated]
     found = _Given(np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), said)
     for item, own in said:
@@ -106,7 +106,7 @@ class Starter:
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
-        self.given = _given(system)
+        self.given = _given(settled)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
         self.n, self.first = known.n, known.first
@@ -123,9 +123,9 @@ class Starter:
             self.every[self._places] = True
             self.rows = np.append(self.rows, np.repeat(self._places, known.unknowns))
             self.columns = np.append(self.columns, np.tile(np.arange(known.unknowns), self._places.size))
-        self.written = np.concatenate(
-            [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
-        )
+        self.free = np.append(~self.given.fixed, np.ones(known.unknowns - self.n, dtype=bool))
+        rated = np.zeros(self.rates.size, dtype=bool)
+        self.written = np.concatenate([self.given.written, rated, ~self.unsaid[self.missed]])
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
@@ -158,11 +158,18 @@ class Starter:
         yd[self.rates] = x[self.n : self.first]
         form = self.system.form
         yd[form.k_q] = y[form.k_f]
-        return y, yd
+        return y[: form.written], yd[: form.written]
 
     def unknowns(self, t: float, y: Floats, yd: Floats) -> Floats:
-        """X of y, yd, the inverse of `expand`: guessed expressions miss what they do there."""
-        x = np.concatenate([y, yd[self.rates], np.zeros(self.missed.size)])
+        """X of y, yd, the inverse of `expand`: positions are those of the contents, guessed expressions miss what they
+        do there.
+        """
+        x = np.concatenate([y, self.given.guess[y.size :], yd[self.rates], np.zeros(self.missed.size)])
+        at = np.flatnonzero((self.moves("start") & self.free)[self.columns])
+        if at.size:
+            aim = np.where(np.isin(np.arange(self.settled.rows), self.rows[at]), -self.residual(t, x), 0.0)
+            entries = self.rows[at], self.columns[at] - y.size, self.jacobian(t, x)[at]
+            x[y.size : self.n] += least_norm((aim.size, self.n - y.size), entries, aim)
         x[self.first :] = self.residual(t, x)[self.missed]
         return x
 
@@ -226,7 +233,7 @@ class Starter:
     def moves(self, *kinds: str) -> Mask:
         """Unknowns of y of these kinds [unknowns]."""
         found = np.zeros(self.equations.unknowns, dtype=bool)
-        found[: self.n] = self.system.are(*kinds)[: self.n]
+        found[: self.n] = self.settled.are(*kinds)
         return found
 
     def _floating(self, unsettled: Places) -> Floats:
@@ -262,8 +269,9 @@ class Starter:
         Of a momentum and its flow the one that is written carries the state, else the momentum.
         """
         _, jyd = self.system.jacobian(t, *self.expand(x))
-        state = self.system.are(*STATE)[: self.n]
-        carries = self.system.differential(jyd)[: self.n] & state & ~self.measured
+        state = self.settled.are(*STATE)
+        carries = state & ~self.measured
+        carries[: self.system.unknowns] &= self.system.differential(jyd)
         carries |= self.given.written & state
         carries[np.where(self.given.written[self._flow], self._momentum, self._flow)] = False
         found = np.ones(x.size, dtype=bool)
@@ -278,8 +286,8 @@ class Starter:
         weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
         content = scale.copy()
         if self.balanced:
-            inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))[: self.n]
-            content[: self.n] *= np.where(inert != 0.0, np.abs(inert), 1.0)
+            inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))
+            content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
         measured[self.n : self.first] = 1.0  # rates have magnitudes of their own each
         return np.asarray(weight * measured)
@@ -296,7 +304,7 @@ class Starter:
         named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
         number: dict[str, int] = {}
         of, missed = ([number.setdefault(s, len(number)) for s in names] for names in (named, self.equations.units))
-        of_y = np.array([*of, 0])[self.system.family_of[: self.n]]
+        of_y = np.array([*of, 0])[self.settled.family_of]
         return np.concatenate([of_y, np.full(self.rates.size, len(number)), missed]).astype(np.int32)
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
@@ -312,7 +320,7 @@ class Starter:
         """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
         (rates of fast and slow stores 1e12 apart) where generous.
         """
-        known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
+        known, found, nominal = self.equations, np.zeros(x.size), self.settled.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self.residual(t, x)
         told = np.where(np.isin(self.rows, self.missed) & np.isfinite(values), values, 0.0) if self.missed.size else 0.0
@@ -347,7 +355,9 @@ def problem_of(
     if least:
         state = free & ~starter.following(t, x)
         unsaid = state & ~starter.written
-        levels = state & starter.written, unsaid & ~starter.idle, unsaid & starter.idle
+        placed = starter.moves("start")
+        said = state & starter.written
+        levels = said & ~placed, said & placed, unsaid & ~starter.idle, unsaid & starter.idle
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     return Problem(
         residual=lambda z: starter.residual(t, z),
