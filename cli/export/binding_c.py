@@ -197,6 +197,7 @@ def _whole(tables: Tables) -> Iterable[str]:
         "FULL": system.unknowns,
         "WRITTEN": tables.written,
         "EXTENDED": max(system.extended, 1),
+        "FOLLOWED": tables.followed,
         "CALLS": max(len(system.calls), 1),
         "SCRATCH": _scratch(system),
         "OBSERVED": tables.observed if tables.outputs else 0,
@@ -267,12 +268,11 @@ def _start(start: Start) -> Iterable[str]:
     system = start.system
     yield from _system("b", system)
     yield "#define start_form b_form"
-    size = start.written + start.rates.size + start.missed.size
+    size = start.written + start.rates.size
     place = np.full(system.unknowns, -1)
     place[start.rates] = start.written + np.arange(start.rates.size)
     yield ints("start_rate", start.rates)
     yield ints("start_rate_place", place)
-    yield ints("start_missed", start.missed)
     yield ints("start_initial", start.initial)
     yield ints("start_k_q", start.k_q)
     yield ints("start_k_f", start.k_f)
@@ -296,7 +296,6 @@ def _start(start: Start) -> Iterable[str]:
         "CALLS": max(len(system.calls), 1),
         "SCRATCH": _scratch(system),
         "RATES": start.rates.size,
-        "MISSED": start.missed.size,
         "INITIAL": start.initial.size,
         "STAGES": len(start.stages),
         "KINEMATICS": start.k_q.size,

@@ -93,6 +93,7 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
         scale=scale[places],
         differential=differential[places].astype(np.int32),
         written=system.form.written,
+        followed=system.another("start").unknowns,
         at=system.form.at,
         system=assembled(system),
         state=inner,
@@ -228,5 +229,5 @@ def _group(group: Formulas, system: System) -> Group:
     """A group of formulas with its places in y."""
     target = group.target
     if group.kind == "initial":
-        target = target + system.form.at[group.family]
+        target = target + system.another("start").form.at[group.family]
     return Group(group.block, group.kind, group.entries, group.source, target)

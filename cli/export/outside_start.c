@@ -50,8 +50,6 @@ static void start_rows(seeking *s, const double *x)
 {
     expand(s, x);
     sd_core_residual(&s->system, sd_t0, s->y, s->yd, s->r);
-    for (int32_t k = 0; k < START_MISSED; k++)
-        s->r[start_missed[k]] -= x[START_UNKNOWNS + START_RATES + k];
 }
 
 /* one entry of the linearised rows, in scaled unknowns */
@@ -74,8 +72,6 @@ static void enter_all(seeking *s, int sizes)
             if (start_rate_place[c] >= 0)
                 enter(s, start_form.row[e], start_rate_place[c], s->jyd[e], sizes);
         }
-    for (int32_t k = 0; k < START_MISSED; k++)
-        enter(s, start_missed[k], START_UNKNOWNS + START_RATES + k, -1.0, sizes);
 }
 
 /* largest row in use, each in the size of its terms; s->r holds the rows */
@@ -237,9 +233,6 @@ static int seek(seeking *s, double *p)
     memcpy(s->guess, given, START_UNKNOWNS * sizeof *given);
     for (int32_t k = 0; k < START_INITIAL; k++)
         s->x[start_initial[k]] = given[start_initial[k]];
-    start_rows(s, s->x);
-    for (int32_t k = 0; k < START_MISSED; k++)
-        s->x[START_UNKNOWNS + START_RATES + k] = s->r[start_missed[k]];
     for (int32_t k = 0; k < START_STAGES; k++) {
         const sd_stage *stage = &start_stage[k];
         int code = 1;

@@ -52,7 +52,7 @@ def _row(row: Equations) -> dict[str, Any]:
     if row.block == "observe":
         found |= {"name": row.label, "stored": row.stored}
     if row.block == "initial":
-        found |= {"fixed": row.fixed, "written": row.written, "content": row.content}
+        found |= {"content": row.content}
     return found
 
 

@@ -128,16 +128,15 @@ class Given:
 def rows_at(system: System, state: ConsistentState) -> Rows:
     """Every row that holds at consistent states, linearised; system: the form as written."""
     starter = Starter(system)
-    if max(starter.first, starter.settled.rows) > LARGEST:
-        raise NoLinearisation(
-            f"{starter.first} unknowns and rates are more than {LARGEST}, up to which full matrices are taken"
-        )
     x = starter.unknowns(state.t, state.y, state.yd)
+    if max(x.size, starter.settled.rows) > LARGEST:
+        text = f"{x.size} unknowns and rates are more than {LARGEST}, up to which full matrices are taken"
+        raise NoLinearisation(text)
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
     if not np.isfinite(full).all():
         raise NoLinearisation("the slopes of the equations are no numbers there")
-    as_written = np.delete(full, np.r_[system.form.written : starter.n, starter.first : x.size], axis=1)
+    as_written = np.delete(full, np.s_[system.form.written : starter.n], axis=1)
     return Rows(starter, as_written, starter.every & ~starter.groups("initial"))
 
 

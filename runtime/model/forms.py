@@ -18,7 +18,7 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.runtime.model.description import BASE, BESIDE, SCALE, Description, Ints, RowFamily
+from sysdyn.runtime.model.description import BASE, BESIDE, SCALE, START, Description, Ints, RowFamily
 from sysdyn.runtime.model.failures import ContractError, RowLabel
 from sysdyn.values import dataclass
 
@@ -151,9 +151,11 @@ def nu_name(kappa: str) -> str:
     return f"{kappa.removesuffix('.multiplier')}.nu"
 
 
-def _layout(description: Description) -> tuple[Ints, list[tuple[str, int]], int, int]:
-    """At (kinds BESIDE behind the others), kinds and numbers of unknowns as written, their number, that of all."""
-    at = np.zeros(len(description.families), dtype=np.int32)
+def _layout(description: Description, others: tuple[str, ...]) -> tuple[Ints, list[tuple[str, int]], int, int]:
+    """At (these kinds behind those as written, others of BESIDE nowhere), kinds and numbers of unknowns as written,
+    their number, that of all.
+    """
+    at = np.full(len(description.families), NOWHERE, dtype=np.int32)
     kinds: list[tuple[str, int]] = []
     end = 0
     for k, family in enumerate(description.families):
@@ -162,7 +164,7 @@ def _layout(description: Description) -> tuple[Ints, list[tuple[str, int]], int,
             kinds.append((family.kind, family.size))
             end += family.size
     written = end
-    for kind in BESIDE:
+    for kind in others:
         for k in description.families_of(kind):
             at[k] = end
             end += description.families[k].size
@@ -220,7 +222,8 @@ def _leveled(
 
 def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
-    at, kind, written, extended = _layout(description)
+    own = START if name == "start" else ()
+    at, kind, written, extended = _layout(description, (*own, "audit"))
     unknowns = written
     if "kinematics" not in description.layouts:  # the same in every form
         description.layouts["kinematics"] = _kinematics(description, at)
@@ -262,9 +265,10 @@ def plan(description: Description, name: str) -> Form:
             calls.append(Planned(block, at, tables[group]))
             if block + SCALE in description.blocks:
                 scales.append(Planned(block + SCALE, at, tables[group]))
-    for k in description.families_of("start") if name == "start" else ():
-        kind.append(("start", description.families[k].size))
-        unknowns += description.families[k].size
+    for one in own:
+        size = sum(description.families[k].size for k in description.families_of(one))
+        kind.append((one, size))
+        unknowns += size
     calls, number = _leveled(calls, level, description.rows, number)
     return Form(
         name=name,

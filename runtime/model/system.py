@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.carrier import Carrier, Extent, Failure, LibraryCarrier, Tables
-from sysdyn.runtime.model.description import BASE, BESIDE, Description, Floats, Ints, describe
+from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, describe
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
 from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
@@ -495,9 +495,10 @@ class System:
     def _are(self, kinds: tuple[str, ...]) -> Mask:
         mask = np.zeros(self.unknowns, dtype=bool)
         for family, first in zip(self.description.families, self.form.at, strict=True):
-            if family.kind in kinds and family.kind not in BESIDE:
+            if family.kind in kinds and 0 <= first < self.unknowns and family.kind != "audit":
                 mask[first : first + family.size] = True
-        mask[self.form.written :] = ("start" if self.form.name == "start" else "nu") in kinds
+        if self.form.name != "start":
+            mask[self.form.written :] = "nu" in kinds
         return mask
 
     def of_groups(self, *names: str) -> Mask:
@@ -519,7 +520,7 @@ class System:
     def _family_of(self) -> Ints:
         found = np.full(self.unknowns, -1, dtype=np.int32)
         for k, family in enumerate(self.description.families):
-            if family.kind not in BESIDE or (family.kind, self.form.name) == ("start", "start"):
+            if self.form.at[k] >= 0 and family.kind != "audit":
                 found[self.form.at[k] : self.form.at[k] + family.size] = k
         return read_only(found)
 

@@ -48,7 +48,7 @@ def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...
     if tangent is None:
         return 0, ()
     follows = starter.following(state.t, starter.unknowns(state.t, state.y, state.yd))
-    carries = np.flatnonzero((starter.free & ~follows)[: starter.n])
+    carries = np.flatnonzero(starter.free & ~follows & ~starter.moves("slack", "unsaid"))
     missing = _rank(tangent[carries])
     return missing, tuple(starter.settled.name(int(k)) for k in carries) if missing else ()
 
