@@ -15,9 +15,10 @@ from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature,
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.joined import Joined
-from sysdyn.dsl.model.network import Branch, Initial, Network, State, Terminal
+from sysdyn.dsl.model.network import Initial, Loop, Network, NodeFamily, State, Terminal
 from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
-from sysdyn.dsl.text.diagnostics import ModelError
+from sysdyn.dsl.text.diagnostics import ModelError, Place
+from sysdyn.values import dataclass
 
 _Point = tuple[str, tuple[int, ...]]
 """A node by its name and indices; the ground has none."""
@@ -27,11 +28,8 @@ _GROUND = "", ()
 def from_stores(network: Network) -> Network:
     """Traced positions of points that single stores hold to the ground, as displacements of these stores."""
     sizes, over = Sizes(network), dict[_Point | None, Node]({_GROUND: ex.const(0.0)})
-    left = [
-        (_point(plus, sizes), _point(minus, sizes), ex.var(b.name, "bq", *b.at))
-        for b, plus, minus in _springs(network, frozenset())
-        if not b.loops
-    ]
+    springs = [j for j in _springs(network, frozenset()) if not j.loops]
+    left = [(_point(j.plus, sizes), _point(j.minus, sizes), j.content) for j in springs]
     number = 0
     while number < len(over):
         number = len(over)
@@ -64,54 +62,100 @@ def _point(end: Terminal, sizes: Sizes) -> _Point | None:
         return None
 
 
-def _springs(network: Network, wanted: frozenset[Wanted]) -> Iterator[tuple[Branch, Terminal, Terminal]]:
-    """Branches between common-flow nodes whose displacement is an unknown of the start, with their ends."""
+@dataclass(frozen=True, slots=True)
+class _Join:
+    """Points of a family joined with others: the displacement of plus over minus, and whose it is."""
+
+    name: str
+    content: Node
+    plus: Terminal
+    minus: Terminal
+    loops: tuple[Loop, ...]
+    place: Place
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Families of nodes at the ends; the ground is none."""
+        return tuple(end.node for end in (self.plus, self.minus) if end.node is not None)
+
+
+def _springs(network: Network, wanted: frozenset[Wanted]) -> Iterator[_Join]:
+    """Branches between common-flow nodes whose displacement is an unknown of the start."""
     for b in network.branches:
-        if b.domain.common == "flow" and b.plus and b.minus and (b.kind == "potential" or (b.name, "bq") in wanted):
-            yield b, b.plus, b.minus
+        stores = b.kind == "potential"
+        if b.domain.common == "flow" and b.plus and b.minus and (stores or (b.name, "bq") in wanted):
+            content = ex.var(b.name, "bq", *b.at) if stores else quadrature(b.name, b.at)
+            yield _Join(b.name, content, b.plus, b.minus, b.loops, b.place)
 
 
 def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     """Positions as unknowns of the start, in parts where displacements are said or stores may stand in loops; wanted:
-    displacements with quadratures.
+    displacements with quadratures.  Where the text tells every position of a part, contents begin at the differences.
     """
-    springs, stores = tuple(_springs(network, wanted)), stores_of(network)
-    asked, rows = _asked(network, springs, wanted), []
-    for b, *ends in springs:
-        if any(end.node in asked for end in ends):
-            content = ex.var(b.name, "bq", *b.at) if b.name in stores else quadrature(b.name, b.at)
-            apart = ex.sub(content, ex.sub(*map(_position, ends)))
-            rows.append(Initial(apart, ex.const(0.0), True, b.loops, b.place, b.name))
-    nodes = [n for n in network.nodes if n.name in asked]
-    for n in (n for n in nodes if (n.name, "nq") in wanted):
-        loops, at = whole(n)
-        apart = ex.sub(quadrature(n.name, at), _position(Terminal(n.name, at)))
-        rows.append(Initial(apart, ex.const(0.0), True, loops, n.place, n.name))
-    def read(root: Node) -> Node:
-        found = _positions([root])
-        return ex.substitute(root, {n: _position(Terminal(n.data[0], n.args)) for n in found}) if found else root
-
-    said = (i for i in rewritten(network, read, ("initials",)).initials if not is_position(i.target, stores))
-    begun = (State(f"{n.name}.start", n.shape, n.domain.displacement, n.place) for n in nodes)
-    return replace(network, positions=tuple(begun), initials=(*said, *rows))
-
-
-def _position(end: Terminal) -> Node:
-    """The position of a point at the start."""
-    return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
-
-
-def _asked(
-    network: Network, springs: Sequence[tuple[Branch, Terminal, Terminal]], wanted: frozenset[Wanted]
-) -> frozenset[str]:
-    """Common-flow nodes of parts in which a displacement is said or wanted, or which stores may join in loops."""
+    springs = tuple(_springs(network, wanted))
     read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
-    said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")} | {name for name, _ in wanted}
-    parts, loops = Joined[str](), in_loops([(p.node or "", m.node or "", 1 + len(b.loops)) for b, p, m in springs])
-    for k, (b, *ends) in enumerate(springs):
-        names = [end.node for end in ends if end.node is not None]
-        said |= set(names) if k in loops or b.name in said else set()
-        if names:
-            parts.join(names[0], names[-1])
+    said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")}
+    parts = _parts(network, springs, said | {name for name, _ in wanted})
+    told = _told(network, springs, parts, said)
+
+    def position(end: Terminal) -> Node:
+        if end.node in told:
+            return told[end.node].value
+        return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
+
+    def begun(join: _Join) -> Initial:
+        apart = ex.sub(position(join.plus), position(join.minus))
+        if all(name in told for name in join.nodes):
+            return Initial(join.content, apart, all(told[n].fixed for n in join.nodes), join.loops, join.place)
+        return Initial(ex.sub(join.content, apart), ex.const(0.0), True, join.loops, join.place, join.name)
+
+    def positioned(root: Node) -> Node:
+        found = _positions([root])
+        return ex.substitute(root, {n: position(Terminal(n.data[0], n.args)) for n in found}) if found else root
+
+    nodes = [n for n in network.nodes if n.name in parts and n.name not in told]
+    points = (_point_of(n) for n in network.nodes if n.name in parts and (n.name, "nq") in wanted)
+    left = tuple(i for i in network.initials if i not in told.values())
+    kept = rewritten(replace(network, initials=left), positioned, ("initials",)).initials
+    return replace(
+        network,
+        positions=tuple(State(f"{n.name}.start", n.shape, n.domain.displacement, n.place) for n in nodes),
+        initials=(
+            *(i for i in kept if not is_position(i.target, stores_of(network))),
+            *(begun(join) for join in (*springs, *points) if any(name in parts for name in join.nodes)),
+        ),
+    )
+
+
+def _point_of(node: NodeFamily) -> _Join:
+    """Nodes at their quadratures over the ground."""
+    loops, at = whole(node)
+    return _Join(node.name, quadrature(node.name, at), Terminal(node.name, at), Terminal(None, ()), loops, node.place)
+
+
+def _parts(network: Network, springs: Sequence[_Join], said: set[str]) -> dict[str, str]:
+    """Common-flow nodes, each with what stands for its part, of parts of which something is said, or in which stores
+    may stand in loops; said: nodes and branches.
+    """
+    parts, ends = Joined[str](), [(j.plus.node or "", j.minus.node or "", 1 + len(j.loops)) for j in springs]
+    looped = in_loops(ends)
+    for k, join in enumerate(springs):
+        said = said | set(join.nodes) if k in looped or join.name in said else said
+        if join.nodes:
+            parts.join(join.nodes[0], join.nodes[-1])
     asked = {parts.first(name) for name in said}
-    return frozenset(n.name for n in network.nodes if n.domain.common == "flow" and parts.first(n.name) in asked)
+    heads = {n.name: parts.first(n.name) for n in network.nodes if n.domain.common == "flow"}
+    return {name: head for name, head in heads.items() if head in asked}
+
+
+def _told(
+    network: Network, springs: Sequence[_Join], parts: dict[str, str], said: set[str]
+) -> dict[str | None, Initial]:
+    """Positions by the text of single nodes, in parts of which it tells all of them and no content."""
+    found: dict[str | None, list[Initial]] = {}
+    for i in network.initials:
+        if i.target.op == "var" and i.target.data[1:] == ("nq", 0) and not ex.variables(i.value):
+            found.setdefault(i.target.data[0], []).append(i)
+    open_ = {parts[n.name] for n in network.nodes if n.name in parts and (n.shape or len(found.get(n.name, ())) != 1)}
+    open_ |= {parts[name] for j in springs if j.name in said for name in j.nodes if name in parts}
+    return {name: items[0] for name, items in found.items() if name in parts and parts[name] not in open_}

@@ -293,8 +293,6 @@ class Batch:
         """The start of every run."""
         many, system, made = self.core, self.system, self.passes[1]
         n = system.form.written
-        if system.description.families_of("start"):
-            raise NotApplicableError("positions that are unknowns of the start alone")
         y, yd = (np.ascontiguousarray(item[:n]) for item in (self.start.y, self.start.yd))
         found = anchors(made.settler, system, self.start.t, (y, yd), made.magnitude)
         if found is None:

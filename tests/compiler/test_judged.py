@@ -4,11 +4,15 @@ from dataclasses import replace
 
 import pytest
 from catalogue import ONE, PLACE
-from chains import blank, coordinate
+from chains import blank, coordinate, parameter
 from networks import ELECTRICAL, TRANSLATION, Net, of
+from sysdyn.compiler.binding.binding import bind
 from sysdyn.compiler.binding.checks import check_energies
+from sysdyn.compiler.binding.following import following
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.efforts import efforts
+from sysdyn.compiler.forms.hamiltonian import hamiltonian
+from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.meters.audit import add_audit
 from sysdyn.compiler.model.energies import energies
 from sysdyn.compiler.network.primal.bounds import Sizes
@@ -16,6 +20,7 @@ from sysdyn.compiler.network.primal.contents import Contents
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter, touches_network
 from sysdyn.compiler.network.primal.unspecified import measured
+from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program.rolled import skeleton
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Constraint, Energy, Initial, Loop, Unknown, Work
@@ -67,6 +72,66 @@ def test_the_audit_of_an_oscillator_is_its_energies_and_powers():
     }
     assert (found["#ledger 0 stored"], found["#ledger 0 gross"]) == (34.0, 120.0)
     assert [found[owner] for owner, _ in shapes] == pytest.approx([24.0, 10.0], rel=1e-14)
+
+
+# -- the forms of an oscillator ----------------------------------------------------------------------------------------
+
+
+def rows_of(form, at):
+    """Values of all rows as written, by block: blocks that stand in one row are added."""
+    found = {}
+    for block in form.blocks:
+        if block.name in ("dynamics", "momentum"):
+            for row in (row for kernel in block.kernels for row in kernel.rows):
+                found[block.name] = found.get(block.name, 0.0) + x.evaluate([row.expression], at.get)[0]
+    return found
+
+
+def test_hamiltons_equations_of_an_oscillator():
+    """p' + 5 q + 7 f - 2 = 0 and 0 = p - 3 f, at q = 2, f = 4, p = 13, p' = 1."""
+    form = hamiltonian(energies(oscillator()))
+    assert [(f.kind, f.owner) for f in form.families if f.kind != "audit"] == [("q", "a"), ("f", "a"), ("p", "a")]
+    at = {var("a", "q"): 2.0, var("a", "f"): 4.0, var("a", "p"): 13.0, var("a", "p", order=1): 1.0}
+    assert rows_of(form, at) == {"dynamics": 1.0 + 10.0 + 28.0 - 2.0, "momentum": 1.0}
+
+
+def test_lagranges_equation_of_an_oscillator():
+    """3 f' + 5 q + 7 f - 2 = 0."""
+    form = lagrangian(energies(oscillator()))
+    at = {var("a", "q"): 2.0, var("a", "f"): 4.0, var("a", "f", order=1): 0.5}
+    assert rows_of(form, at) == {"dynamics": 1.5 + 10.0 + 28.0 - 2.0}
+
+
+# -- numbers -----------------------------------------------------------------------------------------------------------
+
+
+def weighted():
+    """An oscillator whose stiffness k = 2 m follows from its mass and whose start is q0."""
+    q, f, m = var("a", "q"), var("a", "q", order=1), x.param("m")
+    energies_ = (
+        Energy("T*", x.product(0.5, [(1.0, m), (2.0, f)]), (), PLACE),
+        Energy("V", x.product(0.5, [(1.0, x.param("k")), (2.0, q)]), (), PLACE),
+    )
+    begin = Initial(q, x.scale(3.0, x.param("q0")), True, (), PLACE)
+    numbers = (parameter("m", 3.0), parameter("k", x.scale(2.0, m)), parameter("q0", 0.5))
+    return blank(coordinates=(coordinate("a"),), energies=energies_, initials=(begin,), parameters=numbers)
+
+
+def test_a_binding_holds_the_numbers_that_the_text_gives_and_those_given_anew():
+    made = compile_network(weighted(), backend="numpy")
+    for given, p, start in (({}, [3.0, 6.0, 0.5], 1.5), ({"m": 5.0, "q0": 2.0}, [5.0, 10.0, 2.0], 6.0)):
+        found = bind(made.network, made.energies, made.form, made.program, given)
+        assert found.p.tolist() == p
+        assert [(s.values.tolist(), s.fixed) for s in found.initial] == [([start], True)]
+
+
+def test_what_follows_is_told_with_what_it_follows_from():
+    """k by m; the start by q0; nothing decides about sizes."""
+    made = compile_network(weighted(), backend="numpy")
+    found = following(made.network, made.form, made.program, made.bind())
+    assert found.follows == {"k": ("m",)}
+    assert sorted(group.kind for group in found.groups) == ["initial", "parameter"]
+    assert found.structural == ()
 
 
 # -- rules that need energies ------------------------------------------------------------------------------------------
