@@ -63,4 +63,4 @@ def _guess(prepared: Prepared, system: System, t0: float) -> Floats:
         with np.errstate(all="ignore"):
             return eventful_start(system, t0, plan(prepared, system)).y
     except (InconsistentStart, NotFiniteError):
-        return Starter(system).given.guess
+        return Starter(system).guess[: system.form.written]

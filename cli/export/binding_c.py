@@ -188,7 +188,7 @@ def _whole(tables: Tables) -> Iterable[str]:
     yield ints("following_ix", tables.following_ix)
     yield ints("structural", tables.structural)
     start = tables.start
-    if start is not None or tables.state is not None:
+    if tables.state is not None:
         yield doubles("full_y", tables.full_y)
         yield doubles("full_yd", tables.full_yd)
     constants = {
@@ -197,6 +197,7 @@ def _whole(tables: Tables) -> Iterable[str]:
         "FULL": system.unknowns,
         "WRITTEN": tables.written,
         "EXTENDED": max(system.extended, 1),
+        "FOLLOWED": tables.followed,
         "CALLS": max(len(system.calls), 1),
         "SCRATCH": _scratch(system),
         "OBSERVED": tables.observed if tables.outputs else 0,
@@ -267,15 +268,15 @@ def _start(start: Start) -> Iterable[str]:
     system = start.system
     yield from _system("b", system)
     yield "#define start_form b_form"
-    size = start.written + start.rates.size + start.missed.size
+    size = start.written + start.rates.size
     place = np.full(system.unknowns, -1)
     place[start.rates] = start.written + np.arange(start.rates.size)
     yield ints("start_rate", start.rates)
     yield ints("start_rate_place", place)
-    yield ints("start_missed", start.missed)
     yield ints("start_initial", start.initial)
     yield ints("start_k_q", start.k_q)
     yield ints("start_k_f", start.k_f)
+    yield doubles("start_known", start.known)
     yield doubles("start_scale", start.scale)
     yield doubles("start_weight", start.weight)
     stages = []
@@ -290,11 +291,11 @@ def _start(start: Start) -> Iterable[str]:
     yield "static const sd_stage start_stage[] = {\n" + "\n".join(stages) + "\n};"
     constants = {
         "X": max(size, 1),
+        "UNKNOWNS": start.written,
         "FULL": max(system.unknowns, 1),
         "CALLS": max(len(system.calls), 1),
         "SCRATCH": _scratch(system),
         "RATES": start.rates.size,
-        "MISSED": start.missed.size,
         "INITIAL": start.initial.size,
         "STAGES": len(start.stages),
         "KINEMATICS": start.k_q.size,

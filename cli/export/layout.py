@@ -93,6 +93,7 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
         scale=scale[places],
         differential=differential[places].astype(np.int32),
         written=system.form.written,
+        followed=system.another("start").unknowns,
         at=system.form.at,
         system=assembled(system),
         state=inner,
@@ -199,7 +200,7 @@ def state_jacobian(tables_: Tables, system: System, t: float, y: Floats, yd: Flo
 def _scale(written: System, state: ConsistentState) -> Floats:
     """Magnitudes of the unknowns as written at the start."""
     starter = Starter(written)
-    return starter.scale(state.t, starter.unknowns(state.t, state.y, state.yd))[: starter.n]
+    return starter.scale(state.t, starter.unknowns(state.t, state.y, state.yd))[: written.form.written]
 
 
 def _observer(system: System, block: str) -> tuple[Call | None, int]:
@@ -228,5 +229,5 @@ def _group(group: Formulas, system: System) -> Group:
     """A group of formulas with its places in y."""
     target = group.target
     if group.kind == "initial":
-        target = target + system.form.at[group.family]
+        target = target + system.another("start").form.at[group.family]
     return Group(group.block, group.kind, group.entries, group.source, target)

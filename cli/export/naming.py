@@ -15,7 +15,7 @@ from sysdyn.compiler.binding.manifest import named, where
 from sysdyn.compiler.model.mirror import letter, spelled, word
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model import description
-from sysdyn.runtime.model.description import BASE, Family, RowFamily
+from sysdyn.runtime.model.description import BASE, BESIDE, Family, RowFamily
 from sysdyn.runtime.model.forms import nu_name
 
 
@@ -29,7 +29,7 @@ def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     place = 0
     for k, family in enumerate(families):
-        if family.kind == "audit" or (state and family.kind not in ("q", "f", "p", "s")):
+        if family.kind in BESIDE or (state and family.kind not in ("q", "f", "p", "s")):
             continue
         first = int(system.form.at[k])
         differential = state or family.kind == "q" or bool(np.any(moving[first : first + family.size]))

@@ -269,7 +269,7 @@ static int groups_of(enum sd_kind kind, double *p, double *y)
 
 int sd_follow(double *p)
 {
-    double *y = calloc(WRITTEN + 1, sizeof *y);
+    double *y = calloc(FOLLOWED + 1, sizeof *y);
     int code = y ? refused(p) : -1;
     if (!code)
         code = groups_of(SD_PARAMETER, p, y);

@@ -148,7 +148,7 @@ def sd_follow(p: Any) -> _Floats:
     """The parameters p with what follows from others (param b = 2*a) and constants of integrated rows written anew."""
     m = _model()
     p = np.array(m.parameters(p))
-    y = np.zeros(m.tables["written"] + 1)
+    y = np.zeros(m.tables["followed"] + 1)
     for kind in ("parameter", "initial", "constant"):
         _groups(m, kind, p, y)
     return m.parameters(p)
@@ -285,7 +285,7 @@ def sd_start(p: Any = None) -> tuple[_Floats, _Floats]:
         return m.y0.copy(), m.yd0.copy()
     if m.tables["start"] is None:
         raise StartError("the model is too large to be started anew here: compile it with these parameters")
-    y, yd = _Seeking(m, np.array(p)).found()
+    y, yd = (item[: m.tables["written"]] for item in _Seeking(m, np.array(p)).found())
     if m.state is not None:
         y, yd = _slopes(m, m.said["t0"], y[m.state["places"]], p)
         return y[m.state["places"]], yd[m.state["places"]]
@@ -300,29 +300,25 @@ class _Seeking:
         self.m, self.p, self.tables = m, p, m.tables["start"]
         self.form = _Form(self.tables["system"], m.ix)
         self.n = self.tables["written"]
-        self.rates, self.missed = (np.asarray(self.tables[name], dtype=int) for name in ("rates", "missed"))
-        self.first = self.n + len(self.rates)
+        self.rates = np.asarray(self.tables["rates"], dtype=int)
         self.unit = np.asarray(self.tables["scale"]) / np.asarray(self.tables["weight"])
         given = np.zeros(self.n)
         _groups(m, "initial", p, given)
-        self.guess = np.concatenate([given, np.zeros(len(self.rates) + len(self.missed))])
-        self.x = np.concatenate([m.full_y[: self.n], m.full_yd[self.rates], np.zeros(len(self.missed))])
+        self.guess = np.concatenate([given, np.zeros(len(self.rates))])
+        self.x = np.array(self.tables["known"], dtype=float)
         initial = self.tables["initial"]
         self.x[initial] = given[initial]
-        self.x[self.first :] = self.rows(self.x)[self.missed]
 
     def expand(self, x: _Floats) -> tuple[_Floats, _Floats]:
         """y, yd of x."""
         y, yd = x[: self.n].copy(), np.zeros(self.n)
-        yd[self.rates] = x[self.n : self.first]
+        yd[self.rates] = x[self.n :]
         yd[self.tables["k_q"]] = y[self.tables["k_f"]]
         return y, yd
 
     def rows(self, x: _Floats) -> _Floats:
         """All rows at x."""
-        r = self.form.residual(self.m.said["t0"], *self.expand(x), self.p)
-        r[self.missed] -= x[self.first :]
-        return r
+        return self.form.residual(self.m.said["t0"], *self.expand(x), self.p)
 
     def matrix(self, x: _Floats) -> _Floats:
         """Their derivatives by x [rows, x]."""
@@ -331,8 +327,7 @@ class _Seeking:
         full[self.form.row, self.form.columns] = jy
         rates = np.zeros((self.form.rows, self.n))
         rates[self.form.row, self.form.columns] = jyd
-        full[:, self.n : self.first] = rates[:, self.rates]
-        full[self.missed, self.first + np.arange(len(self.missed))] = -1.0
+        full[:, self.n :] = rates[:, self.rates]
         return np.where(np.isfinite(full), full, 0.0)
 
     def found(self) -> tuple[_Floats, _Floats]:
@@ -344,8 +339,8 @@ class _Seeking:
         if not holds:
             raise StartError("no consistent start was found at these parameters")
         # round-off beside its magnitude: rows whose slopes underflow leave a rate open
-        rates = np.abs(self.x[self.n : self.first]) <= _NOISE * np.asarray(self.tables["scale"])[self.n : self.first]
-        self.x[self.n : self.first][rates] = 0.0
+        rates = np.abs(self.x[self.n :]) <= _NOISE * np.asarray(self.tables["scale"])[self.n :]
+        self.x[self.n :][rates] = 0.0
         return self.expand(self.x)
 
     def attempt(self, use: NDArray[np.int_], free: NDArray[np.int_]) -> bool:

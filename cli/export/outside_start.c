@@ -38,10 +38,10 @@ static int open_seeking(seeking *s, const double *p)
 
 static void expand(seeking *s, const double *x)
 {
-    memcpy(s->y, x, WRITTEN * sizeof *x);
+    memcpy(s->y, x, START_UNKNOWNS * sizeof *x);
     memset(s->yd, 0, START_FULL * sizeof *x);
     for (int32_t k = 0; k < START_RATES; k++)
-        s->yd[start_rate[k]] = x[WRITTEN + k];
+        s->yd[start_rate[k]] = x[START_UNKNOWNS + k];
     for (int32_t i = 0; i < START_KINEMATICS; i++)
         s->yd[start_k_q[i]] = s->y[start_k_f[i]];
 }
@@ -50,8 +50,6 @@ static void start_rows(seeking *s, const double *x)
 {
     expand(s, x);
     sd_core_residual(&s->system, sd_t0, s->y, s->yd, s->r);
-    for (int32_t k = 0; k < START_MISSED; k++)
-        s->r[start_missed[k]] -= x[WRITTEN + START_RATES + k];
 }
 
 /* one entry of the linearised rows, in scaled unknowns */
@@ -68,14 +66,12 @@ static void enter(seeking *s, int32_t row, int32_t place, double value, int size
 
 static void enter_all(seeking *s, int sizes)
 {
-    for (int32_t c = 0; c < WRITTEN; c++)
+    for (int32_t c = 0; c < START_UNKNOWNS; c++)
         for (int32_t e = start_form.column[c]; e < start_form.column[c + 1]; e++) {
             enter(s, start_form.row[e], c, s->jy[e], sizes);
             if (start_rate_place[c] >= 0)
                 enter(s, start_form.row[e], start_rate_place[c], s->jyd[e], sizes);
         }
-    for (int32_t k = 0; k < START_MISSED; k++)
-        enter(s, start_missed[k], WRITTEN + START_RATES + k, -1.0, sizes);
 }
 
 /* largest row in use, each in the size of its terms; s->r holds the rows */
@@ -230,18 +226,13 @@ static int attempt(seeking *s, const sd_trial *trial)
 static int seek(seeking *s, double *p)
 {
     double *given = s->trial;
-    memset(given, 0, WRITTEN * sizeof *given);
+    memset(given, 0, START_UNKNOWNS * sizeof *given);
     if (groups_of(SD_INITIAL, p, given))
         return -1;
-    memcpy(s->x, full_y, WRITTEN * sizeof *s->x);
-    memcpy(s->guess, given, WRITTEN * sizeof *given);
+    memcpy(s->x, start_known, START_X * sizeof *s->x);
+    memcpy(s->guess, given, START_UNKNOWNS * sizeof *given);
     for (int32_t k = 0; k < START_INITIAL; k++)
         s->x[start_initial[k]] = given[start_initial[k]];
-    for (int32_t k = 0; k < START_RATES; k++)
-        s->x[WRITTEN + k] = full_yd[start_rate[k]];
-    start_rows(s, s->x);
-    for (int32_t k = 0; k < START_MISSED; k++)
-        s->x[WRITTEN + START_RATES + k] = s->r[start_missed[k]];
     for (int32_t k = 0; k < START_STAGES; k++) {
         const sd_stage *stage = &start_stage[k];
         int code = 1;
@@ -252,7 +243,7 @@ static int seek(seeking *s, double *p)
         if (!code && stage->guess)
             memcpy(s->guess, s->x, START_X * sizeof *s->x);
     }
-    for (int32_t k = WRITTEN; k < WRITTEN + START_RATES; k++)
+    for (int32_t k = START_UNKNOWNS; k < START_UNKNOWNS + START_RATES; k++)
         if (fabs(s->x[k]) <= noise_of_start * start_scale[k])
             s->x[k] = 0.0; /* round-off beside its magnitude: rows whose slopes underflow leave a rate open */
     expand(s, s->x);

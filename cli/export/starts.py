@@ -20,22 +20,21 @@ LARGEST = 1500
 def start_tables(system: System, state: ConsistentState) -> Start | None:
     """The problem of a start; None where it is too large, or has rows that only the runtime forms."""
     starter = Starter(system)
-    if starter.summed or max(starter.first + starter.missed.size, starter.settled.rows) > LARGEST:
+    if starter.summed or max(starter.equations.unknowns, starter.settled.rows) > LARGEST:
         return None
     x = starter.unknowns(state.t, state.y, state.yd)
-    free = np.append(~starter.given.fixed, np.ones(x.size - starter.n, dtype=bool))
-    problem = problem_of(starter, state.t, x, x, rows=starter.every, free=free)
+    problem = problem_of(starter, state.t, x, x, rows=starter.every, free=starter.free)
     return Start(
         assembled(starter.settled),
         starter.n,
         starter.rates.astype(np.int32),
-        starter.missed.astype(np.int32),
         np.flatnonzero(starter.given.written).astype(np.int32),
         starter.system.form.k_q,
         starter.system.form.k_f,
+        x,
         problem.scale,
         problem.weight,
-        tuple(_stages(starter, state.t, x, free)),
+        tuple(_stages(starter, state.t, x, starter.free)),
     )
 
 
@@ -43,10 +42,10 @@ def _stages(starter: Starter, t: float, x: Floats, free: Mask) -> list[Stage]:
     """Onto guessed expressions, then onto all rows: what follows from the state alone where that is enough."""
     follows = starter.following(t, x)
     found = []
-    written = starter.guessed & ~starter.unsaid
-    if written.any():
-        rows = written | starter.groups("phi", "psi")
-        found.append(Stage(((_places(rows), _places(free & (np.arange(free.size) < starter.n))),), guess=True))
+    if starter.told.any():
+        rows = starter.told | starter.groups("phi", "psi")
+        own = free & (np.arange(free.size) < starter.n) & ~starter.moves("slack", "unsaid")
+        found.append(Stage(((_places(rows), _places(own)),), guess=True))
     every = _places(starter.every)
     found.append(Stage(((every, _places(free & follows)), (every, _places(free)))))
     return found

@@ -66,19 +66,19 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """How a consistent start is sought at other parameters: x = (y, yd at `rates`, what the rows `missed` miss).
+    """How a consistent start is sought at other parameters: x = (y, yd at `rates`).
 
-    scale, weight [x]: how far x moves from its guess is measured by weight/scale; initial: places of y that the text
-    gives; k_q, k_f: q' = f.
+    written: unknowns of y, those of the start alone among them; known, scale, weight [x]: x as it was bound; how far it
+    moves from its guess is measured by weight/scale; initial: places of y that the text gives; k_q, k_f: q' = f.
     """
 
     system: Assembled
     written: int
     rates: Ints
-    missed: Ints
     initial: Ints
     k_q: Ints
     k_f: Ints
+    known: Floats
     scale: Floats
     weight: Floats
     stages: tuple[Stage, ...]
@@ -122,7 +122,8 @@ class Tables:
     """All of one exported model.
 
     y0, yd0, scale, differential [unknowns of the form]; full_y, full_yd [unknowns of the layout as assembled]; written:
-    unknowns as written, before the multipliers nu; at [families]: where they begin; audit_at [7]: places behind y.
+    unknowns as written, before the multipliers nu; followed: those that initial values may tell; at [families]: where
+    they begin; audit_at [7]: places behind y.
     """
 
     form: str
@@ -137,6 +138,7 @@ class Tables:
     scale: Floats
     differential: Ints
     written: int
+    followed: int
     at: Ints
     system: Assembled
     state: State | None

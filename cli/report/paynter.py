@@ -8,7 +8,7 @@ from sysdyn.cli.report.balance import shown
 from sysdyn.cli.report.study import Study
 from sysdyn.dsl.model.expression import var
 from sysdyn.dsl.model.network import Branch
-from sysdyn.runtime.model.description import count
+from sysdyn.runtime.model.description import BESIDE, count
 
 EDGES = ("p-f", "q-e", "e-f", "p'", "q'")
 """Kinetic, potential, dissipative; what is the rate of p (efforts), what is the rate of q (flows)."""
@@ -144,7 +144,7 @@ def unknowns(study: Study) -> str:
     description = study.started.system.description
     rows = []
     for family, known in zip(study.prepared.compiled.form.families, description.families, strict=False):
-        if family.kind == "audit":
+        if family.kind in BESIDE:
             continue
         symbol = math(types.unknown(family.owner, family.kind, 0))
         name = study.link(family.place, escape(family.owner))

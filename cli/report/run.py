@@ -7,6 +7,7 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.starting import described
 from sysdyn.compiler.binding.certificate import certificate
+from sysdyn.runtime.model.description import BESIDE
 from sysdyn.runtime.structure.order import freedom
 
 SHOWN = 60
@@ -69,7 +70,7 @@ def start(study: Study) -> str:
     rows, position = [], 0
     for family in system.description.families:
         for k in range(family.size):
-            if family.kind != "audit" and position < state.y.size and len(rows) <= SHOWN:
+            if family.kind not in BESIDE and position < state.y.size and len(rows) <= SHOWN:
                 rate = f"{state.yd[position]:.6g}" if np.isfinite(state.yd[position]) else "–"
                 rows.append([escape(family.named(k)), f"{state.y[position]:.6g}", rate])
             position += 1

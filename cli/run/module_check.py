@@ -49,9 +49,10 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
     system = started.system
     oracle = SampledRows(prepared.compiled.form, prepared.binding)
     points = _points(system, started, oracle, until)
+    whole = system.another("start")  # it has all families
     for block in prepared.compiled.form.blocks:
         sample = oracle.sample(block, points)
-        module = _module_rows(system, oracle, block, points)
+        module = _module_rows(whole, oracle, block, points)
         wrong = _apart(module, sample)
         if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
             sample = oracle.sample(block, points, careful=True)
@@ -81,7 +82,7 @@ def _points(system: System, started: Started, oracle: SampledRows, until: float)
     scale, time = magnitudes(system, t0, until, y, yd)
     # the magnitude of what begins at zero is a guess: one far too small would hide its terms behind rounding
     scale = np.maximum(scale, LEAST * group_maximum(system, scale))
-    order = _order(system, oracle)
+    order = _order(system.another("start"))
     number = 1 + len(NEARBY)
     points = Points(np.full(number, t0), np.zeros((number, order.size)), np.zeros((number, order.size)))
     extended = [np.concatenate([x, np.zeros(order.size - x.size)]) for x in (y, yd)]
@@ -104,7 +105,7 @@ def _ways(number: int, size: int) -> Iterator[Array]:
         yield found
 
 
-def _order(system: System, oracle: SampledRows) -> NDArray[np.intp]:
+def _order(system: System) -> NDArray[np.intp]:
     """Places in the system's y of the unknowns in the order of the form's families."""
     families = system.description.families
     parts = [system.form.at[k] + np.arange(f.size) for k, f in enumerate(families)]

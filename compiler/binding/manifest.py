@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding
-from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.model.integers import Index, Reference
 from sysdyn.compiler.model.mirror import letter, spelled
 from sysdyn.compiler.model.parameters import Extents
@@ -52,7 +52,7 @@ def _row(row: Equations) -> dict[str, Any]:
     if row.block == "observe":
         found |= {"name": row.label, "stored": row.stored}
     if row.block == "initial":
-        found |= {"fixed": row.fixed, "written": row.written, "content": row.content}
+        found |= {"content": row.content}
     return found
 
 
@@ -149,7 +149,7 @@ def _unknowns(form: DescriptorForm, program: Program, binding: Binding, authors:
     }
     found = []
     for k, family in enumerate(form.families):
-        if family.kind != "audit":
+        if family.kind not in BESIDE:
             moves = family.kind == "q" or k in moving
             plain = {"kind": letter(form.formulation, family.kind), "unit": family.unit, "differential": moves}
             name = spelled(form.formulation, family.name, family.kind)

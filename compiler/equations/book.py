@@ -15,7 +15,7 @@ from sysdyn.compiler.equations.joining import joined, shorter
 from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import Piece, pieces
 from sysdyn.compiler.forms.conjugates import signed
-from sysdyn.compiler.forms.descriptor import DescriptorForm, Equations
+from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, Equations
 from sysdyn.compiler.forms.efforts import PREFIX, effort
 from sysdyn.compiler.forms.lowering import whole
 from sysdyn.compiler.forms.momenta import momentum, resolve
@@ -93,7 +93,7 @@ class Function:
 def algebra_of(form: DescriptorForm, parameters: Sequence[str]) -> Algebra:
     """Symbols for a form: its unknowns as it lists them, parameters as they were declared."""
     scalars = {owner for owner, shape in form.shapes if not shape} | {o for o, places in form.hulls if not places[0][0]}
-    known = [var(f.owner, f.kind) for f in form.families if f.owner in scalars and f.kind != "audit"]
+    known = [var(f.owner, f.kind) for f in form.families if f.owner in scalars and f.kind not in BESIDE]
     return Algebra(Order(parameters), [*known, *map(param, parameters)])
 
 

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from sysdyn.compiler.equations.matrices import rows_of
-from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm
 from sysdyn.dsl.model.expression import variables
 from sysdyn.values import dataclass
 
@@ -38,7 +38,7 @@ class Offsets:
 
 def offsets(form: DescriptorForm) -> Offsets | None:
     """The offsets of all rows, q' = f among them.  Raises NoSuchEquations for families over ranges."""
-    unknowns = [(f.owner, f.kind) for f in form.families if f.kind != "audit"]
+    unknowns = [(f.owner, f.kind) for f in form.families if f.kind not in BESIDE]
     place = {name: k for k, name in enumerate(unknowns)}
     names: list[tuple[str, str]] = []
     orders: list[dict[int, int]] = []

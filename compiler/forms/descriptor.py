@@ -18,7 +18,11 @@ from sysdyn.dsl.model.network import Shape
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 
-KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
+KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "start", "slack", "unsaid", "audit")
+START = ("start", "slack", "unsaid")
+"""Kinds of the start alone: positions; what guesses miss, of the text and of zero where the text says nothing."""
+BESIDE = (*START, "audit")
+"""Kinds behind the unknowns as written."""
 AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
 BLOCKS = (
     "dynamics", "dynamics_rate", "phi_reaction", "phi_normal", "psi_reaction", "momentum", "momentum_rate", "phi",
@@ -47,7 +51,7 @@ WITHOUT_ENTRIES = frozenset((
 
 @dataclass(frozen=True, slots=True)
 class Unknowns:
-    """A family of unknowns: kind q f p s e kappa mu audit of its owner; one shape for all kinds of an owner."""
+    """A family of unknowns: one of KINDS, of its owner; one shape for all kinds of an owner."""
 
     name: str
     kind: str
@@ -68,8 +72,6 @@ class Equations:
     place: Place | None
     rate: bool = True  # whether every row of it has its time derivative as a block
     stored: bool = False  # a traced quantity (of block observe)
-    fixed: bool = False  # of block initial
-    written: bool = True  # of block initial: whether the text says it
     content: bool = False  # of block initial: what a store holds
 
 

@@ -20,7 +20,7 @@ from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
 from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.forms.efforts import Effort, efforts
 from sysdyn.compiler.forms.meters.audit import add_audit
-from sysdyn.compiler.forms.meters.observing import add_initials, add_observations, observed, pins_and_equations
+from sysdyn.compiler.forms.meters.observing import add_initials, add_observations, missing, observed, pins_and_equations
 from sysdyn.compiler.forms.momenta import given, inertial, resolved
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
@@ -63,7 +63,8 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     stored = add_audit(form.assembly, model, acting)
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
-    owners = (*model.coordinates, *model.unknowns, *model.states)
+    form.families += missing(equations)
+    owners = (*model.coordinates, *model.unknowns, *model.states, *model.positions)
     shapes = [(f.name, f.shape) for f in owners]
     shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
     shapes += stored
@@ -196,6 +197,9 @@ class _Lowering:
             power = {n: kind == "mu" or n in integrated for n in names}
             units = {n: f"{'W' if power[n] else 'J'}/({m.labels[n]})" for n in names}
             found += [Unknowns(f"{n}.multiplier", kind, n, units[n], places[n]) for n in names]
+        for point in m.positions:
+            shown = point.name.removesuffix("start") + "q"
+            found.append(Unknowns(shown, "start", point.name, point.units["start"], point.place))
         found += [Unknowns(f"audit.{n}", "audit", n, "J", None) for n in (*AUDIT, *_drift(m))]
         return found
 

@@ -104,6 +104,7 @@ class EnergyModel:
     coordinates: tuple[Family, ...]
     unknowns: tuple[Family, ...] = ()
     states: tuple[Family, ...] = ()
+    positions: tuple[Family, ...] = ()  # unknowns of the start alone
     functions: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
     works: tuple[Virtual, ...] = ()
     rows: tuple[Row, ...] = ()
@@ -169,6 +170,7 @@ def energies(network: Network) -> EnergyModel:
         ),
         unknowns=tuple(Family(u.name, u.shape, {"e": u.unit.text}, u.place) for u in network.unknowns),
         states=tuple(Family(s.name, s.shape, {"s": s.unit.text}, s.place) for s in network.states),
+        positions=tuple(Family(s.name, s.shape, {"start": s.unit.text}, s.place) for s in network.positions),
         functions=_functions(network),
         works=tuple(_works(network)),
         rows=(*_constraints(network), *_dynamics(network)),

@@ -1,228 +1,161 @@
 """Positions in the complementary family: what stores tell of them, and what initial positions tell of stores.
 
-The contents of stores between common-flow nodes are differences of positions x, c = B x: around every loop of stores,
-quadratures and fixed positions they add up to zero at the start.  A spanning forest of the nodes (`primal/forest.py`)
-tells these loops, and the positions of what stores hold to the ground or apart.
+The contents c of stores between common-flow nodes are differences of positions x, c = B x.  Where that matters at the
+start, positions are unknowns of it alone: what the text says of them is said of these, and loops close by these rows.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Sizes, box_size
-from sysdyn.compiler.network.primal.contents import told
-from sysdyn.compiler.network.primal.forest import IndexForest
-from sysdyn.compiler.network.primal.incidence import indices, loops_over, ranges_over, unrolled
-from sysdyn.compiler.network.primal.index_classes import Cell, Cut, End, Link
-from sysdyn.compiler.network.primal.overlaps import Ranges, initially, narrowed, ranges_of, untold
-from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature, stores_of
+from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.cycles import in_loops
+from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature, stores_of, whole
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Initial, Loop, Network, NodeFamily, Terminal
-from sysdyn.dsl.model.rewriting import TRACED, rewritten
+from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.network import Initial, Loop, Network, NodeFamily, State, Terminal
+from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.values import dataclass
 
-UNWRITTEN = 1e-6
-"""Weight (of squares) of a guess that the text does not write, as the consistent start has it."""
-_GROUND = Terminal(None, ())
+_Point = tuple[str, tuple[int, ...]]
+"""A node by its name and indices; the ground has none."""
+_GROUND = "", ()
 
 
 def from_stores(network: Network) -> Network:
-    """Traced positions of points that stores hold to the ground, as displacements of these stores."""
-    points = _Points(network, [[s for s in _springs(network, frozenset()) if not s.loops]])
+    """Traced positions of points that single stores hold to the ground, as displacements of these stores."""
+    sizes, over = Sizes(network), dict[_Point | None, Node]({_GROUND: ex.const(0.0)})
+    springs = [j for j in _springs(network, frozenset()) if not j.loops]
+    left = [(_point(j.plus, sizes), _point(j.minus, sizes), j.content) for j in springs]
+    number = 0
+    while number < len(over):
+        number = len(over)
+        for plus, minus, content in left:
+            if minus in over and plus is not None:
+                over.setdefault(plus, ex.add(over[minus], content))
+            elif plus in over and minus is not None:
+                over.setdefault(minus, ex.sub(over[plus], content))
 
     def read(root: Node) -> Node:
-        read = [n for n in ex.topological([root]) if n.op == "var" and n.data[1:] == ("nq", 0)]
-        change = {n: path for n in read if (path := points.over_ground(n)) is not None}
+        points = {n: _point(Terminal(n.data[0], n.args), sizes) for n in _positions([root])}
+        change = {n: over[point] for n, point in points.items() if point in over}
         return ex.substitute(root, change) if change else root
 
     return rewritten(network, read, TRACED)
 
 
+def _positions(roots: Sequence[Node]) -> list[Node]:
+    """Positions of points that are read."""
+    return [n for n in ex.topological(roots) if n.op == "var" and n.data[1:] == ("nq", 0)]
+
+
+def _point(end: Terminal, sizes: Sizes) -> _Point | None:
+    """A single point; None where its indices are not known."""
+    if end.node is None:
+        return _GROUND
+    try:
+        return end.node, tuple(sizes.affine(a, (), None).offset.value for a in end.at)
+    except (ModelError, KeyError):
+        return None
+
+
 @dataclass(frozen=True, slots=True)
 class _Join:
-    """Points of a family joined with others: the position of plus over minus; branch: whose displacement it is."""
+    """Points of a family joined with others: the displacement of plus over minus, and whose it is."""
 
+    name: str
+    content: Node
     plus: Terminal
     minus: Terminal
-    content: Node
     loops: tuple[Loop, ...]
     place: Place
-    branch: Branch | None = None
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Families of nodes at the ends; the ground is none."""
+        return tuple(end.node for end in (self.plus, self.minus) if end.node is not None)
 
 
-def _springs(network: Network, wanted: frozenset[Wanted]) -> list[_Join]:
+def _springs(network: Network, wanted: frozenset[Wanted]) -> Iterator[_Join]:
     """Branches between common-flow nodes whose displacement is an unknown of the start."""
-    found = []
     for b in network.branches:
         stores = b.kind == "potential"
         if b.domain.common == "flow" and b.plus and b.minus and (stores or (b.name, "bq") in wanted):
             content = ex.var(b.name, "bq", *b.at) if stores else quadrature(b.name, b.at)
-            found.append(_Join(b.plus, b.minus, content, b.loops, b.place, b))
-    return found
+            yield _Join(b.name, content, b.plus, b.minus, b.loops, b.place)
 
 
-class _Points:
-    """The common-flow nodes of a network in a forest, joined in stages; item 0 is the ground.
-
-    What indices do not tell (no i + c) joins nothing.
+def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
+    """Positions as unknowns of the start, in parts where displacements are said or stores may stand in loops; wanted:
+    displacements with quadratures.  Where the text tells every position of a part, contents begin at the differences.
     """
+    springs = tuple(_springs(network, wanted))
+    read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
+    said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")}
+    parts = _parts(network, springs, said | {name for name, _ in wanted})
+    told = _told(network, springs, parts, said)
 
-    def __init__(self, network: Network, stages: Sequence[Sequence[_Join]], about: Sequence[Initial] = ()) -> None:
-        """Cells are cut where a statement about nodes begins or ends."""
-        self.sizes = Sizes(network)
-        self.nodes = [n for n in network.nodes if n.domain.common == "flow"]
-        self._item = {n.name: k for k, n in enumerate(self.nodes, 1)}
-        self._joins = [j for stage in stages for j in stage]
-        items = [(), *(self.sizes.box(n.shape, n.place) for n in self.nodes)]
-        number = itertools.count()
-        links = [[link for j in stage if (link := self._link(j, next(number)))] for stage in stages]
-        self.forest = IndexForest(items, links, [cut for i in about for cut in self._cuts(i)])
+    def position(end: Terminal) -> Node:
+        if end.node in told:
+            return told[end.node].value
+        return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
 
-    def _link(self, join: _Join, owner: int) -> tuple[Link, Node] | None:
-        try:
-            within = ranges_of(join.loops, self.sizes, join.place)
-            plus, minus = (self._end(t, within, join.place) for t in (join.plus, join.minus))
-        except (ModelError, KeyError):
-            return None
-        box = tuple(within.values())
-        over = dict(zip(map(ex.index, within), indices(box), strict=True))
-        return (Link(box, plus, minus, owner=owner), ex.substitute(join.content, over)) if box_size(box) else None
+    def begun(join: _Join) -> Initial:
+        apart = ex.sub(position(join.plus), position(join.minus))
+        if all(name in told for name in join.nodes):
+            return Initial(join.content, apart, all(told[n].fixed for n in join.nodes), join.loops, join.place)
+        return Initial(ex.sub(join.content, apart), ex.const(0.0), True, join.loops, join.place, join.name)
 
-    def _end(self, terminal: Terminal, within: Ranges, place: Place | None) -> End:
-        number, item = {name: k for k, name in enumerate(within)}, self._item[terminal.node] if terminal.node else 0
-        at = (self.sizes.affine(a, within, place) for a in terminal.at)
-        return End(item, tuple((None if a.loop is None else number[a.loop], a.offset) for a in at))
+    def positioned(root: Node) -> Node:
+        found = _positions([root])
+        return ex.substitute(root, {n: position(Terminal(n.data[0], n.args)) for n in found}) if found else root
 
-    def _cuts(self, initial: Initial) -> Iterator[Cut]:
-        within = ranges_of(initial.loops, self.sizes, initial.place)
-        for d, i in enumerate(self.sizes.reach(initial.target.args, within, initial.place)):
-            yield from ((self._item[initial.target.data[0]], d, cut) for cut in (i.first, i.last.plus(1)))
-
-    def over_ground(self, node: Node) -> Node | None:
-        """The position of a single point; None where nothing joins it to the ground."""
-        try:
-            return self.forest.between(self._end(Terminal(node.data[0], node.args), {}, None), End(0, ()))
-        except (ModelError, KeyError):
-            return None
-
-    def left(self) -> list[_Join]:
-        """What closes loops in a pattern that index classes cannot hold."""
-        return [self._joins[link.owner] for link in self.forest.refused] if self.forest.misses_loops() else []
-
-    def loops(self) -> Iterator[tuple[_Join, tuple[Loop, ...], Node]]:
-        """Who closes loops, where, and the position of plus over minus that others tell."""
-        for owner, box, around in self.forest.loops:
-            join = self._joins[owner]
-            names = [loop.index for loop in join.loops]
-            back = dict(zip(indices(box), map(ex.index, names), strict=True))
-            yield join, narrowed(join.loops, dict(zip(names, box, strict=True))), ex.substitute(around, back)
+    nodes = [n for n in network.nodes if n.name in parts and n.name not in told]
+    points = (_point_of(n) for n in network.nodes if n.name in parts and (n.name, "nq") in wanted)
+    left = tuple(i for i in network.initials if i not in told.values())
+    kept = rewritten(replace(network, initials=left), positioned, ("initials",)).initials
+    return replace(
+        network,
+        positions=tuple(State(f"{n.name}.start", n.shape, n.domain.displacement, n.place) for n in nodes),
+        initials=(
+            *(i for i in kept if not is_position(i.target, stores_of(network))),
+            *(begun(join) for join in (*springs, *points) if any(name in parts for name in join.nodes)),
+        ),
+    )
 
 
-def with_contents(network: Network, wanted: frozenset[Wanted]) -> Network:
-    """Initial positions as initial displacements between them; wanted: displacements with quadratures."""
-    found = _Contents(network, wanted)
-    stores = stores_of(network)
-    kept = tuple(i for i in network.initials if not is_position(i.target, stores))
-    return replace(network, initials=(*found.guesses(), *kept, *found.loops()))
-
-
-class _Contents:
-    """What the initial positions of one network say."""
-
-    def __init__(self, network: Network, wanted: frozenset[Wanted]) -> None:
-        self.network, self.wanted, self.sizes = network, wanted, Sizes(network)
-        self.said: dict[Wanted, list[Initial]] = {}
-        for initial in network.initials:
-            if initial.target.op == "var" and not initial.target.data[2]:
-                kind = "bq" if initial.target.data[1] == "be" else initial.target.data[1]
-                self.said.setdefault((initial.target.data[0], kind), []).append(initial)
-        self.about = [i for n in network.nodes for i in self.said.get((n.name, "nq"), ())]
-        self.known = [_Join(_at(i), _GROUND, i.value, i.loops, i.place) for i in self.about if i.fixed]
-        self.springs = _springs(network, wanted)
-
-    def guesses(self) -> Iterator[Initial]:
-        """Contents that nothing is written of, by the positions of their ends, of which something is."""
-        for moved in tuple(self._moved()):
-            self.said.setdefault((moved.target.data[0], "nq"), []).append(moved)
-        for j in self.springs:
-            within = ranges_of(j.loops, self.sizes, j.place)
-            ends = [self._start(t, within) for t in (j.plus, j.minus)]
-            if ends == [None, None] or j.branch is None:
-                continue
-            value = ex.sub(*(end or ex.const(0.0) for end in ends))
-            for rest in untold(self.said.get((j.branch.name, "bq"), ()), j.branch.at, within, self.sizes):
-                yield Initial(j.content, value, False, narrowed(j.loops, rest), j.place)
-
-    def _start(self, point: Terminal, within: Ranges) -> Node | None:
-        """The initial position of points over ranges, as far as it is written."""
-        return initially(self.said.get((str(point.node), "nq"), ()), point.at, within, self.sizes)
-
-    def loops(self) -> Iterator[Initial]:
-        """Contents around the loops that fixed positions, quadratures and stores close: what they must be."""
-        read = [_read(n, self.sizes) for n in self.network.nodes if (n.name, "nq") in self.wanted]
-        points = _Points(self.network, [self.known, read, self.springs])
-        told = any((j.branch.name, "bq") in self.said for j in self.springs if j.branch is not None)
-        for j in points.left() if told or self.about else ():
-            (found,) = unrolled("a loop in which contents are said joins nodes along two offsets", j.place).diagnostics
-            raise ModelError([replace(found, help="formulation lagrangian, hamiltonian")])
-        for join, loops, around in points.loops():
-            if join.branch is not None:
-                known = not ex.variables(around)
-                target, value = (join.content, around) if known else (ex.sub(join.content, around), ex.const(0.0))
-                yield Initial(target, value, True, loops, join.place)
-
-    # -- moved guesses --------------------------------------------------------------------------------------
-
-    def _told(self, *, fixed: bool) -> Iterator[_Join]:
-        """Contents that the text says, as numbers."""
-        for j in self.springs:
-            if j.branch is not None and j.branch.kind == "potential":
-                said = self.said.get((j.branch.name, "bq"), ())
-                numbers = [i for i in said if i.fixed == fixed and not ex.variables(i.value)]
-                for _, loops, content in told(j.branch, numbers, self.sizes):
-                    yield replace(j, loops=loops, content=content)
-
-    def _moved(self) -> Iterator[Initial]:
-        """Positions of points that contents join to others: guesses moved least, written ones less."""
-        told = [tuple(self._told(fixed=fixed)) for fixed in (True, False)]
-        if not any(told):
-            return
-        numbers = [j for j in self.known if not ex.variables(j.content)]
-        points = _Points(self.network, [numbers, *told], self.about)
-        for cells in points.forest.trees():
-            shift = self._shift(points, cells)
-            for cell in cells:
-                if cell[0]:
-                    node, box = points.nodes[cell[0] - 1], points.forest.box(cell)
-                    value = points.forest.along(cell, shift)
-                    target = ex.var(node.name, "nq", *indices(box))
-                    yield Initial(target, value, False, loops_over(box), node.place)
-
-    def _shift(self, points: _Points, cells: Sequence[Cell]) -> Node:
-        """What is added to the positions of a tree: the ground stands at zero, others have the guessed mean."""
-        forest, terms, weights = points.forest, [], []
-        for cell in cells:
-            if not cell[0]:
-                return ex.neg(forest.along(cell))
-            box = forest.box(cell)
-            guess = self._start(Terminal(points.nodes[cell[0] - 1].name, indices(box)), ranges_over(box))
-            weight = UNWRITTEN if guess is None else 1.0
-            total, number = forest.summed(cell, ex.sub(guess or ex.const(0.0), forest.along(cell)))
-            terms.append((weight, total))
-            weights.append((weight, number))
-        return ex.div(ex.linear(0.0, terms), ex.linear(0.0, weights))
-
-
-def _at(initial: Initial) -> Terminal:
-    return Terminal(initial.target.data[0], initial.target.args)
-
-
-def _read(node: NodeFamily, sizes: Sizes) -> _Join:
+def _point_of(node: NodeFamily) -> _Join:
     """Nodes at their quadratures over the ground."""
-    box = sizes.box(node.shape, node.place)
-    at = indices(box)
-    return _Join(Terminal(node.name, at), _GROUND, quadrature(node.name, at), loops_over(box), node.place)
+    loops, at = whole(node)
+    return _Join(node.name, quadrature(node.name, at), Terminal(node.name, at), Terminal(None, ()), loops, node.place)
+
+
+def _parts(network: Network, springs: Sequence[_Join], said: set[str]) -> dict[str, str]:
+    """Common-flow nodes, each with what stands for its part, of parts of which something is said, or in which stores
+    may stand in loops; said: nodes and branches.
+    """
+    parts, ends = Joined[str](), [(j.plus.node or "", j.minus.node or "", 1 + len(j.loops)) for j in springs]
+    looped = in_loops(ends)
+    for k, join in enumerate(springs):
+        said = said | set(join.nodes) if k in looped or join.name in said else said
+        if join.nodes:
+            parts.join(join.nodes[0], join.nodes[-1])
+    asked = {parts.first(name) for name in said}
+    heads = {n.name: parts.first(n.name) for n in network.nodes if n.domain.common == "flow"}
+    return {name: head for name, head in heads.items() if head in asked}
+
+
+def _told(
+    network: Network, springs: Sequence[_Join], parts: dict[str, str], said: set[str]
+) -> dict[str | None, Initial]:
+    """Positions by the text of single nodes, in parts of which it tells all of them and no content."""
+    found: dict[str | None, list[Initial]] = {}
+    for i in network.initials:
+        if i.target.op == "var" and i.target.data[1:] == ("nq", 0) and not ex.variables(i.value):
+            found.setdefault(i.target.data[0], []).append(i)
+    open_ = {parts[n.name] for n in network.nodes if n.name in parts and (n.shape or len(found.get(n.name, ())) != 1)}
+    open_ |= {parts[name] for j in springs if j.name in said for name in j.nodes if name in parts}
+    return {name: items[0] for name, items in found.items() if name in parts and parts[name] not in open_}

@@ -13,7 +13,7 @@ from sysdyn.compiler.network.primal.bounds import Box, Sizes, without
 from sysdyn.compiler.network.primal.overlaps import ranges_of
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Loop, Network, State
+from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Loop, Network, NodeFamily, State
 from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import Place
 
@@ -51,7 +51,7 @@ def from_masses(network: Network) -> Network:
 
 def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
     """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of: a dynamic
-    variable NAME.q each, which begins as the displacement is written to begin.
+    variable NAME.q each.  That of a branch begins as written, that of a node at its position.
     """
     stores = stores_of(network)
     roots = ex.topological(expressions(network, "observations", "dynamics", "expectations"))
@@ -63,8 +63,7 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
 
     families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
     for n in network.nodes:
-        loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(n.shape))
-        families[n.name, "nq"] = [(loops, tuple(ex.index(x.index) for x in loops), n.domain, n.place)]
+        families[n.name, "nq"] = [(*whole(n), n.domain, n.place)]
     for b in network.branches:
         families.setdefault((b.name, "bq"), []).append((b.loops, b.at, b.domain, b.place))
     states, dynamics = [], []
@@ -73,7 +72,8 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
             shape = tuple((loop.first, loop.last) for loop in loops)
             states.append(State(f"{name}.q", shape, domain.displacement, place))
             dynamics.append(Dynamic(quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
-    starts = (i for i in network.initials if i.target.op == "var" and i.target.data in {(*w, 0) for w in wanted})
+    told = {(*w, 0) for w in wanted if w[1] == "bq"}
+    starts = (i for i in network.initials if i.target.op == "var" and i.target.data in told)
     begun = (replace(i, target=quadrature(i.target.data[0], i.target.args)) for i in starts)
     network = rewritten(network, read, (*TRACED, "dynamics"))
     found = replace(
@@ -83,6 +83,12 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
         initials=(*network.initials, *begun),
     )
     return found, frozenset(wanted)
+
+
+def whole(node: NodeFamily) -> tuple[tuple[Loop, ...], tuple[Node, ...]]:
+    """Loops over all points of a family, and their indices."""
+    loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(node.shape))
+    return loops, tuple(ex.index(x.index) for x in loops)
 
 
 def massive(network: Network) -> frozenset[str]:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
-from sysdyn.compiler.network.positions import from_stores, with_contents
+from sysdyn.compiler.network.positions import from_stores, with_positions
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadratures
 from sysdyn.compiler.network.stated import ALL, as_elements
@@ -47,7 +47,7 @@ def reflect(network: Network) -> Network:
     displacement or flow of a node or branch.
     """
     bare = from_masses(from_stores(grounded(as_elements(network, ALL))))
-    network = with_contents(*with_quadratures(bare))
+    network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
     return replace(relabelled(network), slopes=tuple(_moduli(network.couplings)), read=read)

@@ -49,7 +49,8 @@ def verify_network(network: Network, *, coordinates: bool = False) -> None:
 def _families(network: Network) -> dict[tuple[str, str], set[int]]:
     """Numbers of indices by (name, what it is): x coordinate, e implicit, s state, n node, b branch."""
     found: dict[tuple[str, str], set[int]] = {}
-    declared = {"x": network.coordinates, "e": network.unknowns, "s": network.states, "n": network.nodes}
+    declared = {"x": network.coordinates, "e": network.unknowns, "n": network.nodes}
+    declared["s"] = (*network.states, *network.positions)
     for what, items in declared.items():
         for item in items:
             found.setdefault((item.name, what), set()).add(len(item.shape))  # type: ignore[attr-defined]

@@ -427,3 +427,4 @@ class Network:
     levels: tuple[LevelChoice, ...] = ()
     authors: Mapping[str, tuple[tuple[str, Place], ...]] = field(default_factory=dict)  # elements of gathered families
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
+    positions: tuple[State, ...] = ()  # of points, at the start alone

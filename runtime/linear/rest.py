@@ -58,7 +58,7 @@ class Resting:
     def __init__(self, system: System, tangible: AbstractSet[str], t: float, first: Floats) -> None:
         self.system, self.tangible, self.t, self.first = system, tangible, t, first
         self.starter = Starter(system)
-        self.rows = self.starter.settled
+        self.rows = system.another("rated")
         self.n = system.form.written
         families = system.description.families
         owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: self.n]], dtype=bool)
@@ -84,7 +84,7 @@ class Resting:
             matrices = [self.rows.dense(self.jacobian(y)) for y in points]
         if not all(np.isfinite(m).all() for m in matrices):
             return np.zeros((flows.size, 0))
-        linear = np.all([(m == matrices[0]).all(axis=1) for m in matrices], axis=0) & self.starter.groups("phi")
+        linear = np.all([(m == matrices[0]).all(axis=1) for m in matrices], axis=0) & self.rows.of_groups("phi")
         stacked = np.vstack([m[self.use & ~linear][:, places] for m in matrices])
         row, _ = factors(stacked)
         return null_space(row[:, None] * stacked) if stacked.size else np.eye(flows.size)
@@ -96,7 +96,7 @@ class Resting:
 
     def _use(self) -> Mask:
         """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
-        use = self.starter.groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda").copy()
+        use = self.rows.of_groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda").copy()
         use[self.rows.held[0]] = True
         grows = quadratures(self.system, self.tangible) & (self.system.kinds[: self.n] == "s")
         for group, family, first in self.rows.form.groups:

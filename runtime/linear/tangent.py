@@ -128,16 +128,16 @@ class Given:
 def rows_at(system: System, state: ConsistentState) -> Rows:
     """Every row that holds at consistent states, linearised; system: the form as written."""
     starter = Starter(system)
-    if max(starter.first, starter.settled.rows) > LARGEST:
-        raise NoLinearisation(
-            f"{starter.first} unknowns and rates are more than {LARGEST}, up to which full matrices are taken"
-        )
     x = starter.unknowns(state.t, state.y, state.yd)
+    if max(x.size, starter.settled.rows) > LARGEST:
+        text = f"{x.size} unknowns and rates are more than {LARGEST}, up to which full matrices are taken"
+        raise NoLinearisation(text)
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
     if not np.isfinite(full).all():
         raise NoLinearisation("the slopes of the equations are no numbers there")
-    return Rows(starter, full[:, : starter.first], starter.every & ~starter.groups("initial"))
+    as_written = np.delete(full, np.s_[system.form.written : starter.n], axis=1)
+    return Rows(starter, as_written, starter.every & ~starter.groups("initial"))
 
 
 def _tangent(g: Floats, by_column: Floats) -> tuple[Floats, Floats]:
@@ -164,7 +164,7 @@ def _null_space(matrix: Floats) -> Floats:
 def reduced(given: Given) -> Reduced:
     """The reduction.  Raises NoLinearisation."""
     rows, system, loose = given.rows, given.system, given.loose
-    starter, n = rows.starter, rows.starter.n
+    starter, n = rows.starter, system.form.written
     g = rows.jacobian[rows.holds]
     tangent, moves = _tangent(g, factors(g)[1])
     candidates = candidates_of(system, given.state, n)
@@ -199,7 +199,7 @@ def widely_reduced(given: Given) -> Reduced | None:
     g = rows.jacobian[rows.holds]
     if g.shape[1] > WIDEST:
         return None
-    known = candidates_of(system, given.state, starter.n)
+    known = candidates_of(system, given.state, system.form.written)
     shown = system.kinds[known] == "q"
     groups = (known[loose[known]], known[~shown & ~loose[known]], known[shown & ~loose[known]])
     units = factors(g)[1]
@@ -323,8 +323,8 @@ def _eliminated(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> Floats:
 
 def _rates(starter: Starter, system: System, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
     """Place in z of the rate of each state: the flow of a displacement, else the rate itself."""
-    at = np.full(starter.n, -1, dtype=np.int64)
-    at[starter.rates] = starter.n + np.arange(starter.rates.size)
+    at = np.full(system.form.written, -1, dtype=np.int64)
+    at[starter.rates] = at.size + np.arange(starter.rates.size)
     at[system.form.k_q] = system.form.k_f
     return at[chosen]
 
@@ -353,7 +353,7 @@ def _without_rates_of_inputs(
 ) -> Reduced:
     """The matrices of variations `moved` [z, states and inputs and their rates]."""
     starter, system, inputs, out = given.rows.starter, given.system, given.names, given.out
-    states, n = chosen.size, starter.n
+    states, n = chosen.size, system.form.written
     yd = np.zeros((n, moved.shape[1]), dtype=moved.dtype)
     yd[starter.rates] = moved[n:]
     yd[system.form.k_q] = moved[system.form.k_f]

@@ -24,7 +24,11 @@ Shape = tuple[tuple[int, int], ...]
 Index = tuple[int, int, int]
 """(loop, slot, constant): the value is (loop variable or 0) + (ix[slot] or 0) + constant; loop, slot -1: none."""
 
-KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "audit")
+KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "start", "slack", "unsaid", "audit")
+START = ("start", "slack", "unsaid")
+"""Kinds of the start alone: positions; what guesses miss, of the text and of zero where the text says nothing."""
+BESIDE = (*START, "audit")
+"""Kinds behind the unknowns as written."""
 BASE = {
     "dynamics_rate": "dynamics",
     "phi_reaction": "dynamics",
@@ -98,7 +102,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class RowFamily:
-    """Rows of one label.  name, stored, rate: of rows of block observe; fixed, written, content: of block initial."""
+    """Rows of one label.  name, stored, rate: of rows of block observe; content: of block initial."""
 
     block: str
     label: str
@@ -111,8 +115,6 @@ class RowFamily:
     name: str
     stored: bool
     rate: bool
-    fixed: bool
-    written: bool
     content: bool
     elements: Elements = ()
 
@@ -251,8 +253,6 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
         name=str(value.get("name") or label),
         stored=bool(value.get("stored", True)),
         rate=bool(value.get("rate", False)),
-        fixed=bool(value.get("fixed", True)),
-        written=bool(value.get("written", True)),
         content=bool(value.get("content", False)),
         elements=value.get("elements", ()),
     )

@@ -12,13 +12,13 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
   constraints   what holds between displacements, flows and momenta alone (no rows q' - f)
   settled   all rows that hold at a consistent point: as written and hidden (no rows q' - f)
   rated     the same and dynamics_rate: what has no inertia follows from the rate of its balance
-  start     the same and the block `initial`
+  start     the same and the block `initial`; unknowns of the start alone
 """
 
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.runtime.model.description import BASE, SCALE, Description, Ints, RowFamily
+from sysdyn.runtime.model.description import BASE, BESIDE, SCALE, START, Description, Ints, RowFamily
 from sysdyn.runtime.model.failures import ContractError, RowLabel
 from sysdyn.values import dataclass
 
@@ -91,8 +91,8 @@ class Planned:
 class Form:
     """A choice of calls with the layout of y and of the rows.
 
-    written: unknowns as written (nu stand behind them); at: places of the families, audit families behind
-    the written ones (`extended` in all); kind: (kind, number) of unknowns one after the other; k_row, k_q, k_f: the
+    written: unknowns as written (nu, and those of the start alone, stand behind them); at: places of the families,
+    audit families behind all (`extended`); kind: (kind, number) of unknowns one after the other; k_row, k_q, k_f: the
     rows q' - f;
     groups: (name of the group, row family, first row), ascending; scales: calls of the scale blocks of steep rows.
     """
@@ -132,7 +132,8 @@ class Form:
 
 def unknown_name(description: Description, form: Form, place: int) -> str:
     """Name of the unknown at a place of y."""
-    for k in reversed(np.flatnonzero(form.at <= place).tolist() if place < form.written else []):
+    known = place < form.written or form.name == "start"
+    for k in reversed(np.flatnonzero(form.at <= place).tolist() if known else []):
         family = description.families[k]
         if family.kind != "audit" and place < form.at[k] + family.size:
             return family.named(place - int(form.at[k]))
@@ -150,20 +151,23 @@ def nu_name(kappa: str) -> str:
     return f"{kappa.removesuffix('.multiplier')}.nu"
 
 
-def _layout(description: Description) -> tuple[Ints, list[tuple[str, int]], int, int]:
-    """At (audit families behind the others), kinds and numbers of unknowns, their number, with the audit families."""
-    at = np.zeros(len(description.families), dtype=np.int32)
+def _layout(description: Description, others: tuple[str, ...]) -> tuple[Ints, list[tuple[str, int]], int, int]:
+    """At (these kinds behind those as written, others of BESIDE nowhere), kinds and numbers of unknowns as written,
+    their number, that of all.
+    """
+    at = np.full(len(description.families), NOWHERE, dtype=np.int32)
     kinds: list[tuple[str, int]] = []
     end = 0
     for k, family in enumerate(description.families):
-        if family.kind != "audit":
+        if family.kind not in BESIDE:
             at[k] = end
             kinds.append((family.kind, family.size))
             end += family.size
     written = end
-    for k in description.families_of("audit"):
-        at[k] = end
-        end += description.families[k].size
+    for kind in others:
+        for k in description.families_of(kind):
+            at[k] = end
+            end += description.families[k].size
     return at, kinds, written, end
 
 
@@ -218,7 +222,8 @@ def _leveled(
 
 def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
-    at, kind, written, extended = _layout(description)
+    own = START if name == "start" else ()
+    at, kind, written, extended = _layout(description, (*own, "audit"))
     unknowns = written
     if "kinematics" not in description.layouts:  # the same in every form
         description.layouts["kinematics"] = _kinematics(description, at)
@@ -260,6 +265,10 @@ def plan(description: Description, name: str) -> Form:
             calls.append(Planned(block, at, tables[group]))
             if block + SCALE in description.blocks:
                 scales.append(Planned(block + SCALE, at, tables[group]))
+    for one in own:
+        size = sum(description.families[k].size for k in description.families_of(one))
+        kind.append((one, size))
+        unknowns += size
     calls, number = _leveled(calls, level, description.rows, number)
     return Form(
         name=name,

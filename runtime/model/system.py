@@ -516,9 +516,10 @@ class System:
     def _are(self, kinds: tuple[str, ...]) -> Mask:
         mask = np.zeros(self.unknowns, dtype=bool)
         for family, first in zip(self.description.families, self.form.at, strict=True):
-            if family.kind in kinds and family.kind != "audit":
+            if family.kind in kinds and 0 <= first < self.unknowns and family.kind != "audit":
                 mask[first : first + family.size] = True
-        mask[self.form.written :] = "nu" in kinds
+        if self.form.name != "start":
+            mask[self.form.written :] = "nu" in kinds
         return mask
 
     def of_groups(self, *names: str) -> Mask:
@@ -540,7 +541,7 @@ class System:
     def _family_of(self) -> Ints:
         found = np.full(self.unknowns, -1, dtype=np.int32)
         for k, family in enumerate(self.description.families):
-            if family.kind != "audit":
+            if self.form.at[k] >= 0 and family.kind != "audit":
                 found[self.form.at[k] : self.form.at[k] + family.size] = k
         return read_only(found)
 

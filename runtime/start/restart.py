@@ -125,7 +125,7 @@ class Restart:
         guess = starter.unknowns(t, np.where(near, 0.0, y), np.zeros_like(yd))
         # a rate of a multiplier that is zero because its constraint does not hold stays zero
         idle, state = np.zeros((2, guess.size), dtype=bool)
-        idle[starter.n : starter.first] = np.isin(starter.rates, starter.system.idle_multipliers())
+        idle[starter.n :] = np.isin(starter.rates, starter.system.idle_multipliers())
         guess[idle], state[: y.size] = 0.0, self.state
         for held in (state, np.zeros_like(state)):
             found = behind(starter, t, guess, ~(idle | held))

@@ -27,7 +27,6 @@ from sysdyn.runtime.numerics.least_change import (
     solve,
     stepped,
 )
-from sysdyn.runtime.numerics.points import distinct
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.values import dataclass
 
@@ -100,7 +99,7 @@ def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     several roots that one is meant.
     """
     own = free & ~starter.written & (np.arange(free.size) < starter.n)
-    return _onto(starter, t, guess, guess, rows=starter.guessed & ~starter.unsaid, free=own)
+    return _onto(starter, t, guess, guess, rows=starter.told, free=own)
 
 
 def _rescaled(
@@ -204,7 +203,7 @@ def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         x = found.x
     # what round-off left is no magnitude; rates follow from the rest by linear rows
     x = starter.without_noise(x, starter.scale(t, x))
-    x[starter.n : starter.first] = guess[starter.n : starter.first]
+    x[starter.n :] = guess[starter.n :]
     starter.work = own
     return _rescaled(starter, t, x, guess, free)
 
@@ -287,8 +286,8 @@ def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
     """Labels of the constraint rows that an unknown stands in."""
     found: list[str] = []
     values = starter.jacobian(t, x)
-    hit = distinct(starter.rows[(starter.columns == place) & (values != 0.0)])
-    for row in hit[~starter.unsaid[hit]]:
+    silent = starter.rows[starter.moves("unsaid")[starter.columns]]
+    for row in np.setdiff1d(starter.rows[(starter.columns == place) & (values != 0.0)], silent):
         label = starter.settled.row_label(int(row))
         base = label.kind.split("_")[0]
         text = f"{base} {label.label}"
@@ -302,18 +301,14 @@ Moved = tuple[str, float, float, str]
 
 def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[Moved]:
     """Written guesses, of unknowns and by expressions, that the start does not meet."""
-    given, n = starter.given, starter.n
-    change, size = x.copy(), scale.copy()
-    change[:n] -= given.guess
-    size[:n] = np.maximum(np.abs(given.guess), 1e-3 * scale[:n])
-    told = starter.written & (np.abs(change) > NOTED * size)
-    told[:n] &= ~given.fixed
+    guess, missed = starter.guess, starter.moves("slack")
+    size = np.where(missed, scale, np.maximum(np.abs(guess), 1e-3 * scale))
+    told = starter.written & starter.free & (np.abs(x - guess) > NOTED * size)
     for place in np.flatnonzero(told)[:100].tolist():
-        if place >= n:
+        if missed[place]:
             yield _missed(starter, t, x, place)
         else:
-            guess = float(given.guess[place])
-            yield starter.system.name(place), guess, float(x[place]), _asked(starter, t, x, place)
+            yield starter.settled.name(place), float(guess[place]), float(x[place]), _asked(starter, t, x, place)
 
 
 def _missed(starter: Starter, t: float, x: Floats, place: int) -> Moved:
@@ -321,12 +316,12 @@ def _missed(starter: Starter, t: float, x: Floats, place: int) -> Moved:
 
     Where a row guesses several unknowns at once its label stands for them, and 0 for what it would miss.
     """
-    row, values, miss = starter.missed[place - starter.first], starter.jacobian(t, x), float(x[place])
-    mine = (starter.rows == row) & (starter.columns < starter.n) & (values != 0.0)
+    row, values, miss = starter.rows[starter.columns == place][0], starter.jacobian(t, x), float(x[place])
+    mine = (starter.rows == row) & (starter.columns != place) & (values != 0.0)
     own = np.flatnonzero(mine & ~starter.written[starter.columns])
     if own.size == 1:
         k = int(starter.columns[own[0]])
-        return starter.system.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, t, x, k)
+        return starter.settled.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, t, x, k)
     label = starter.settled.row_label(int(row))
     return f"guess of line {label.line}", 0.0, miss, "what its two sides differ by"
 
@@ -353,7 +348,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     contradict = bool(scaled[order[0]] > OWN)
     if found and contradict:
         scale = starter.scale(t, freed.x)
-        change = np.abs(freed.x - guess)[: starter.n] / scale[: starter.n] * starter.given.fixed
+        change = np.where(starter.free, 0.0, np.abs(freed.x - guess) / scale)
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
         candidates = tuple(dict.fromkeys(starter.given.label(k) for k in places))
     kind = "fixed"
@@ -383,21 +378,20 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     system = system if system.form.name == "3" else system.another("3")
     starter = Starter(system)
     starter.work = Work(until=until)
-    guess = np.concatenate([starter.given.guess, np.zeros(starter.equations.unknowns - starter.n)])
+    guess = starter.guess
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
-        y = np.where(system.are(*STATE, "e")[: starter.n], near.y, starter.given.guess)
-        guess = starter.unknowns(t0, y, np.zeros(starter.n))
-    free = np.append(~starter.given.fixed, np.ones(guess.size - starter.n, dtype=bool))
-    guess = _guess(starter, t0, guess, free)
-    best, strategy = _attempt(starter, t0, guess, free)
+        y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
+        guess = starter.unknowns(t0, y, np.zeros(y.size))
+    guess = _guess(starter, t0, guess, starter.free)
+    best, strategy = _attempt(starter, t0, guess, starter.free)
     if not strategy:
-        raise _explain(starter, t0, guess, free, best)
+        raise _explain(starter, t0, guess, starter.free, best)
     y, yd = starter.expand(best.x)
     moved = tuple(_moved(starter, t0, best.x, starter.scale(t0, best.x)))
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
     zeros = (np.abs(best.x) <= EXACT * largest)[: y.size]
     if best.x.size > LARGE:
         starter.forget()
-        del starter, guess, free
+        del starter, guess
         system.trim()
     return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros)

@@ -1,10 +1,10 @@
 """What a consistent start is sought in: unknowns, equations, given values, magnitudes and weights.
 
-Unknowns: y as written and the derivatives that the settled rows read; equations: all settled rows (as written,
-phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.
+Unknowns: y as written, those of the start alone, the derivatives that the settled rows read; equations: all settled
+rows (as written, phi_rate, phi_acceleration, psi_rate, momentum_rate, gamma_rate) and the block `initial`.
 
-A guess of an expression, or of contents that follow from several coordinates, has a row of block `initial` and an
-unknown of its own, what the row misses; these move least, and coordinates follow contents.
+A guess of an expression, or of contents that follow from several coordinates, is a row of block `initial` that reads an
+unknown of the start alone, what it misses; these move least, and coordinates follow contents.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
-from sysdyn.runtime.model.description import Floats, Initial, Ints
+from sysdyn.runtime.model.description import START, Floats, Initial, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work
+from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work, least_norm
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
-STATE = ("q", "f", "p", "s")
+STATE = ("q", "f", "p", "s", *START)
 WEIGHT = {"unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
 FLOOR = 1e-5
@@ -54,9 +54,9 @@ class _Given:
 
 def _given(system: System) -> _Given:
     """The initial values of a text.  InconsistentStart where two fixed ones differ."""
-    n, stated = system.form.written, sorted(system.description.initial, key=lambda item: item.fixed)
+    n, stated = system.unknowns, sorted(system.description.initial, key=lambda item: item.fixed)
     said = [(item, system.form.at[item.family] + item.positions) for item in stated]
-    found = _Given(np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), said)
+    found = _Given(np.zeros(n), np.zeros(n, dtype=bool), system.are("slack").copy(), said)
     for item, own in said:
         found.guess[own] = item.values
         found.fixed[own] |= item.fixed
@@ -96,8 +96,7 @@ def remembered(
 class Starter:
     """The equations of the start of one model (t0 apart), for one search: nothing but t and x changes.
 
-    Guessed expressions hold but for an unknown of their own each, behind those of y and its rates; sums of balances
-    without inertia have their rates.
+    Sums of balances without inertia have their rates.
     """
 
     def __init__(self, system: System) -> None:
@@ -106,13 +105,10 @@ class Starter:
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
-        self.given = _given(system)
+        self.given = _given(settled)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
-        self.n, self.first = known.n, known.first
-        self.rates, self.missed = known.rates, known.missed
-        self.guessed, self.unsaid = known.guessed, known.unsaid
-        self.measured = known.measured
+        self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
         self.rows, self.columns = known.rows, known.columns
@@ -123,9 +119,9 @@ class Starter:
             self.every[self._places] = True
             self.rows = np.append(self.rows, np.repeat(self._places, known.unknowns))
             self.columns = np.append(self.columns, np.tile(np.arange(known.unknowns), self._places.size))
-        self.written = np.concatenate(
-            [self.given.written, np.zeros(self.rates.size, dtype=bool), ~self.unsaid[self.missed]]
-        )
+        self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
+        self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
+        self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
@@ -146,7 +142,7 @@ class Starter:
         form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
         inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
         inertial[self._flow] = True
-        held = np.zeros(self.first + self.missed.size, dtype=bool)
+        held = np.zeros(self.equations.unknowns, dtype=bool)
         held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
         known = self.equations
         held[known.columns[known.structural & ~self.groups("phi")[known.rows]]] = False
@@ -155,15 +151,23 @@ class Starter:
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
         y, yd = x[: self.n].copy(), np.zeros(self.n)
-        yd[self.rates] = x[self.n : self.first]
+        yd[self.rates] = x[self.n :]
         form = self.system.form
         yd[form.k_q] = y[form.k_f]
-        return y, yd
+        return y[: form.written], yd[: form.written]
 
     def unknowns(self, t: float, y: Floats, yd: Floats) -> Floats:
-        """X of y, yd, the inverse of `expand`: guessed expressions miss what they do there."""
-        x = np.concatenate([y, yd[self.rates], np.zeros(self.missed.size)])
-        x[self.first :] = self.residual(t, x)[self.missed]
+        """X of y, yd, the inverse of `expand`: positions are those of the contents, guessed expressions miss what they
+        do there.
+        """
+        x = np.concatenate([y, self.given.guess[y.size :], yd[self.rates]])
+        at = np.flatnonzero((self.moves("start") & self.free)[self.columns])
+        if at.size:
+            aim = np.where(np.isin(np.arange(self.settled.rows), self.rows[at]), -self.residual(t, x), 0.0)
+            entries = self.rows[at], self.columns[at] - y.size, self.jacobian(t, x)[at]
+            x[y.size : self.n] += least_norm((aim.size, self.n - y.size), entries, aim)
+        rows, missed = self.equations.guessed
+        x[missed] = self.residual(t, x)[rows]
         return x
 
     def residual(self, t: float, x: Floats) -> Floats:
@@ -223,10 +227,18 @@ class Starter:
         """Rows of the named groups; read-only."""
         return self.settled.of_groups(*names)
 
+    @property
+    def told(self) -> Mask:
+        """Rows by which the text guesses expressions [rows]."""
+        rows, missed = self.equations.guessed
+        found = np.zeros(self.settled.rows, dtype=bool)
+        found[rows[self.written[missed]]] = True
+        return found
+
     def moves(self, *kinds: str) -> Mask:
         """Unknowns of y of these kinds [unknowns]."""
         found = np.zeros(self.equations.unknowns, dtype=bool)
-        found[: self.n] = self.system.are(*kinds)[: self.n]
+        found[: self.n] = self.settled.are(*kinds)
         return found
 
     def _floating(self, unsettled: Places) -> Floats:
@@ -262,13 +274,13 @@ class Starter:
         Of a momentum and its flow the one that is written carries the state, else the momentum.
         """
         _, jyd = self.system.jacobian(t, *self.expand(x))
-        state = self.system.are(*STATE)[: self.n]
-        carries = self.system.differential(jyd)[: self.n] & state & ~self.measured
+        state = self.settled.are(*STATE)
+        carries = state & ~self.measured
+        carries[: self.system.unknowns] &= self.system.differential(jyd)
         carries |= self.given.written & state
         carries[np.where(self.given.written[self._flow], self._momentum, self._flow)] = False
         found = np.ones(x.size, dtype=bool)
         found[: self.n] = ~carries
-        found[self.first :] = False
         return found
 
     def weights(self, t: float, x: Floats, scale: Floats) -> Floats:
@@ -278,10 +290,10 @@ class Starter:
         weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
         content = scale.copy()
         if self.balanced:
-            inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))[: self.n]
-            content[: self.n] *= np.where(inert != 0.0, np.abs(inert), 1.0)
+            inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))
+            content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
-        measured[self.n : self.first] = 1.0  # rates have magnitudes of their own each
+        measured[self.n :] = 1.0  # rates have magnitudes of their own each
         return np.asarray(weight * measured)
 
     @functools.cached_property
@@ -292,12 +304,11 @@ class Starter:
         rows, families = self.system.description.rows, self.system.description.families
         groups = self.system.form.groups if self.balanced else ()
         effort = {rows[k].owner: rows[k].unit for group, k, _ in groups if group == "dynamics"}
-        kinds = {"q": "", "s": "", "f": "p"}
+        kinds = {"q": "", "s": "", "f": "p", "slack": "", "unsaid": ""}
         named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
         number: dict[str, int] = {}
-        of, missed = ([number.setdefault(s, len(number)) for s in names] for names in (named, self.equations.units))
-        of_y = np.array([*of, 0])[self.system.family_of[: self.n]]
-        return np.concatenate([of_y, np.full(self.rates.size, len(number)), missed]).astype(np.int32)
+        of_y = np.array([*(number.setdefault(s, len(number)) for s in named), 0])[self.settled.family_of]
+        return np.append(of_y, np.full(self.rates.size, len(number))).astype(np.int32)
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
@@ -312,27 +323,23 @@ class Starter:
         """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
         (rates of fast and slow stores 1e12 apart) where generous.
         """
-        known, found, nominal = self.equations, np.zeros(x.size), self.system.nominal
+        known, found, nominal = self.equations, np.zeros(x.size), self.settled.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self.residual(t, x)
-        told = np.where(np.isin(self.rows, self.missed) & np.isfinite(values), values, 0.0) if self.missed.size else 0.0
+        rows, missed = known.guessed
+        told = np.where(np.isin(self.rows, rows) & np.isfinite(values), values, 0.0) if missed.size else 0.0
         sized = values - told
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
         sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * self.generous, lib.pointer(found)
         if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
-        return self._of_one_unit(np.abs(told), found) if self.missed.size else found
-
-    def _of_one_unit(self, told: Floats, found: Floats) -> Floats:
-        """Magnitudes with those of what guesses miss: guesses of one unit are measured alike."""
-        family = self.equations.family
-        size, most = np.zeros(self.settled.rows), np.zeros(int(family.max(initial=0)) + 1)
-        text = self.columns < self.first
-        np.add.at(size, self.rows[text], (told * found[self.columns])[text])
-        np.maximum.at(most, family, size[self.missed])
-        found[self.first :] = most[family]
-        return np.where(found > 1e-280, found, 1.0)
+        if missed.size:  # what guesses of one unit miss is measured alike
+            found[missed] = 0.0
+            found[missed] = np.bincount(self.rows, np.abs(told) * found[self.columns], self.settled.rows)[rows]
+            found[missed] = self.largest_alike(found)[missed]
+            found = np.where(found > 1e-280, found, 1.0)
+        return found
 
 
 def problem_of(
@@ -347,7 +354,9 @@ def problem_of(
     if least:
         state = free & ~starter.following(t, x)
         unsaid = state & ~starter.written
-        levels = state & starter.written, unsaid & ~starter.idle, unsaid & starter.idle
+        placed = starter.moves("start")
+        said = state & starter.written
+        levels = said & ~placed, said & placed, unsaid & ~starter.idle, unsaid & starter.idle
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     return Problem(
         residual=lambda z: starter.residual(t, z),

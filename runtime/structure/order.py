@@ -27,16 +27,16 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     system: the form as written; tangible: coordinates whose displacement something depends on.
     """
     starter = Starter(system)
-    tangent = _tangent(starter, state, starter.every & ~starter.groups("initial"))
+    tangent = _tangent(starter, state, starter.every & ~starter.groups("initial"), np.ones_like(starter.free))
     if tangent is None:
         return None
-    kinds = system.kinds[: starter.n]
+    kinds, n = system.kinds, system.unknowns
     _, jyd = system.jacobian(state.t, state.y, state.yd)
-    moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd)[: starter.n])
+    moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd))
     families = system.description.families
-    owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: starter.n]], dtype=bool)
+    owners = np.array([families[int(k)].owner in tangible for k in system.family_of], dtype=bool)
     content = moving & ((kinds != "q") | owners)
-    return _rank(tangent[: starter.n][content]), _rank(tangent[: starter.n][moving])
+    return _rank(tangent[:n][content]), _rank(tangent[:n][moving])
 
 
 def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...]]:
@@ -44,25 +44,22 @@ def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...
     too large unknown: 0).
     """
     starter = Starter(system)
-    tangent = _tangent(starter, state, starter.every, starter.given.fixed)
+    tangent = _tangent(starter, state, starter.every, starter.free)
     if tangent is None:
         return 0, ()
     follows = starter.following(state.t, starter.unknowns(state.t, state.y, state.yd))
-    carries = np.flatnonzero(~follows[: starter.n] & ~starter.given.fixed)
+    carries = np.flatnonzero(starter.free & ~follows & ~starter.moves("slack", "unsaid"))
     missing = _rank(tangent[carries])
-    return missing, tuple(system.name(int(k)) for k in carries) if missing else ()
+    return missing, tuple(starter.settled.name(int(k)) for k in carries) if missing else ()
 
 
-def _tangent(starter: Starter, state: ConsistentState, rows: Mask, held: Mask | None = None) -> Floats | None:
-    """Orthonormal directions [unknowns and rates, freedoms] that the rows leave open, without the held unknowns of y;
-    None of models too large.
+def _tangent(starter: Starter, state: ConsistentState, rows: Mask, free: Mask) -> Floats | None:
+    """Orthonormal directions [unknowns and rates, freedoms] that the rows leave open to free unknowns; None of models
+    too large.
     """
     x = starter.unknowns(state.t, state.y, state.yd)
     if x.size > DENSE:
         return None
-    free = np.ones(x.size, dtype=bool)
-    if held is not None:
-        free[: starter.n] = ~held
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
     (full,) = equilibrated(full[rows][:, free])

@@ -175,7 +175,7 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
             there = solve(problem_of(starter, state.t, shaken, shaken, rows=rows, free=free), shaken)
             near = np.abs(there.x - x)[: size.size] <= NEAR * amplitude * size
             if there.residual < EXACT and near.all():
-                found.append(there.x[: starter.n])
+                found.append(there.x[: size.size])
                 break
     return found
 

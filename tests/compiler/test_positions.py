@@ -1,11 +1,12 @@
-"""Initial positions of points as contents of the springs between them: a triangle of ground, a and b."""
+"""Positions of points as unknowns of the start, between the springs of a triangle of ground, a and b."""
 
 from dataclasses import replace
 
 import pytest
 from catalogue import PLACE
 from networks import TRANSLATION, Net, of
-from sysdyn.compiler.network.positions import UNWRITTEN, from_stores, with_contents
+from sysdyn.compiler.network.positions import from_stores, with_positions
+from sysdyn.compiler.network.quadratures import with_quadratures
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Initial
 
@@ -23,31 +24,60 @@ def triangle(*said, **parts):
     return replace(net.network(**parts), initials=initials)
 
 
-def begun(*said):
-    """Guessed contents by name, and what fixed rows miss at contents."""
-    initials = with_contents(triangle(*said), frozenset()).initials
-    guesses = {i.target.data[0]: i.value.data for i in initials if not i.fixed}
-    rows = [x.sub(i.target, i.value) for i in initials if i.fixed]
-    return guesses, lambda **at: x.evaluate(rows, lambda n: at[n.data[0]])
+def rows(*said, **parts):
+    """What the rows between contents and positions miss, and what is said: (name, fixed, value)."""
+    found = with_positions(triangle(*said, **parts), frozenset())
+    apart = [i.target for i in found.initials if i.store]
+    told = [(i.target.data[0], i.fixed, i.value.data) for i in found.initials if not i.store]
+
+    def missed(**at):
+        return x.evaluate(apart, lambda n: at[n.data[0].partition(".")[0]])
+
+    return [p.name for p in found.positions], missed, told
 
 
-def test_springs_begin_at_the_difference_of_their_ends():
-    """a = 1 and b ~ 3: s = 1 is fixed with a, and t and u differ by it."""
-    guesses, missed = begun(("a", "nq", 1.0, True), ("b", "nq", 3.0, False))
-    assert guesses == {"s": 1.0, "t": 2.0, "u": 3.0}
-    assert missed(s=1.0, t=2.0, u=3.0) == [0.0, 0.0]
-    assert missed(s=1.5, t=2.0, u=3.0) == [0.5, 0.0]
-    assert missed(s=1.0, t=2.0, u=3.25)[1] in (0.25, -0.25)
+def test_contents_are_differences_of_positions():
+    """At a = 1 and b = 3 the springs hold s = a, t = b - a and u = b; what is said of a is said of its position."""
+    names, missed, told = rows(("a", "nq", 1.0, True))
+    assert names == ["a.start", "b.start"]
+    assert missed(a=1.0, b=3.0, s=1.0, t=2.0, u=3.0) == [0.0, 0.0, 0.0]
+    assert missed(a=1.0, b=3.0, s=1.5, t=2.25, u=2.0) == [0.5, 0.25, -1.0]
+    assert told == [("a.start", True, 1.0)]
 
 
-def test_a_content_that_is_said_moves_points_least():
-    """t = 1/2 pulls a and b apart alike; a guess of a holds it but for the weight of b, which is not said."""
-    guesses, missed = begun(("t", "bq", 0.5, True))
-    assert guesses == {"s": -0.25, "u": 0.25}
-    assert missed(s=-0.25, t=0.5, u=0.25) == [0.0, 0.0]
-    guesses, _ = begun(("t", "bq", 0.5, True), ("a", "nq", 1.0, False))
-    apart = 1.5 * UNWRITTEN / (1.0 + UNWRITTEN)  # b would go from 0 to 3/2
-    assert guesses == pytest.approx({"s": 1.0 - apart, "u": 1.5 - apart}, rel=1e-15)
+def test_where_all_positions_are_told_contents_are_numbers():
+    """a = 1 and b ~ 3: s is fixed with a, t and u are guessed; so a run beside others needs no search."""
+    names, _, told = rows(("a", "nq", 1.0, True), ("b", "nq", 3.0, False))
+    assert names == []
+    assert told == [("s", True, 1.0), ("t", False, 2.0), ("u", False, 3.0)]
+
+
+def test_what_is_said_of_contents_stays():
+    names, _, told = rows(("t", "bq", 0.5, True))
+    assert names == ["a.start", "b.start"]
+    assert told == [("t", True, 0.5)]
+
+
+def test_positions_are_asked_where_they_tell_anything():
+    """Springs in a tree of which nothing is said begin for themselves; a loop, or a word, asks for their part."""
+    net = Net()
+    for name in "abcd":
+        net.node(name, TRANSLATION)
+    for name, ends in (("s", ("a", "b")), ("t", ("c",)), ("u", ("d", "c"))):
+        net.C(name, 1.0, *ends)
+    bare = net.network()
+    assert not with_positions(bare, frozenset()).positions
+    said = replace(bare, initials=(Initial(of("d", "nq"), x.const(1.0), False, (), PLACE),))
+    assert [p.name for p in with_positions(said, frozenset()).positions] == ["c.start", "d.start"]
+    net.C("w", 1.0, "a", "b")
+    assert [p.name for p in with_positions(net.network(), frozenset()).positions] == ["a.start", "b.start"]
+
+
+def test_a_quadrature_begins_at_its_position():
+    network, wanted = with_quadratures(triangle(observe={"b": of("b", "nq")}))
+    found = with_positions(network, wanted)
+    (row,) = (i.target for i in found.initials if i.store == "b")
+    assert x.evaluate([row], {of("b.q", "s"): 2.0, x.var("b.start", "start"): 1.5}.get) == [0.5]
 
 
 def test_a_traced_position_is_that_of_springs_to_the_ground():

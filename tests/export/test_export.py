@@ -227,6 +227,33 @@ def test_starts_at_other_parameters(tmp_path, model, changed, index):
 
 
 @C
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_positions_tell_stretches_outside(tmp_path, backend):
+    """Two springs in series from a mass at a to the ground: 4 N/m and 2 N/m share a = 0.3 m as 0.1 m and 0.2 m."""
+    path = tmp_path / "series.sd"
+    path.write_text(
+        "model series {\n  param a = 0.1 m\n  node x, y: translation\n  M: kinetic(p = 1 kg*f) x\n"
+        "  K: potential(e = 4 N/m*q) x -> y\n  L: potential(e = 2 N/m*q) y -> ground\n  init x.q = a\n}\n"
+        "scene go of series { time 0 s to 1 s; trace K.q, L.q, x.q }\n"
+    )
+    folder = tmp_path / "out"
+    assert compiled(folder, str(path), "--scene", "go", "--formulation", "co_lagrangian", "--backend", backend) == 0
+    names = [item["name"] for item in json.loads((folder / "binding.json").read_text())["outputs"]]
+    if backend == "c":
+        outside = Outside(folder)
+        p = outside.changed(a=0.3)
+        code, *start = outside.start(p)
+        assert code == 0
+        w = outside.outputs(outside.t0, *start, p)[1]
+    else:
+        python = module(folder)
+        p = python.parameters(a=0.3)
+        w = python.sd_outputs(0.0, *python.sd_start(p), p)
+    found = dict(zip(names, w, strict=True))
+    assert found == pytest.approx({"K.q": 0.1, "L.q": 0.2, "x.q": 0.3}, abs=1e-9)
+
+
+@C
 def test_rates_of_a_blocked_diode_are_no_noise(tmp_path):
     """Its slope is 1e-50 A/V: whatever stands in the voltage's rate, the rows hold; 1e33 V/s stood there."""
     changed = {"K": 0.353, "th_0": 0.326}

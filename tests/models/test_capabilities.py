@@ -15,6 +15,7 @@ from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
 from sysdyn.cli.run.running import Request
 from sysdyn.compiler.binding.oracle import Oracle
+from sysdyn.compiler.forms.descriptor import BESIDE
 from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.dimensions import ENERGY, POWER
@@ -464,7 +465,7 @@ def test_43_consistent_initial_conditions():
             _, row = next(iter(solution(entry)))
             y, _ = state(prepared.compiled.form, row)
             kinds = [f.kind for f in prepared.compiled.form.families]
-            places = [k for k, kind in enumerate(kinds) if kind != "audit"]
+            places = [k for k, kind in enumerate(kinds) if kind not in BESIDE]
             assert found.state.y[places] == pytest.approx(y[places], rel=1e-8, abs=1e-9 * np.max(np.abs(y)))
 
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
 from random_positions import judged
+from start_strategies import prepared_start
+from sysdyn.runtime.events.observer import Observer
 
 MASSES = """
 model masses {{
@@ -198,6 +200,16 @@ def test_rows_joined_along_two_offsets_begin_alike(tmp_path, closing):
     trace = trace_of(tmp_path, text, formulation="co_lagrangian")
     start = {"S[2].q": -0.05, "S[3].q": 0.1, "Q[4].q": 0.0, "D[3].q": 0.05, "D[5].q": 0.0}
     assert {name: trace[name].values[0] for name in start} == pytest.approx(start, abs=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
+def test_a_guessed_content_goes_before_guessed_positions(formulation):
+    """Of x = 0.1, y = 0.7 and x - y = -0.4 the stretch stays and both points move alike, and the author is told."""
+    body = "K: potential(e = 3 N/m*q) x -> y\ninit x.q ~ 0.1 m\ninit y.q ~ 0.7 m\ninit K.q ~ -0.4 m"
+    _, begun = prepared_start(MASSES.format(body=body, more="", traced="x.q, y.q, K.q"), formulation, "go")
+    found = Observer(begun.system)(begun.state.t, *begun.state.for_form(begun.system))
+    assert found == pytest.approx([0.2, 0.6, -0.4], abs=1e-9)
+    assert [(name, guess) for name, guess, _, _ in begun.state.moved] == [("x.q", 0.1), ("y.q", 0.7)]
 
 
 def test_random_springs_partly_said_begin_with_the_stretches_of_the_closed_form():

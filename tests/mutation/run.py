@@ -48,7 +48,7 @@ LOWERING = (
     "model/mirror.py", "network/reflection.py", "network/positions.py", "network/quadratures.py",
     "network/primal/balances.py", "network/primal/choices.py", "network/primal/laws.py", "network/primal/series.py",
     "network/primal/potentials.py", "network/primal/reading.py", "network/primal/contents.py",
-    "network/primal/overlaps.py", "network/primal/unspecified.py", "network/primal/forest.py",
+    "network/primal/overlaps.py", "network/primal/unspecified.py",
 )  # fmt: skip
 SEEDS = (
     "dc_motor", "knife_edge", "pendulum", "lead_filter", "two_link_arm", "bead_rod", "electrical_transformer",

@@ -100,8 +100,9 @@ def test_the_written_state_moves_before_what_is_unsaid():
     x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
     free = np.append(~found.given.fixed, np.ones(x.size - found.n, dtype=bool))
     problem = problem_of(found, 0.0, x, x, rows=found.every, free=free, least=True)
-    written, unsaid, idle = (by_name(found, level) for level in problem.levels)
+    written, positions, unsaid, idle = (by_name(found, level) for level in problem.levels)
     assert {name for name, yes in written.items() if yes} == {"q_2", "f_1", "f_2"}
+    assert not any(positions.values())
     assert not any(unsaid.values())
     assert not any(idle.values())
 

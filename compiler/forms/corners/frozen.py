@@ -18,6 +18,7 @@ from dataclasses import replace
 from sysdyn.compiler.forms.corners.broken import broken
 from sysdyn.compiler.forms.corners.kinks import YES, Surface, surfaces, watched
 from sysdyn.compiler.forms.descriptor import (
+    BESIDE,
     BLOCKS,
     Block,
     DescriptorForm,
@@ -246,7 +247,7 @@ class _Freezer:
                 observe(name, linear(1.0, ((sign, sense),)))
         self.done = {}
         families = self.before.families
-        last = next((k for k, f in enumerate(families) if f.kind == "audit"), len(families))  # the audit's come last
+        last = next((k for k, f in enumerate(families) if f.kind in BESIDE), len(families))
         blocks = tuple(self._block(b, added.pop(b.name, [])) for b in self.before.blocks)
         made = (*blocks, *(Block(name, (Kernel((), tuple(new)),)) for name, new in added.items()))
         order = {name: number for number, name in enumerate(BLOCKS)}

@@ -6,8 +6,7 @@ dropped; anything else is an equation on the initial state, a row of block `init
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import Equations, Pin, Unknowns
@@ -94,16 +93,23 @@ def pins_and_equations(
     return tuple(pins), tuple(equations)
 
 
+def missing(equations: Sequence[Equation]) -> Iterator[Unknowns]:
+    """What guesses miss: of contents in their unit, of any other expression in one of its own."""
+    for owner, target in ((e.owner, e.target) for e in equations if not e.target.fixed):
+        kind = "slack" if target.said else "unsaid"
+        yield Unknowns(owner, kind, owner, target.unit if target.store else owner, target.place)
+
+
 def add_initials(
     assembly: Assembly, model: EnergyModel, carriers: frozenset[str], equations: Sequence[Equation]
 ) -> None:
-    """One row family an equation, its shape the ranges of its loops."""
+    """One row family an equation, its shape the ranges of its loops; a guess holds but for what it misses."""
     for equation in equations:
-        target = equation.target
-        said = Equations("initial", "initial", equation.owner, "initial", target.unit, target.place, fixed=target.fixed)
-        content = bool(target.store)
-        assembly.family(replace(said, label=target.store or said.label, written=target.said, content=content))
+        target, owner, content = equation.target, equation.owner, bool(equation.target.store)
+        label = target.store or "initial"
+        assembly.family(Equations("initial", label, owner, "initial", target.unit, target.place, content=content))
         at = tuple(counter(k) for k in range(len(target.nest)))
-        residual = resolve(model, carriers, sub(target.target, target.value))
+        missed = [var(own.owner, own.kind, *at) for own in missing([equation])]
+        residual = resolve(model, carriers, sub(target.target, add(target.value, *missed)))
         for term in without_nested(split(residual, target.nest, target.place), "an initial condition"):
-            assembly.add("initial", equation.owner, at, term.loops, term.expression)
+            assembly.add("initial", owner, at, term.loops, term.expression)

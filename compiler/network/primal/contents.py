@@ -17,7 +17,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, meet, shape_of, union, without
+from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, meet, shape_of, union, without
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import (
@@ -154,7 +154,9 @@ class Contents:
         joining = [(e, e.branch.kind, e.branch.domain.common) for e in elements if len(e.ends) == 2]
         series = [e for e, kind, common in joining if common == "effort" and kind in ("potential", "effort")]
         between = [e for e, kind, common in joining if reflected and common == "flow" and kind == "potential"]
-        self.looped = in_loops([*series, *between])
+        both = [*series, *between]
+        looped = in_loops([(e.ends[0].node, e.ends[1].node, box_size(e.box)) for e in both])
+        self.looped = {both[k].number for k in looped}
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []

@@ -34,16 +34,12 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """a(k) and b(k) belong together for every k of the box, with equal (+1) or opposite (-1) sense.
-
-    owner: whose link it is, in the numbering of who asks.
-    """
+    """a(k) and b(k) belong together for every k of the box, with equal (+1) or opposite (-1) sense."""
 
     box: Box
     a: End
     b: End
     sign: int = 1
-    owner: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,13 +216,9 @@ class IndexClasses:
         if left != right:
             if (right[0], right[1]) < (left[0], left[1]):
                 left, right = right, left
-            self._hang(right, left, of_left * of_right * sign)
-
-    def _hang(self, old: Cell, new: Cell, sign: int) -> None:
-        """A root under another."""
-        self._parent[old] = new, sign
-        if self._collapsed:
-            self._collapsed = {(new if root == old else root, axis, k) for root, axis, k in self._collapsed}
+            self._parent[right] = left, of_left * of_right * sign
+            if self._collapsed:
+                self._collapsed = {(left if root == right else root, axis, k) for root, axis, k in self._collapsed}
 
     def _unite(self, links: Sequence[Link]) -> None:
         """Equals first, then runs inside cells, then what reaches from cell to cell."""

@@ -35,8 +35,6 @@ int sd_start_residual(const sd_rows_of_start *s, double t, const double *x, doub
         return -2;
     expand(s, x, y, y + s->extended);
     sd_residual(s->system, t, y, y + s->extended, r);
-    for (int32_t k = 0; k < s->missed; k++)
-        r[s->miss[k]] -= x[s->written + s->rates + k];
     free(y);
     return 0;
 }
@@ -52,8 +50,6 @@ int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, doub
     sd_jacobian(s->system, t, y, y + s->extended, values, jyd);
     for (int32_t k = 0; k < s->rated; k++)
         values[entries + k] = jyd[s->entry[k]];
-    for (int32_t k = 0; k < s->missed; k++)
-        values[entries + s->rated + k] = -1.0;
     free(y);
     return 0;
 }
