@@ -61,7 +61,8 @@ class Origin:
     def sized(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
         if self._sized is None or self._sized[0] != t_end:
-            far = self.jy, self.jyd, self.yd, net_order_of(self.system).address
+            order = net_order_of(self.system)
+            far = self.jy, self.jyd, self.yd, order.address
             y = self.start.without_noise(self.y)
             self._sized = t_end, magnitudes(self.system, self.t, t_end, y, self.yd, far)
         return self._sized[1]
