@@ -52,7 +52,7 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
     whole = system.another("start")  # it has all families
     for block in prepared.compiled.form.blocks:
         sample = oracle.sample(block, points)
-        module = _module_rows(whole, oracle, block, points)
+        module = _module_rows(whole, oracle, block, points, sample.rows)
         wrong = _apart(module, sample)
         if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
             sample = oracle.sample(block, points, careful=True)
@@ -60,13 +60,12 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
         if wrong.any():
             k, row = np.argwhere(wrong)[0]
             place = int(sample.rows[row])
-            values = float(module[k, place]), float(sample.value[k, row])
+            values = float(module[k, row]), float(sample.value[k, row])
             raise ModuleFault(_told(prepared, oracle, block, place, values))
 
 
-def _apart(module: Array, sample: Sample) -> NDArray[np.bool_]:
-    """Where both differ by more than rounding [points, rows of the sample]."""
-    found = module[:, sample.rows]
+def _apart(found: Array, sample: Sample) -> NDArray[np.bool_]:
+    """Where both differ by more than rounding [points, rows of the sample]; found: the module's rows there."""
     with np.errstate(invalid="ignore"):
         apart = np.abs(found - sample.value)
     both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
@@ -112,12 +111,14 @@ def _order(system: System) -> NDArray[np.intp]:
     return np.concatenate([*parts, np.zeros(0, dtype=np.intp)]).astype(np.intp)
 
 
-def _module_rows(system: System, oracle: SampledRows, block: Block, points: Points) -> Array:
-    """The block's rows [points, rows] by the carrier, in the order of the form's row families."""
+def _module_rows(
+    system: System, oracle: SampledRows, block: Block, points: Points, rows: NDArray[np.integer]
+) -> Array:
+    """These rows of the block [points, rows] by the carrier; rows: in the order of the form's row families."""
     number = int(oracle.to[-1])
     return np.stack(
         [
-            system.rows_at(block.name, oracle.at[:-1], oracle.to[:-1], number, t, y, yd)
+            system.rows_at(block.name, oracle.at[:-1], oracle.to[:-1], number, t, y, yd)[rows]
             for t, y, yd in zip(points.t, points.y, points.yd, strict=True)
         ]
     )

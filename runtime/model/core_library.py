@@ -186,6 +186,7 @@ def _load() -> Any:
         "sd_linear_z_replayed": (None, [_P]),
         "sd_linear_z_factor": (_I, [_P, _P, _P]),
         "sd_linear_z_solve": (None, [_P, _P]),
+        "sd_firsts": (None, [_I, _P, _P]),
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P, _P, _P]),
         "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P, _P]),
         "sd_both_ends": (c.c_int, [_I, _P, _P, _P]),

@@ -53,7 +53,9 @@ class Pattern:
         return self._made()
 
     def _made(self) -> Ints:
-        return read_only(np.repeat(np.arange(self.unknowns, dtype=np.int32), np.diff(self.column)))
+        found = np.empty(self.entries, dtype=np.int32)
+        lib.core.sd_firsts(self.unknowns, lib.pointer(self.column), lib.pointer(found))
+        return read_only(found)
 
 
 def read_only(array: Array) -> Array:

@@ -454,7 +454,7 @@ class System:
         """R [rows] of one block alone, for places of families (at) and of rows (to) of the caller's choice."""
         call = self.call(block, np.ascontiguousarray(at), np.ascontiguousarray(to), max(rows, 1))
         out = np.zeros(max(rows, 1))
-        a, b = self._buffer(y), self._buffer(yd)
+        a, b = (x if x.size == self.form.extended else self._buffer(x) for x in (y, yd))
         lib.ROWS(call.rows)(c.addressof(call.frame), t, lib.pointer(a), lib.pointer(b), lib.pointer(out))
         del self._keep[-1]
         self.failure.check()

@@ -44,3 +44,10 @@ int64_t sd_pairs(int32_t n, int32_t firsts, int32_t seconds, const int32_t *firs
     free(room);
     return found;
 }
+
+void sd_firsts(int32_t firsts, const int32_t *start, int32_t *first)
+{
+    for (int32_t k = 0; k < firsts; k++)
+        for (int32_t i = start[k]; i < start[k + 1]; i++)
+            first[i] = k;
+}

@@ -10,4 +10,7 @@
 int64_t sd_pairs(int32_t n, int32_t firsts, int32_t seconds, const int32_t *first, const int32_t *second, int32_t *number,
                  int32_t *start, int32_t *each);
 
+/* first [start[firsts]]: of each distinct pair, by where those of each first begin */
+void sd_firsts(int32_t firsts, const int32_t *start, int32_t *first);
+
 #endif
