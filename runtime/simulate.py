@@ -50,7 +50,7 @@ class Outcome:
     them; reached [s]; error_estimate relative (None without accuracy control); warnings: sentences; failure: of a run
     that stopped (its trace has final = 0); judgement: of a run that ended; below_round_off: the estimate is less than
     double precision resolves; reason: why method auto took its method ("" where it was named); cancelled: traced
-    differences of terms much larger than they are; events: of a run that ended.
+    differences of terms much larger than they are; events: of a run that ended; steps: of the run that stands.
     """
 
     trace: Path | None
@@ -72,6 +72,7 @@ class Outcome:
     cancelled: tuple[Cancelled, ...] = ()
     events: tuple[Happened, ...] = ()
     held: Trace | None = None
+    steps: int = 0
 
     @property
     def traced(self) -> Trace:
@@ -377,7 +378,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     lost = tuple(cancelled(runs.terms(finished.largest), writer.seen(), options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
-    return outcome(True, options.t_end, achieved, None, **told)
+    return outcome(True, options.t_end, achieved, None, steps=finished.statistics.steps, **told)
 
 
 def close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

@@ -247,7 +247,7 @@ class Integration:
         else:
             method.patience = request.stiff_steps
         if request.method == "dopri":
-            method.spare = request.spare_steps
+            method.spare, method.opening = request.spare_steps, request.opening
         if request.method == "energy":
             self._audit = self.system.observer("audit")
             method.audit = None if self._audit is None else c.addressof(self._audit)
@@ -608,6 +608,7 @@ class Integration:
             self.happened(),
             self.run_.contents.beyond,
             self.last(),
+            method.opening if self.request.method == "dopri" else 0.0,
         )
 
     def __del__(self) -> None:

@@ -37,6 +37,7 @@ class Request:
     audit's members too;
     condense: what constant sums define leaves the system (condense/);
     stages: of radau, in the first step and at most, None: chosen;
+    opening: of dopri, first step as an earlier run found it fit (core/steppers/dopri.h), 0: chosen;
     unstrained: it is given up where Newton fails in every second step (cause strained);
     apart: part of a step; instants within it that are nearer to the row before are passed over.
     """
@@ -68,6 +69,7 @@ class Request:
     condense: bool = True
     stages: tuple[int, int] | None = None
     unstrained: bool = False
+    opening: float = 0.0
 
     @property
     def tolerance(self) -> float:
@@ -96,7 +98,8 @@ class Finished:
 
     magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
     their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest unknown
-    of a row within a step, in magnitudes that it has at steps; last [unknowns]: y and yd at its end, the largest |y|.
+    of a row within a step, in magnitudes that it has at steps; last [unknowns]: y and yd at its end, the largest |y|;
+    opening: for the next run's request.
     """
 
     reached: float
@@ -109,6 +112,7 @@ class Finished:
     events: tuple[Happened, ...] = ()
     beyond: float = 0.0
     last: tuple[Floats, Floats, Floats] | None = None
+    opening: float = 0.0
 
     @property
     def balances(self) -> tuple[Balance, ...]:

@@ -180,6 +180,7 @@ class Runs:
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
         self._beside: tuple[Floats, Floats, Floats] | None = None
         self.patience: int | None = patience
+        self.opening = 0.0
         self._compared_before = getattr(self, "common", None)
         if before is way or (before.system, before.index) != (way.system, way.index):
             self._origin: Origin | None = None
@@ -227,6 +228,7 @@ class Runs:
             # of steep laws Newton fails at any tolerance
             unstrained=draft and rtol > 1.01 * accuracy.TAME and not self.system.form.scales,
             audited=bool(self.meters),
+            opening=self.opening,
             apart=APART if draft and self.open else 0.0,
             events=options.events or None,
             begin=self.begin,
@@ -316,6 +318,7 @@ class Runs:
             self.writer.flush()
             self.keeping.take(self.writer, self.done[2])
         self.done, self.finished = (finished, self.samples, self.writer), finished
+        self.opening = finished.opening
         return finished
 
     def _integrate(self, integration: Integration) -> Finished:

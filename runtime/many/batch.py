@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate import pairs
-from sysdyn.runtime.integrate.accuracy import DRAFT, Achieved, Law
+from sysdyn.runtime.integrate.accuracy import DRAFT, FEW_STEPS, Achieved, Law
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
@@ -274,6 +274,7 @@ class Batch:
         field.project = None if made._project is None else c.addressof(made._project.core.contents)
         field.rtol = c.addressof(core) + kind.rtol.offset
         field.h_max = c.addressof(core) + kind.h_max.offset
+        field.opening = c.addressof(core) + kind.opening.offset if hasattr(kind, "opening") else None
         field.longest = longest
         field.counter[:] = self._counters(made)
 
@@ -398,7 +399,9 @@ class Batch:
         many.units, many.known = len(units), int(runs.common is not None)
         asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
         many.late = min(pairs.TIMING, pairs.SHARE * asked) * span
-        many.power, many.credit, many.finest, many.far = law.power, law.credit, law.finest, law.far
+        for name in ("power", "credit", "finest", "far", "ratio", "little", "growth"):
+            setattr(many, name, getattr(law, name))
+        many.few_steps, many.many_steps = FEW_STEPS, law.most
         many.tolerance[0], many.tolerance[1] = draft, fine
         many.max_steps = min(options.max_steps or 2**62, 2**62)
         many.energy = allowed(options)

@@ -31,13 +31,14 @@ TIMING = 1e-9
 @dataclass(frozen=True, slots=True)
 class Measured:
     """One command's integration.  cpu: cpu_integrate_s, the least of all repetitions; estimate: None where none; steps:
-    of all its runs; rtol: of the last one.
+    of all its runs; last, rtol: steps and tolerance of the last one.
     """
 
     cpu: float
     estimate: float | None
     met: bool
     steps: int
+    last: int
     method: str
     rtol: float
     time: np.ndarray
@@ -98,9 +99,8 @@ class Bench:
         columns = {name: np.asarray(trace[name])[keep] for name in trace.names}
         nominal = {name: float(trace[name].nominal) for name in trace.names}
         steps, rtol = outcome.statistics["steps"], float(trace.attributes["rtol"])
-        return Measured(
-            cpu, outcome.error_estimate, outcome.met, steps, outcome.method, rtol, instants[keep], columns, nominal
-        )
+        told = outcome.error_estimate, outcome.met, steps, outcome.steps, outcome.method, rtol
+        return Measured(cpu, *told, instants[keep], columns, nominal)
 
 
 class Reference:

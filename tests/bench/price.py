@@ -69,11 +69,9 @@ def singles(bench: Bench, finest: float, seconds: float) -> list[Measured]:
 
 
 def lean(run: Measured, accuracy: float, single: list[Measured], errors: list[float]) -> bool:
-    """By the single run of its method whose tolerance is nearest to that of its last run."""
-    alike = [s for s in single if s.method == run.method]
-    like = min(alike, key=lambda s: abs(np.log(s.rtol / run.rtol)), default=None)
+    """Whether its last run took no more steps than the cheapest single run that meets the accuracy."""
     enough = [(s.cpu, s.steps) for s, error in zip(single, errors, strict=True) if error <= accuracy]
-    return like is not None and bool(enough) and like.steps <= min(enough)[1]
+    return bool(enough) and run.last <= min(enough)[1]
 
 
 def rows(name: str, accuracies: list[float], formulation: str | None, seconds: float) -> list[Row]:

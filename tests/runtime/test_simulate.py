@@ -64,6 +64,18 @@ def test_where_little_happens_the_bdf_follows_a_draft_of_radau(name, accuracy, t
     assert max(errors) <= result.error_estimate <= accuracy
 
 
+def test_the_run_behind_a_draft_begins_with_the_step_that_the_draft_found(tmp_path):
+    make, t_end, values = END["pendulum"]
+    options = {"every": t_end / 40, "method": "dopri"}
+    made = outcome(make(), tmp_path / "o.h5", t_end, accuracy=1e-4, **options)
+    trace = Trace.open(tmp_path / "o.h5")
+    alone = outcome(make(), tmp_path / "a.h5", t_end, rtol=float(trace.attributes["rtol"]), **options)
+    assert made.met
+    assert made.steps < alone.steps == alone.statistics["steps"]
+    for quantity, value in values.items():
+        assert abs(trace[quantity][-1] - value) <= 1e-4 * trace[quantity].nominal, quantity
+
+
 def test_trace_of_accepted_steps_holds_the_instants_asked_for(tmp_path):
     result = outcome(models.pendulum(), tmp_path / "o.h5", 4.0, at=(0.4, 1.0), accuracy=1e-4)
     trace = Trace.open(tmp_path / "o.h5")

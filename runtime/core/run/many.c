@@ -12,12 +12,11 @@
 #define SAFETY 2.5
 #define AIM 2.0
 #define LEFT 0.3
-#define LITTLE 0.1
 #define SLOWEST 0.75
 #define STRETCH 1.5
 #define SHORT 60
 #define UNSEEN 100.0
-#define SHORT_CREDIT 0.75
+#define SHORT_CREDIT 0.85
 #define FIRST_DROP 1e-2
 #define PARTED 10.0
 #define MUCH 0.3
@@ -218,8 +217,9 @@ static void clear_ledgers(sd_ledgers *ledgers)
     ledgers->lost = -1;
 }
 
-/* every structure as it was set up, the start of this run in it; last: instants of the run before (NULL: as set up) */
-static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longest, const sd_samples *last)
+/* every structure as it was set up, the start of this run in it; last: instants of the run before (NULL: as set up);
+ * opening: its first step, as an earlier run found it (0: chosen) */
+static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longest, const sd_samples *last, double opening)
 {
     sd_run *run = pass->run;
     const double *y = many->passes[0].y, *yd = many->passes[0].start_rate;
@@ -243,6 +243,8 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
     memset(pass->met, 0, (size_t)pass->n * sizeof(double));
     *pass->rtol = tolerance;
     *pass->h_max = longest;
+    if (pass->opening)
+        *pass->opening = opening;
     if (last) {
         run->instant = last->time;
         run->instant_kind = many->kind;
@@ -498,18 +500,35 @@ static void match(const sd_many *many, sd_samples *mine, const sd_samples *other
     mine->number = n;
 }
 
+/* tolerance behind a draft of so many steps */
+static double behind(const sd_many *many, int64_t steps)
+{
+    double much = fmin(fmax((double)steps, many->few_steps), many->many_steps) / many->few_steps;
+    double draft = many->tolerance[0];
+    double fit = many->tolerance[1] * pow(much, -many->growth / many->power);
+    return fmax(fmax(fmin(fit, many->ratio * draft), many->far * draft), many->finest);
+}
+
+/* the first step that the last run of a pass found fit */
+static double opening(const sd_pass *pass)
+{
+    return pass->opening ? *pass->opening : 0.0;
+}
+
 /* runs until the last one's estimated error is what was asked: `control` of integrate/accuracy.py */
 static int control(sd_many *many, int64_t *steps, double *estimate)
 {
     sd_samples *last = &many->sample[0], *own = &many->sample[1], *there = &many->sample[2];
-    double tolerance = many->tolerance[0], next = many->tolerance[1], longest = many->passes[1].longest;
+    double tolerance = many->tolerance[0], next, longest = many->passes[1].longest, opened;
     double before = -1.0, step_before = 0.0, power = -1.0;
     int64_t taken = 0, taken_before;
     /* of a run that is the last one, nobody asks for rows at its own steps */
     int lean = many->keep == 0 && !many->claims && !many->known;
-    prepare(many, &many->passes[0], tolerance, many->passes[0].longest, NULL);
+    prepare(many, &many->passes[0], tolerance, many->passes[0].longest, NULL, 0.0);
     int state = integrate(many, &many->passes[0], last, there, &taken);
     *steps += taken;
+    next = behind(many, taken);
+    opened = opening(&many->passes[0]);
     int lost = state == SD_MANY_ACCURACY; /* its rows say nothing: the next run is compared with nothing */
     state = lost ? SD_MANY_DONE : state;
     if (many->known)
@@ -519,7 +538,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         taken = 0;
         for (int32_t k = 0; !many->known && k < last->number; k++)
             many->kind[k] = COMPARED | (lean && k == last->number - 1 ? TRACE : 0);
-        prepare(many, &many->passes[1], next, longest, many->known ? NULL : last);
+        prepare(many, &many->passes[1], next, longest, many->known ? NULL : last, opened);
         many->passes[1].run->every_step = many->passes[1].run->every_step && !lean;
         state = integrate(many, &many->passes[1], own, there, &taken);
         *steps += taken;
@@ -566,7 +585,8 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         step_before = step;
         double drop = pow(1.0 / fmax(AIM * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
         tolerance = next;
-        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, power < 0.0 ? LITTLE : LEFT)) * next, many->finest);
+        opened = opening(&many->passes[1]);
+        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, power < 0.0 ? many->little : LEFT)) * next, many->finest);
         next = away ? fmin(next, TAME) : next;
         longest /= STRETCH;
         sd_samples *swap = last;

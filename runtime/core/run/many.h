@@ -48,6 +48,7 @@ typedef struct sd_pass {
     const double *least;         /* [n] what round-off leaves open: no magnitude is less */
     sd_settle *project;          /* of the method; NULL: none */
     double *rtol, *h_max;        /* of the stepper */
+    double *opening;             /* of dopri (steppers/dopri.h); NULL: none */
     double longest;              /* step [s] */
     const int64_t *counter[SD_MANY_COUNTERS]; /* of its work; NULL: none */
 } sd_pass;
@@ -99,8 +100,8 @@ typedef struct sd_many {
     const int32_t *unit, *unit_of; /* [columns], [written]; unit_of -1: none */
     int32_t units, known;        /* known 1: instants of comparison are set up, else steps of the run before */
     double late;                 /* time tolerance of comparisons [s] */
-    double power, credit, finest, far; /* of the method's law */
-    double tolerance[2];         /* of the draft, of the run behind it */
+    double power, credit, finest, far, ratio, little, growth, few_steps, many_steps; /* of the method's law (integrate/accuracy.py) */
+    double tolerance[2];         /* of the draft, of the run behind one of few steps */
     int64_t max_steps;
     double energy;               /* part of a ledger's turnover that its balance may be */
     const sd_claim *claim;

@@ -8,6 +8,8 @@
 
 #define SAFETY 0.9
 #define BOLD 2.0         /* of the first step: what it may be longer than for a coefficient of 1 */
+#define OPENING 3        /* steps that tell how long the first might have been */
+#define EXACT 1e-12      /* error of one of them at least */
 #define GROWTH 6.0       /* of the step at most; it shrinks to 1/3 at most */
 #define SHRINK 0.333
 #define MEMORY 0.03      /* exponent of the last step's error (PI control) */
@@ -102,6 +104,18 @@ static double squares(const sd_dopri *dopri, const double *a, const double *b)
     return sum;
 }
 
+/* As an earlier run found it fit; else (h y'/y)^8 is within tolerance, but for a coefficient that is small. */
+static double first_step(const sd_dopri *dopri, double span)
+{
+    double part = pow(dopri->rtol, 0.125), known = dopri->steps == 0 ? dopri->opening * part : 0.0, h = 0.1 * span;
+    double change = dopri->tested ? dopri->rtol * sqrt(squares(dopri, dopri->yd, NULL) / dopri->tested) : 0.0;
+    if (known > 0.0 && isfinite(known))
+        return known;
+    if (isfinite(change) && change > 0.0)
+        h = fmin(h, BOLD * part / change);
+    return fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(dopri->t), SD_SHORT * span), span));
+}
+
 void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd, double h)
 {
     size_t size = (size_t)dopri->n * sizeof *y;
@@ -117,14 +131,10 @@ void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd
             dopri->yd[dopri->underlying->unknown[j]] = 0.0;
     dopri->underlying->tolerance = fmax(1e-3 * dopri->rtol, 1e-14);
     set_weights(dopri);
-    double span = dopri->t_end - t;
-    double change = dopri->tested ? dopri->rtol * sqrt(squares(dopri, dopri->yd, NULL) / dopri->tested) : 0.0;
-    if (!(h > 0.0)) { /* (h y'/y)^8 within tolerance, but for a coefficient that is small */
-        h = 0.1 * span;
-        if (isfinite(change) && change > 0.0)
-            h = fmin(h, BOLD * pow(dopri->rtol, 0.125) / change);
-        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
-    }
+    if (!(h > 0.0))
+        h = first_step(dopri, dopri->t_end - t);
+    if (dopri->steps == 0)
+        dopri->opening = INFINITY;
     dopri->h = fmin(dopri->fixed_h > 0.0 ? dopri->fixed_h : h, dopri->h_max);
     dopri->h_used = 0.0;
     dopri->error_accepted = 1e-4;
@@ -258,6 +268,8 @@ static void accept(sd_dopri *dopri, double error)
     double h = dopri->h, t = dopri->t + h;
     double ratio = pow(error, 0.125 - 0.2 * MEMORY) / pow(dopri->error_accepted, MEMORY) / SAFETY;
     double next = h / fmax(1.0 / GROWTH, fmin(1.0 / SHRINK, ratio));
+    if (dopri->steps < OPENING)
+        dopri->opening = fmin(dopri->opening, SAFETY * h * pow(fmax(error, EXACT) * dopri->rtol, -0.125));
     if (dopri->rejected)
         next = fmin(next, h);
     dopri->error_accepted = fmax(error, 1e-4);

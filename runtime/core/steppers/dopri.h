@@ -31,6 +31,7 @@ typedef struct sd_dopri {
     const int32_t *test, *power; /* [n] as in bdf.h */
     double patience;          /* steps still to be taken above which a stiff run is given up */
     double spare;             /* the same of one whose system is faster than its motion; 0: never */
+    double opening;           /* over rtol^(1/8): the first step as an earlier run found it fit, 0: chosen; then as this one does */
     /* state of the integration */
     double t, h, h_used, error_accepted;
     int32_t rejected, dense;  /* dense: the interpolant of the last step is there */
