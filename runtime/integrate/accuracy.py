@@ -113,7 +113,7 @@ LAWS = {
     # asked; a tenth lets no draft of the dearest models do
     "radau": Law(21.0, 0.95, 0.6, 1e-17, ratio=0.03, little=0.2),
     # the tolerance that would do falls with the power 1.9 of the draft's steps: where the longest step holds them, any
-    # would; every fifteenth model takes a third run
+    # would; one model in eleven takes a third run
     "dopri": Law(50.0, 1.0, 0.9, 2e-14, growth=1.75, ratio=0.15, little=0.3),
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
