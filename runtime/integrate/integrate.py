@@ -48,9 +48,9 @@ little of what a run finds."""
 CHUNK_STEPS = 1 << 20
 PROJECTED = ("1", "0")
 """Forms whose rows let the constraints drift: accepted points are moved onto them."""
-CRAWL = 200_000
-"""Steps after which a run must have got CREPT of the span further: else it would take for ever."""
-CREPT = 1e-7
+CRAWL, DRAFT_CRAWL = 200_000, 20_000
+"""Steps after which a run, a draft must have got CREPT of the span further: else it would take for ever."""
+CREPT = 1e-6
 SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change,
 where constraints are constant sums: their unknowns are interpolated differently (radau_dense.c).  Of curved ones
@@ -579,7 +579,7 @@ class Integration:
                 self.drain(sink)
             if state == 1:
                 break
-            if method.steps - marked >= CRAWL:
+            if method.steps - marked >= (DRAFT_CRAWL if request.draft else CRAWL):
                 if method.t - at < CREPT * (request.t_end - self.start.t):
                     raise self._failure("step_too_small")
                 marked, at = method.steps, method.t

@@ -11,6 +11,8 @@
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
 #define TRUST 0.02          /* least contraction assumed of a first correction (an exponential law may lie ahead) */
+#define STEEP 0.1           /* with steep laws instead of the one, ... */
+#define STEEP_TRUST 0.3     /* ... and the other: corrections left out would be errors that fall slower than the tolerance */
 #define SLOW 0.9            /* contraction above which Newton gives up */
 #define STAGNANT 0.1        /* of the tolerance: corrections this small that do not shrink are round-off */
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
@@ -208,6 +210,7 @@ static int iterate(sd_bdf *bdf, double t)
 {
     double first = 0.0, before = 0.0;
     int converged = 0, idle = 0, judged = bdf->system->scales > 0;
+    double trust = judged ? STEEP_TRUST : TRUST, tolerance = judged ? STEEP : NEWTON_TOLERANCE;
     for (int m = 0; m < ITERATIONS + judged; m++) {
         double *d = bdf->delta;
         sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
@@ -241,8 +244,8 @@ static int iterate(sd_bdf *bdf, double t)
         idle = m > 0 && size <= STAGNANT && !(size < SLOW * before);
         before = size;
         /* a first correction is not believed beyond this, however fast earlier steps converged */
-        double contraction = m == 0 ? fmax(bdf->contraction, TRUST) : bdf->contraction;
-        converged = converged || contraction * size <= NEWTON_TOLERANCE;
+        double contraction = m == 0 ? fmax(bdf->contraction, trust) : bdf->contraction;
+        converged = converged || contraction * size <= tolerance;
         if (converged && !judged)
             return SD_FINE;
     }
