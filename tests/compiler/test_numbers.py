@@ -23,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def size(root, **known):
-    return float(magnitudes([root], lambda n, args: known[n.data])[0])
+    return float(magnitudes([root], lambda n, args: known[n.data], lambda table: 0.0)[0])
 
 
 def test_what_cancels_is_as_uncertain_as_its_terms():
