@@ -109,7 +109,7 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
     else:
         assert refused is not None
         raise refused
-    meters = [base, *runs, *found, *_others(request, base, max(rtol * share, FINEST))]
+    meters = [base, *runs, *found, *_others(request, base, checked)]
     return Recorded(
         golden,
         error,
@@ -123,7 +123,9 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
 
 
 def _others(request: Request, base: Run, accuracy: float) -> list[Run]:
-    """A run by the bdf beside an explicit method, whose meters are far better than those that a check may meet."""
+    """A run by the bdf at the accuracy of checks beside an explicit method, whose meters are far better than those that
+    a check may meet.
+    """
     if base.method != "dopri" or request.method not in (None, "auto"):
         return []
     try:

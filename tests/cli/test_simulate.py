@@ -207,7 +207,7 @@ def test_a_draft_left_alone_tells_its_balance_only_where_it_is_asked_for(expect,
     scene = f"scene alone of pendulum {{\n time 0 s to 6 s\n trace x every 10 ms\n {expect}\n}}\n"
     gallery = Path(__file__).parents[2] / "models/gallery/pendulum.sd"
     path = write(tmp_path, gallery.read_text().split("scene", 1)[0] + scene)
-    assert run(["simulate", path, "--max-steps", "21", "-o", "out.h5"]) == 3
+    assert run(["simulate", path, "--max-steps", "17", "-o", "out.h5"]) == 3
     said = capsys.readouterr()
     assert "that of a coarser run to the end" in said.err
     assert ("energy balance" in said.out + said.err) is bool(expect)

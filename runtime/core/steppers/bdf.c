@@ -168,14 +168,14 @@ static int rows_hold(sd_bdf *bdf, double t)
     return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, all, bdf->terms) < 0;
 }
 
-/* Every steep row is as small as round-off of the unknowns' magnitudes, by slopes at the point itself, lets it be (see
+/* Every steep row is as small as round-off of the largest unknowns met, by slopes at the point itself, lets it be (see
  * radau_newton.c) */
 static int rows_at_round_off(sd_bdf *bdf, double t)
 {
     if (bdf->linear->rank < bdf->n)
         return 0;
     sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
-    return sd_first_astray(bdf->system, t, bdf->y, bdf->yd, bdf->delta, bdf->jy, bdf->jyd, 1.0 / bdf->cj, bdf->magnitude,
+    return sd_first_astray(bdf->system, t, bdf->y, bdf->yd, bdf->delta, bdf->jy, bdf->jyd, 1.0 / bdf->cj, bdf->met,
                            SD_ROUND_OFF, bdf->terms) < 0;
 }
 

@@ -57,7 +57,7 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
     return 1;
 }
 
-/* Every steep row is as small as round-off of the unknowns' magnitudes, by slopes at the stages themselves, lets it be: where
+/* Every steep row is as small as round-off of the largest unknowns met, by slopes at the stages themselves, lets it be: where
  * two terms of a law nearly vanish beside unknowns that are large elsewhere, no part of the terms is ever reached.  Where the
  * factors left a column small corrections say nothing. */
 static int rows_at_round_off(sd_radau *radau)
@@ -69,7 +69,7 @@ static int rows_at_round_off(sd_radau *radau)
         sd_radau_stage(radau, s, radau->y, radau->rate);
         sd_jacobian(radau->system, t, radau->y, radau->rate, radau->jy, radau->jyd);
         if (sd_first_astray(radau->system, t, radau->y, radau->rate, radau->d[s], radau->jy, radau->jyd, radau->h,
-                            radau->magnitude, SD_ROUND_OFF, radau->terms) >= 0)
+                            radau->met, SD_ROUND_OFF, radau->terms) >= 0)
             return 0;
     }
     return 1;
