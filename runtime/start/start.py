@@ -179,11 +179,22 @@ Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool
 """From t, a point x to begin at, the guess and the free unknowns: the best solution, and whether all rows hold."""
 
 
+def _beyond(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
+    """Whether rows that read none of these unknowns are missed: loops of springs, constraints of the state."""
+    known = starter.equations
+    read = np.bincount(known.rows, known.structural & free[known.columns], starter.settled.rows)
+    missed = np.where((read == 0) & ~known.unsettled, np.abs(starter.residual(t, x)), 0.0)
+    return bool(missed.any() and (missed * starter.row_scale(t, x, starter.scale(t, x)) > OWN).any())
+
+
 def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """What follows from the state alone, by Newton's method; where that is not enough everything, the least first: a
     guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
     """
-    found, holds = _rescaled(starter, t, x, guess, free & starter.following(t, x), least=False)
+    follows = free & starter.following(t, x)
+    found, holds = Solution(x, np.inf, np.zeros(0)), False
+    if not _beyond(starter, t, x, follows):
+        found, holds = _rescaled(starter, t, x, guess, follows, least=False)
     if holds and found.residual <= CLOSED:
         return found, holds
     best, also = _rescaled(starter, t, x, guess, free)
