@@ -158,9 +158,9 @@ class _Linear:
         self.shape = int(problem.use.sum()), int(problem.free.sum())
 
     def _taken(self) -> tuple[Any, Any, Floats]:
-        """Rows, columns and values of the entries in use."""
+        """Rows, columns and values of the entries in use; factors would fill from zeros too."""
         problem = self.problem
-        take = problem.use[problem.rows] & problem.free[problem.columns]
+        take = problem.use[problem.rows] & problem.free[problem.columns] & (self._values != 0.0)
         values = self._values[take]
         values[~np.isfinite(values)] = 0.0
         return problem.rows[take], problem.columns[take], values
