@@ -161,18 +161,14 @@ class Contents:
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box]]] = {}
-        self._leaders: dict[str, list[Member]] = {}
         self._stems: list[str] = []
-        self._pinned: set[Node] = set()
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = reader.sizes.reach(initial.target.args, within, initial.place)
             self._given.setdefault(initial.target.data[0], []).append((initial, box))
         followers: dict[int, list[Member]] = {}
         for m in members:
-            if m.leads:
-                self._leaders.setdefault(m.coordinate, []).append(m)
-            elif m.element.branch.kind == "potential":
+            if not m.leads and m.element.branch.kind == "potential":
                 followers.setdefault(m.element.number, []).append(m)
         for group in followers.values():
             self._follower(group[0].element, group)
@@ -225,31 +221,27 @@ class Contents:
 
     def resolved(self, measured: Container[str]) -> Iterator[Initial]:
         """The initial conditions of coordinates and other unknowns; measured: stores whose guesses stand elsewhere."""
+        known: set[tuple[Node, Node, tuple[Loop, ...], bool]] = set()
         for initial in self.initials:
             if not initial.fixed and initial.target.op == "var" and initial.target.data[0] in measured:
                 continue
             if not touches_network(initial.target) and not touches_network(initial.value):
                 yield initial
                 continue
-            for loops, (kind, target, value) in self.reader.cut(
+            for loops, (target, value) in self.reader.cut(
                 initial.loops,
                 initial.place,
                 lambda ranges, i=initial: self._one(i, ranges),  # type: ignore[misc]
             ):
-                if kind == "pin":
-                    yield replace(initial, target=target, value=value, loops=loops)
-                elif kind == "class" and target not in self._pinned:
-                    self._pinned.update(() if target.args else (target,))
-                    own = tuple(loop for loop in loops if index(loop.index) in topological(target.args))
+                # stores of a class have one coordinate, of which the same is said once
+                over = topological((target, value, *(end for loop in loops for end in (loop.first, loop.last))))
+                own = tuple(loop for loop in loops if index(loop.index) in over)
+                if (said := (target, value, own, initial.fixed)) not in known:
+                    known.add(said)
                     yield replace(initial, target=target, value=value, loops=own)
 
-    def _led(self, coordinate: str) -> bool:
-        """Whether a statement gives the content of a leader of the coordinate's classes."""
-        leaders = self._leaders.get(coordinate, ())
-        return any(meet(m.box, box) for m in leaders for _, box in self._given.get(m.element.name, []))
-
-    def _one(self, initial: Initial, ranges: Ranges) -> tuple[str, Node, Node]:
-        """Where one piece is read: (pin | class | drop, target, value); class: the coordinate of the store's class."""
+    def _one(self, initial: Initial, ranges: Ranges) -> tuple[Node, Node]:
+        """Where one piece is read: target and value; of stores whose constant is told the coordinate of their class."""
         target = initial.target
         if _is_content(initial):
             piece = self.reader.piece(target.data[0], target.args, ranges)
@@ -257,14 +249,11 @@ class Contents:
             if m is not None and fixed and piece.element.branch.kind == "potential":
                 q = var(m.coordinate, "q", *m.indices(target.args))
                 if m.leads and len(m.index) == len(target.args):
-                    return "pin", q, initial.value
+                    return q, initial.value
                 within = {name: r.interval for name, r in ranges.items()}
-                first = self.start(m.leader.name, m.leader_at(target.args), within)
-                return ("class" if m.leads or not self._led(m.coordinate) else "drop"), q, first
+                return q, self.start(m.leader.name, m.leader_at(target.args), within)
         new, value = (self.reader.resolve(node, ranges) for node in (target, initial.value))
-        if not variables(value):
-            return "pin", *_pin(new, value)
-        return "pin", new, value
+        return (new, value) if variables(value) else _pin(new, value)
 
 
 def _is_content(initial: Initial) -> bool:
