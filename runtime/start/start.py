@@ -9,7 +9,7 @@ order until the rows hold; the name of the one that found it stays with the stat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from sysdyn.runtime.numerics.least_change import (
     solve,
     stepped,
 )
+from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.values import dataclass
 
@@ -40,8 +41,6 @@ CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
-NOTED = 1e-9
-"""Of its size: a move of a guess that is told."""
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
 LEAST_PART = 1e-6
@@ -293,50 +292,6 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     return best, ""
 
 
-def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
-    """Labels of the constraint rows that an unknown stands in."""
-    found: list[str] = []
-    values = starter.jacobian(t, x)
-    silent = starter.rows[starter.moves("unsaid")[starter.columns]]
-    for row in np.setdiff1d(starter.rows[(starter.columns == place) & (values != 0.0)], silent):
-        label = starter.settled.row_label(int(row))
-        base = label.kind.split("_")[0]
-        text = f"{base} {label.label}"
-        if base in ("phi", "psi", "gamma", "momentum", "initial") and text not in found:
-            found.append(text)
-    return "asked for by " + ", ".join(found[:4]) if found else "asked for by the balance of efforts"
-
-
-Moved = tuple[str, float, float, str]
-
-
-def _moved(starter: Starter, t: float, x: Floats, scale: Floats) -> Iterator[Moved]:
-    """Written guesses, of unknowns and by expressions, that the start does not meet."""
-    guess, missed = starter.guess, starter.moves("slack")
-    size = np.where(missed, scale, np.maximum(np.abs(guess), 1e-3 * scale))
-    told = starter.written & starter.free & (np.abs(x - guess) > NOTED * size)
-    for place in np.flatnonzero(told)[:100].tolist():
-        if missed[place]:
-            yield _missed(starter, t, x, place)
-        else:
-            yield starter.settled.name(place), float(guess[place]), float(x[place]), _asked(starter, t, x, place)
-
-
-def _missed(starter: Starter, t: float, x: Floats, place: int) -> Moved:
-    """Name of what an expression guesses, its value, the start's.
-
-    Where a row guesses several unknowns at once its label stands for them, and 0 for what it would miss.
-    """
-    row, values, miss = starter.rows[starter.columns == place][0], starter.jacobian(t, x), float(x[place])
-    mine = (starter.rows == row) & (starter.columns != place) & (values != 0.0)
-    own = np.flatnonzero(mine & ~starter.written[starter.columns])
-    if own.size == 1:
-        k = int(starter.columns[own[0]])
-        return starter.settled.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, t, x, k)
-    label = starter.settled.row_label(int(row))
-    return f"guess of line {label.line}", 0.0, miss, "what its two sides differ by"
-
-
 def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
     """Why there is no consistent state: rows in the way, and the fixed values that would have to move."""
     if not np.isfinite(best.residual):
@@ -398,7 +353,7 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     if not strategy:
         raise _explain(starter, t0, guess, starter.free, best)
     y, yd = starter.expand(best.x)
-    moved = tuple(_moved(starter, t0, best.x, starter.scale(t0, best.x)))
+    moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
     zeros = (np.abs(best.x) <= EXACT * largest)[: y.size]
     if best.x.size > LARGE:
