@@ -93,12 +93,16 @@ def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, f
     return found.x if found.residual < EXACT else x
 
 
-def _guess(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
-    """The guess with what written expressions give their own unknowns where the others are guessed by numbers: of
-    several roots that one is meant.
+def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
+    """Where the iteration begins, on the roots that are meant: what written expressions give where the others are as
+    guessed, then what follows beside implicit unknowns at their guesses.
     """
     own = free & ~starter.written & (np.arange(free.size) < starter.n)
-    return _onto(starter, t, guess, guess, rows=starter.told, free=own)
+    x, held = _onto(starter, t, guess, guess, rows=starter.told, free=own), starter.moves("e") & starter.written
+    if not held.any():
+        return x
+    rows, may = starter.every & ~starter.groups("gamma", "gamma_rate"), free & ~held & starter.following(t, x)
+    return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
 def _rescaled(
@@ -132,17 +136,6 @@ def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
     scale = np.maximum(starter.scale(t, magnitudes), NOISE * starter.largest_alike(magnitudes))
     size = starter.row_scale(t, magnitudes, scale)[starter.every]
     return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
-
-
-def _beside_gammas(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats:
-    """X with what follows as implicit unknowns at their guesses make it: of two roots of a gamma that is not linear the
-    iteration then begins at that of the guess.
-    """
-    held = starter.moves("e") & starter.written
-    if not held.any():
-        return x
-    rows, may = starter.every & ~starter.groups("gamma", "gamma_rate"), free & ~held & starter.following(t, x)
-    return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
 def _bent(starter: Starter, t: float, x: Floats) -> Mask:
@@ -281,7 +274,7 @@ def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
     """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
-    x = _beside_gammas(starter, t, guess.copy(), guess, free)
+    x = _begun(starter, t, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
         found, holds = strategy(starter, t, x, guess, free)
@@ -348,7 +341,6 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
-    guess = _guess(starter, t0, guess, starter.free)
     best, strategy = _attempt(starter, t0, guess, starter.free)
     if not strategy:
         raise _explain(starter, t0, guess, starter.free, best)
