@@ -200,8 +200,7 @@ def magnitudes(
     """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s].
 
     far: the motion linearised at the start, which says how far each unknown gets (sd_relaxed, start/sizing.h): dF/dy,
-    dF/dyd [entries], rates [unknowns], the address of an order of elimination; None: as its rate
-    says.
+    dF/dyd [entries], rates [unknowns], the address of an order of elimination; None: as its rate says.
     """
     span = max(t_end - t0, 0.0) or 1.0
     a, b = (system._buffer(np.where(np.isfinite(item), item, 0.0)) for item in (y, yd))

@@ -6,6 +6,7 @@ Comput. 8, 1987): what partial pivoting may fill is known from the pattern.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from ctypes import addressof
 from functools import cached_property
 from typing import Any
@@ -63,19 +64,17 @@ class Order:
 
     def linear(self, pattern: Pattern) -> Any:
         """The core's factorisation of such matrices: the caller frees it, and keeps pattern and order alive."""
-        places = lib.pointer(pattern.column), lib.pointer(pattern.row)
-        made = lib.core.sd_linear_ordered(pattern.unknowns, *places, self.address)
-        if not made:
-            raise MemoryError
-        return made
+        return self._made(lib.core.sd_linear_ordered, pattern)
 
     def complex_linear(self, pattern: Pattern) -> int:
         """The same of complex ones: its address."""
-        places = lib.pointer(pattern.column), lib.pointer(pattern.row)
-        made = lib.core.sd_linear_z_ordered(pattern.unknowns, *places, self.address)
+        return int(self._made(lib.core.sd_linear_z_ordered, pattern))
+
+    def _made(self, make: Callable[..., Any], pattern: Pattern) -> Any:
+        made = make(pattern.unknowns, lib.pointer(pattern.column), lib.pointer(pattern.row), self.address)
         if not made:
             raise MemoryError
-        return int(made)
+        return made
 
 
 def order_of(system: System) -> Order:

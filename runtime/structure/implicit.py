@@ -8,6 +8,7 @@ singular there and regular beside it.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
@@ -44,16 +45,19 @@ def undetermined(system: System, state: ConsistentState) -> tuple[str, ...]:
     here = slopes(y)
     found = np.ones(implicit.size, dtype=bool)
     for nudge in NUDGES:
-        beside = y.copy()
-        beside[implicit] += nudge * size
-        there = slopes(beside)
+        there = slopes(_moved(y, implicit, nudge * size))
         found &= np.isfinite(there) & (there > 0.0) & (here <= VANISHING * there)
     if not found.any() or system.rows > DENSE:
         return ()
-    beside = y.copy()
-    beside[implicit[found]] += NUDGES[-1] * size[found]
+    beside = _moved(y, implicit[found], NUDGES[-1] * size[found])
     iterated = (system.dense(np.add(*system.jacobian(state.t, point, yd))) for point in (y, beside))
     at, off = (decomposed(matrix)[1][-1] for matrix in equilibrated(*iterated))
     if at > VANISHING * off:
         return ()
     return tuple(system.name(int(k)) for k in implicit[found])
+
+
+def _moved(y: Floats, places: NDArray[np.intp], by: Floats) -> Floats:
+    found = y.copy()
+    found[places] += by
+    return found

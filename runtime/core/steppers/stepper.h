@@ -56,7 +56,7 @@ typedef struct sd_stepper {
     void (*values)(const void *self, double t, double *y);
 } sd_stepper;
 
-#define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the magnitudes of unknowns */
+#define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the largest that unknowns have been */
 #define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */
 
 /* The largest |y| met so far, and the magnitude that grows with it. */
