@@ -146,6 +146,8 @@ class Linear(c.Structure):
         ("idle", _P),
         ("place", _P),
         ("rank", _I),
+        ("null", _P),
+        ("null_room", c.c_size_t),
         ("pivoted", _I),
         ("replayed", _I),
         ("elimination", _P),

@@ -221,16 +221,15 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
         found = _small_index(system, jy, jyd)
         if found >= 0:
             return found, ()
-    names = null_place(system, jy, jyd)[0]
-    if names:
-        # equilibration may end where one unit makes the others tiny: asked again in sizes of the unknowns
-        size = balanced(system, y, jy)[system.pattern.columns_of()]
-        jy, jyd = jy * size, jyd * size
-        if null_place(system, jy, jyd)[0]:
-            jy = _roused(system, state.t, jy)
-            if null_place(system, jy, jyd)[0]:
-                return None, names
-    return pencil_index(system.dense(jyd), system.dense(jy)), ()
+    size = balanced(system, y, jy)[system.pattern.columns_of()]
+    undetermined: tuple[str, ...] = ()
+    for at, rates in ((jy, jyd), (jy * size, jyd * size), (_roused(system, state.t, jy * size), jyd * size)):
+        names = null_place(system, at, rates)[0]
+        index = None if names else pencil_index(system.dense(rates), system.dense(at))
+        if index is not None:
+            return index, ()
+        undetermined = undetermined or names
+    return None, undetermined
 
 
 def _sliding_index(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:

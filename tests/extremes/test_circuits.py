@@ -8,6 +8,7 @@ import os
 import re
 from collections import Counter
 
+import bridges
 import numpy as np
 import pytest
 from circuits import INSTANTS, circuit
@@ -80,3 +81,16 @@ def test_rows_between_steps_are_as_accurate_as_steps(tmp_path, number, formulati
     assert run.met
     for name, values in made.reference(time).items():
         assert np.abs(run.at(name, time) - values).max() <= 3e-5 * np.abs(values).max()
+
+
+@pytest.mark.parametrize(
+    ("number", "formulation"), [(1, "hamiltonian"), (2, "co_lagrangian"), (4, "lagrangian"), (8, "lagrangian")]
+)
+def test_bridges_whose_sources_float_while_all_diodes_block(tmp_path, number, formulation):
+    """No current tells the voltage of such a source to earth: eight of them, of sparse kernels, were refused before."""
+    time = np.linspace(0.0, 0.02, 201)
+    run = ran(tmp_path, bridges.text(number, 0.02, 1e-4, 1e-4), formulation=formulation)
+    assert not run.refused
+    assert run.met
+    for name, wanted in bridges.reference(number, time).items():
+        assert np.abs(run.at(name, time) - wanted).max() <= 3e-5 * np.abs(wanted).max()

@@ -100,20 +100,33 @@ def test_singular_matrix_names_its_place(n):
     assert solver.linear.contents.bad_column == 3
 
 
-def test_a_column_without_a_pivot_stays_where_it_may():
-    # two nodes that nothing ties to the rest but their difference: the second may float
-    matrix = csc_array(np.array([[2.0, -2.0, 0.0], [-2.0, 2.0, 1e-300], [0.0, 1e-300, 3.0]]))
+@pytest.mark.parametrize("beside", [0, 70])
+def test_of_columns_without_a_pivot_the_shortest_solution_is_taken(beside):
+    # two nodes that nothing ties to the rest but their difference; `beside`: more unknowns, for the sparse kernels
+    matrix = np.eye(3 + beside)
+    matrix[:3, :3] = [[2.0, -2.0, 0.0], [-2.0, 2.0, 1e-300], [0.0, 1e-300, 3.0]]
+    matrix = csc_array(matrix)
     solver = Solver(matrix)
-    idle = np.array([0, 1, 0], dtype=np.int32)
+    rest = np.zeros(beside)
+    idle = np.append([0, 1, 0], rest).astype(np.int32)
     linear = solver.linear.contents
     linear.null_pivot, linear.idle = 1e-10, lib.pointer(idle)
-    assert solver.factor(matrix.data) == 0
-    assert linear.rank == 2
-    x = solver.solve([4.0, -4.0, 6.0])
-    assert x == pytest.approx([2.0, 0.0, 2.0], abs=1e-12)
+    for _ in range(2):  # chosen pivots, and the same once more
+        assert solver.factor(matrix.data) == 0
+        assert linear.rank == 2 + beside
+        x = solver.solve([4.0, -4.0, 6.0, *rest])
+        assert x == pytest.approx([1.0, -1.0, 2.0, *rest], abs=1e-12)
+    assert solver.factor(matrix.data, np.array([1.0, 2.0, 1.0, *(1.0 + rest)])) == 0
+    assert solver.solve([4.0, -4.0, 6.0, *rest])[:2] == pytest.approx([2 / 5, -8 / 5], abs=1e-12)
+    # what has become a pivot is one
+    values = matrix.data.copy()
+    values[0] *= 2.0
+    assert solver.factor(values) == 0
+    assert linear.rank == 3 + beside
+    assert solver.solve([4.0, -2.0, 6.0, *rest])[:2] == pytest.approx([1.0, 0.0], abs=1e-12)
     idle[1] = 0
     solver.factor(matrix.data)
-    assert linear.rank == 3
+    assert linear.rank == 3 + beside
 
 
 @pytest.mark.parametrize("n", [20, 60, 150])

@@ -14,6 +14,7 @@ void sd_linear_free(sd_linear *linear)
         return;
     sd_sparse_free(linear->sparse);
     sd_elimination_free(linear->elimination);
+    free(linear->null);
     free(linear->row_scale);
     free(linear->work);
     free(linear->dense);
@@ -192,13 +193,17 @@ static int without_pairs(sd_linear *linear)
     sd_sparse_free(linear->sparse);
     linear->sparse = lu;
     linear->otherwise = NULL;
+    lu->idle = linear->idle;
+    lu->null_pivot = linear->idle ? linear->null_pivot : 0.0;
     return sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
 }
 
 static int sparse_factor(sd_linear *linear)
 {
     int failed = 1;
-    if (linear->sparse->pivoted)
+    linear->sparse->idle = linear->idle;
+    linear->sparse->null_pivot = linear->idle ? linear->null_pivot : 0.0;
+    if (linear->sparse->pivoted && linear->sparse->rank == linear->n) /* a column that was left may have a pivot now */
         failed = sd_sparse_refactor(linear->sparse, linear->column, linear->row, linear->scaled);
     if (failed) {
         failed = sd_sparse_pivot(linear->sparse, linear->column, linear->row, linear->scaled);
@@ -208,9 +213,64 @@ static int sparse_factor(sd_linear *linear)
     }
     const sd_sparse *lu = linear->sparse;
     linear->smallest = lu->smallest;
+    linear->rank = lu->rank;
     linear->bad_row = lu->bad_row;
     linear->bad_column = lu->bad_column;
     return failed;
+}
+
+static void scaled_solve(sd_linear *linear, sd_number *x)
+{
+    if (linear->dense)
+        dense_solve(linear, x, linear->work);
+    else
+        sd_sparse_solve(linear->sparse, x, linear->work, NULL, NULL);
+}
+
+/* null: for each column that was left the solution in which it is one, of length one */
+static int null_vectors(sd_linear *linear)
+{
+    int32_t n = linear->n, found = 0;
+    size_t room = (size_t)(n - linear->rank) * (size_t)n;
+    if (room > linear->null_room) {
+        sd_number *null = realloc(linear->null, room * sizeof *null);
+        if (!null)
+            return 2;
+        linear->null = null;
+        linear->null_room = room;
+    }
+    for (int32_t k = linear->dense ? linear->rank : 0; k < n; k++) {
+        if (linear->sparse && linear->sparse->source[k] >= 0)
+            continue;
+        int32_t c = linear->dense ? linear->place[k] : linear->sparse->order[k];
+        sd_number *v = linear->null + (size_t)found++ * (size_t)n;
+        memset(v, 0, (size_t)n * sizeof *v);
+        for (int32_t e = linear->column[c]; e < linear->column[c + 1]; e++)
+            v[linear->row[e]] -= linear->scaled[e];
+        scaled_solve(linear, v);
+        v[c] = 1.0;
+        double square = 0.0;
+        for (int32_t i = 0; i < n; i++)
+            square += sd_square(v[i]);
+        for (int32_t i = 0; i < n; i++)
+            v[i] /= sqrt(square);
+    }
+    return 0;
+}
+
+/* takes from x what lies in the directions that the matrix maps to zero; no pass makes x longer, one will do where these
+ * share no unknowns */
+static void shorten(const sd_linear *linear, sd_number *x)
+{
+    int32_t n = linear->n;
+    for (int32_t k = 0; k < n - linear->rank; k++) {
+        const sd_number *v = linear->null + (size_t)k * (size_t)n;
+        sd_number along = 0.0;
+        for (int32_t i = 0; i < n; i++)
+            along += sd_conjugate(v[i]) * x[i];
+        for (int32_t i = 0; i < n; i++)
+            x[i] -= along * v[i];
+    }
 }
 
 /* all that was learnt of matrices before */
@@ -233,6 +293,8 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
         return 0;
     equilibrate(linear, values, scale);
     int failed = linear->dense ? dense_factor(linear) : sparse_factor(linear);
+    if (!failed && linear->rank < linear->n)
+        failed = null_vectors(linear);
     if (linear->elimination && !linear->idle && !failed)
         sd_elimination_learn(linear->elimination, linear->scaled);
     return failed;
@@ -249,14 +311,6 @@ void sd_linear_replayed(sd_linear *linear)
         linear->elimination = sd_elimination_new(linear->n, linear->column, linear->row);
 }
 
-static void scaled_solve(sd_linear *linear, sd_number *x)
-{
-    if (linear->dense)
-        dense_solve(linear, x, linear->work);
-    else
-        sd_sparse_solve(linear->sparse, x, linear->work, NULL, NULL);
-}
-
 void sd_linear_solve(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
@@ -265,7 +319,7 @@ void sd_linear_solve(sd_linear *linear, sd_number *x)
         sd_elimination_solve(linear->elimination, x);
         return;
     }
-    if (linear->sparse && linear->smallest >= REFINE) {
+    if (linear->sparse && linear->smallest >= REFINE && linear->rank == n) {
         sd_sparse_solve(linear->sparse, x, linear->work, linear->row_scale, linear->column_scale);
         return;
     }
@@ -280,6 +334,8 @@ void sd_linear_solve(sd_linear *linear, sd_number *x)
         for (int32_t i = 0; i < n; i++)
             x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;
     }
+    if (linear->rank < n)
+        shorten(linear, x);
     for (int32_t i = 0; i < n; i++)
         x[i] *= linear->column_scale[i];
 }

@@ -13,6 +13,7 @@
 #include "linear/elimination.h"
 #include "linear/number.h"
 
+#include <stddef.h>
 #include <stdint.h>
 
 typedef struct sd_sparse sd_sparse;
@@ -26,6 +27,8 @@ typedef struct sd_order {
     int32_t paired;
 } sd_order;
 
+#define SD_LEAST_PIVOT 1e-290 /* part of its column below which a pivot is none, where every one but zero counts */
+
 typedef struct sd_linear {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
@@ -38,12 +41,14 @@ typedef struct sd_linear {
     double smallest;             /* smallest pivot relative to its column: 0 singular */
     int32_t bad_row, bad_column; /* where it was found */
     int64_t factorisations, pivotings;
-    /* A column that nothing determines, where `idle` allows it: its solution is zero, the row that is left over holds or
-     * not.  (Laws whose slopes underflow: the node between two diodes that block.)  Of dense matrices alone. */
+    /* A column that nothing determines, where `idle` allows it: of all solutions the shortest is taken, in units of `scale`;
+     * the row that is left over holds or not.  (Laws whose slopes underflow: the node between two diodes that block.) */
     double null_pivot;           /* part of its column below which a pivot is none; 0: every pivot counts */
     const int32_t *idle;         /* [n] 1: the column may be left; of the caller */
     int32_t *place;              /* [n] column that is eliminated k-th */
     int32_t rank;                /* of the last factors: n where no column was left */
+    sd_number *null;             /* [n - rank][n] what the matrix maps to zero, of the last factors */
+    size_t null_room;
     int32_t pivoted;             /* 0: pivots are chosen anew */
     int32_t replayed;            /* the last factors are those of `elimination` */
     sd_elimination *elimination; /* NULL: every matrix is pivoted */

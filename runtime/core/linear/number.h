@@ -18,6 +18,16 @@ static inline double sd_size(sd_number x)
     return fabs(creal(x)) + fabs(cimag(x));
 }
 
+static inline double sd_square(sd_number x)
+{
+    return creal(x) * creal(x) + cimag(x) * cimag(x);
+}
+
+static inline sd_number sd_conjugate(sd_number x)
+{
+    return CMPLX(creal(x), -cimag(x));
+}
+
 /* 1 / x by the plain formula, which overflows before x does: those who judge what comes of it see numbers that are not finite */
 static inline sd_number sd_inverse(sd_number x)
 {
@@ -55,6 +65,16 @@ typedef double sd_number;
 static inline double sd_size(sd_number x)
 {
     return fabs(x);
+}
+
+static inline double sd_square(sd_number x)
+{
+    return x * x;
+}
+
+static inline sd_number sd_conjugate(sd_number x)
+{
+    return x;
 }
 
 static inline sd_number sd_inverse(sd_number x)

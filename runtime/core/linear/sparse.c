@@ -109,12 +109,13 @@ static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *large
     for (int32_t i = top; i < lu->rows; i++)
         if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
             *largest = sd_size(lu->x[lu->stack[i]]);
+    double threshold = lu->null_pivot > 0.0 ? 1.0 : THRESHOLD; /* what is left below it must be what the matrix lacks */
     int32_t own = lu->own ? lu->own[c] : c;
-    if (lu->paired && lu->place[own] < 0 && *largest > 0.0 && sd_size(lu->x[own]) >= THRESHOLD * *largest)
+    if (lu->paired && lu->place[own] < 0 && *largest > 0.0 && sd_size(lu->x[own]) >= threshold * *largest)
         return own;
     for (int32_t i = top; i < lu->rows && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
-        if (lu->place[r] >= 0 || sd_size(lu->x[r]) < THRESHOLD * *largest)
+        if (lu->place[r] >= 0 || sd_size(lu->x[r]) < threshold * *largest)
             continue;
         if (best < 0 || lu->count[r] < lu->count[best] || (lu->count[r] == lu->count[best] && r < best))
             best = r;
@@ -158,6 +159,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
     int64_t nl = 0, nu = 0;
     lu->pivoted = 0;
     lu->smallest = 1.0;
+    lu->rank = n;
     for (int32_t i = 0; i < rows; i++) {
         lu->place[i] = -1;
         lu->mark[i] = -1;
@@ -193,7 +195,8 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         double largest;
         int32_t pivot = choose(lu, c, top, &largest);
         double relative = size > 0.0 ? largest / size : 0.0;
-        if (relative < lu->null_pivot) { /* it follows from the others */
+        if (relative < lu->null_pivot && (!lu->idle || lu->idle[c])) { /* it follows from the others */
+            lu->rank--;
             for (int32_t i = top; i < rows; i++)
                 lu->x[lu->stack[i]] = 0.0;
             nu = lu->u_start[k];
@@ -230,7 +233,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         lu->l_start[k + 1] = (int32_t)nl;
         lu->u_start[k + 1] = (int32_t)nu;
     }
-    for (int32_t r = 0; r < rows && rows > n; r++)
+    for (int32_t r = 0; r < rows && rows > lu->rank; r++)
         if (lu->place[r] < 0)
             lu->place[r] = n;
     int64_t kept = 0, p = 0;
@@ -267,6 +270,14 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     return failed;
 }
 
+static double column_size(const int32_t *column, const sd_number *value, int32_t c)
+{
+    double size = 0.0;
+    for (int32_t e = column[c]; e < column[c + 1]; e++)
+        size = fmax(size, sd_size(value[e]));
+    return size;
+}
+
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
     sd_number *x = lu->x;
@@ -296,6 +307,8 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
             largest = sd_size(v) > largest ? sd_size(v) : largest;
         }
         double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
+        if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(column, value, c)) /* it may be left out now */
+            relative = 0.0;
         lu->smallest = relative < lu->smallest ? relative : lu->smallest;
         if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
             memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);

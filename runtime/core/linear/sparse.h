@@ -24,6 +24,8 @@ typedef struct sd_sparse {
     int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T */
     const int32_t *own;          /* [n] of the caller; NULL: row c */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
+    const int32_t *idle;         /* [n] 1: which may be, of the caller; NULL: any */
+    int32_t rank;                /* columns that were not left out */
     double dropped;              /* entries of L up to this size are left out, rows in excess that agree with it; 0: none.
                                     The factors serve once: no refactorising on such a pattern */
     int64_t most;                /* entries of the factors beyond which pivoting is given up; 0: none */

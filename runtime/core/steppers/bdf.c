@@ -109,6 +109,7 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
     memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
     memset(bdf->ee, 0, (size_t)bdf->n * sizeof *yd);
     bdf->h = 1.0;
+    bdf->linear->null_pivot = bdf->linear->idle ? SD_LEAST_PIVOT : 0.0;
     sd_bdf_begin_powers(bdf);
     sd_bdf_weights(bdf);
     sd_bdf_step_weights(bdf);
@@ -157,26 +158,30 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
     return SD_FINE;
 }
 
+/* what a row may be off, of its terms */
+static double row_limit(const sd_bdf *bdf)
+{
+    return fmin(1.0, fmax(FINEST_ROW, LAX * bdf->rtol));
+}
+
 /* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an
  * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
 static int rows_hold(sd_bdf *bdf, double t)
 {
     for (int32_t i = 0; i < bdf->n; i++)
         bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->magnitude[i]);
-    double limit = fmin(1.0, fmax(FINEST_ROW, LAX * bdf->rtol));
+    double limit = row_limit(bdf);
     int all = bdf->linear->rank < bdf->n;
     return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, all, bdf->terms) < 0;
 }
 
-/* Every steep row is as small as round-off of the largest unknowns met, by slopes at the point itself, lets it be (see
+/* Every steep row is as small as round-off of the unknowns (`moved`), by slopes at the point itself, lets it be (see
  * radau_newton.c) */
 static int rows_at_round_off(sd_bdf *bdf, double t)
 {
-    if (bdf->linear->rank < bdf->n)
-        return 0;
     sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
-    return sd_first_astray(bdf->system, t, bdf->y, bdf->yd, bdf->delta, bdf->jy, bdf->jyd, 1.0 / bdf->cj, bdf->met,
-                           SD_ROUND_OFF, bdf->terms) < 0;
+    return sd_first_astray(bdf->system, t, bdf->y, bdf->yd, bdf->delta, row_limit(bdf), bdf->jy, bdf->jyd,
+                           1.0 / bdf->cj, bdf->moved, bdf->linear->rank < bdf->n, bdf->terms) < 0;
 }
 
 /* the residual in delta is finite; else bad_row says where not */
@@ -242,6 +247,8 @@ static int iterate(sd_bdf *bdf, double t)
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
         idle = m > 0 && size <= STAGNANT && !(size < SLOW * before);
+        for (int32_t i = 0; i < bdf->n && idle && judged; i++)
+            bdf->moved[i] = sd_open(d[i], bdf->y[i], bdf->met[i]);
         before = size;
         /* a first correction is not believed beyond this, however fast earlier steps converged */
         double contraction = m == 0 ? fmax(bdf->contraction, trust) : bdf->contraction;

@@ -34,7 +34,6 @@
 #define SD_SAFETY 0.9
 #define SD_GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
 #define SD_SHRINK 0.2
-#define SD_LEAST_PIVOT 1e-290 /* part of its column below which a pivot is none, where every one but zero counts */
 
 /* Coefficients of one method (numerics/radau_coefficients.py); rows and columns of S of A^-1 = S diag(...) S^-1 */
 typedef struct sd_radau_method {

@@ -215,8 +215,8 @@ int sd_radau_astray(sd_radau *radau)
             radau->rate[i] = rate / radau->h;
         }
         sd_residual(radau->system, at, radau->y, radau->rate, radau->d[0]);
-        if (sd_first_astray(radau->system, at, radau->y, radau->rate, radau->d[0], radau->jy, radau->jyd, radau->h,
-                            radau->magnitude, 1.0, radau->terms) >= 0)
+        if (sd_first_astray(radau->system, at, radau->y, radau->rate, radau->d[0], 0.0, radau->jy, radau->jyd,
+                            radau->h, radau->magnitude, 0, radau->terms) >= 0)
             return 1;
     }
     return 0;

@@ -13,10 +13,12 @@
 #define SLOW 0.99          /* contraction above which Newton gives up */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
 #define LAX 100.0          /* a steep row may be off by as many times Newton's tolerance times the method's */
-#define NULL_PIVOT 1e-10   /* part of its column below which a pivot determines no better than Newton's test asks */
 #define LEAST_PART 1e-7    /* of a correction that is still tried */
 #define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
 #define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
+
+/* Parts of their column below which pivots determine nothing: no better than Newton's test asks, then ever fainter */
+static const double null_pivots[] = {1e-10, 1e-13, 1e-16, SD_LEAST_PIVOT};
 
 /* the part of its column below which a pivot is none; columns of multipliers and states always have one */
 void sd_radau_leave_below(sd_radau *radau, double null_pivot)
@@ -38,13 +40,19 @@ static int columns_left(const sd_radau *radau)
     return left;
 }
 
+/* what a row may be off, of its terms */
+static double row_limit(const sd_radau *radau, double newton_tolerance)
+{
+    double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
+    return columns_left(radau) ? fmax(limit, FAINT_ROW) : limit;
+}
+
 /* The residuals in d, behind the last correction, are small in every steep row beside the row's own terms: on an
  * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
 static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
 {
-    double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
-    int left = columns_left(radau), judged = all || left;
-    limit = left ? fmax(limit, FAINT_ROW) : limit;
+    int judged = all || columns_left(radau);
+    double limit = row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
         for (int32_t i = 0; i < radau->n; i++) {
             radau->y[i] = radau->phi[i] + radau->z[s][i];
@@ -57,19 +65,21 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
     return 1;
 }
 
-/* Every steep row is as small as round-off of the largest unknowns met, by slopes at the stages themselves, lets it be: where
- * two terms of a law nearly vanish beside unknowns that are large elsewhere, no part of the terms is ever reached.  Where the
- * factors left a column small corrections say nothing. */
-static int rows_at_round_off(sd_radau *radau)
+/* Every steep row is as small as the last corrections (`full`), which do not shrink any more, let it be by slopes at the
+ * stages themselves: where two terms of a law nearly vanish beside unknowns that are large elsewhere, no part of the terms is
+ * ever reached.  Where the factors left a column every row is judged. */
+static int rows_at_round_off(sd_radau *radau, double newton_tolerance)
 {
-    if (columns_left(radau))
-        return 0;
+    int all = columns_left(radau);
+    double limit = row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
         double t = radau->t + radau->method->c[s] * radau->h;
         sd_radau_stage(radau, s, radau->y, radau->rate);
         sd_jacobian(radau->system, t, radau->y, radau->rate, radau->jy, radau->jyd);
-        if (sd_first_astray(radau->system, t, radau->y, radau->rate, radau->d[s], radau->jy, radau->jyd, radau->h,
-                            radau->met, SD_ROUND_OFF, radau->terms) >= 0)
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->first[i] = sd_open(radau->full[s][i], radau->y[i], radau->met[i]);
+        if (sd_first_astray(radau->system, t, radau->y, radau->rate, radau->d[s], limit, radau->jy, radau->jyd,
+                            radau->h, radau->first, all, radau->terms) >= 0)
             return 0;
     }
     return 1;
@@ -88,6 +98,24 @@ static double newton_tolerance(const sd_radau *radau)
     return fmax(least, fmin(0.03, sqrt(radau->tolerance)));
 }
 
+/* the stages are kept in base */
+static void keep(sd_radau *radau)
+{
+    for (int s = 0; s < radau->method->stages; s++)
+        memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
+}
+
+/* a correction of the stages with what it was and from where: full, base */
+static double noted_correction(sd_radau *radau)
+{
+    keep(radau);
+    double size = sd_radau_correct(radau);
+    for (int s = 0; s < radau->method->stages; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->full[s][i] = radau->z[s][i] - radau->base[s][i];
+    return size;
+}
+
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
@@ -100,11 +128,11 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
         int cause = sd_radau_residuals(radau);
         if (cause)
             return cause;
-        if (converged && (rows_hold(radau, tolerance, 0) || (idle && rows_at_round_off(radau))))
+        if (converged && (rows_hold(radau, tolerance, 0) || (idle && rows_at_round_off(radau, tolerance))))
             return SD_FINE;
         if (m > most)
             break;
-        double size = sd_radau_correct(radau);
+        double size = radau->system->scales > 0 ? noted_correction(radau) : sd_radau_correct(radau);
         *used = m;
         if (!isfinite(size))
             return SD_NEWTON;
@@ -181,50 +209,63 @@ static int full_correction(sd_radau *radau, int known, double *size)
     int cause = sd_radau_factorise(radau, 1);
     if (cause)
         return cause;
-    for (int s = 0; s < radau->method->stages; s++)
-        memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
     if (!known && (cause = sd_radau_residuals(radau)))
         return cause;
-    *size = sd_radau_correct(radau);
-    for (int s = 0; s < radau->method->stages; s++)
-        for (int32_t i = 0; i < radau->n; i++)
-            radau->full[s][i] = radau->z[s][i] - radau->base[s][i];
+    *size = noted_correction(radau);
     return isfinite(*size) ? SD_FINE : SD_NEWTON;
 }
 
-/* Newton's iteration with fresh slopes each time and corrections shortened where they lead astray: for steep laws.  What
- * follows from the state through slopes near round-off does not converge (on the tail of an exponential every correction
- * is 1/a, on its underflow it is noise).  So the state is judged by its correction, the rest by the rows, each in the
- * scale of its terms. */
+/* the stages as they were kept */
+static void take_back(sd_radau *radau)
+{
+    for (int s = 0; s < radau->method->stages; s++)
+        memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
+}
+
+/* The part of a correction that is taken, whose factors leave columns below `null_pivot`; 0: none, or `cause` says why; -1:
+ * the stages hold.  known: d holds the residuals. */
+static double walk(sd_radau *radau, double null_pivot, double tolerance, int known, int *cause)
+{
+    double size;
+    sd_radau_leave_below(radau, null_pivot);
+    *cause = full_correction(radau, known, &size);
+    sd_radau_leave_below(radau, SD_LEAST_PIVOT);
+    if (*cause)
+        return 0.0;
+    if (radau->state_size <= tolerance && sd_radau_residuals(radau) == SD_FINE &&
+        (rows_hold(radau, tolerance, 1) || rows_at_round_off(radau, tolerance)))
+        return -1.0;
+    if (columns_left(radau) && size <= STAGNANT * tolerance)
+        return 0.0; /* what is left of the rows is for the columns that were left */
+    return damped_part(radau, fmax(size, DBL_MIN));
+}
+
+/* Newton's iteration from the last point, with fresh slopes each time and corrections shortened where they lead astray: for
+ * steep laws.  What follows from the state through slopes near round-off does not converge (on the tail of an exponential
+ * every correction is 1/a, on its underflow it is noise).  So the state is judged by its correction, the rest by the rows,
+ * each in the scale of its terms; and slopes count that are faint only where those above them mend nothing.  (An extrapolated
+ * point may lie far up an exponential, from where it is 1/a at a time.) */
 int sd_radau_iterate_damped(sd_radau *radau, int *used)
 {
     double tolerance = newton_tolerance(radau);
-    double size;
-    int cause = sd_radau_residuals(radau), known = cause == SD_FINE;
-    if (cause == SD_NONFINITE) { /* extrapolated too far: from the last point */
-        for (int s = 0; s < radau->method->stages; s++)
-            memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
-        cause = SD_FINE;
-    }
-    for (int m = 1; m <= WALK && cause == SD_FINE; m++) {
+    for (int s = 0; s < radau->method->stages; s++)
+        memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
+    for (int m = 1; m <= WALK; m++) {
+        double part = 0.0;
         *used = m;
-        sd_radau_leave_below(radau, NULL_PIVOT);
-        cause = full_correction(radau, known, &size);
-        sd_radau_leave_below(radau, SD_LEAST_PIVOT);
-        if (cause)
-            break;
-        if (radau->state_size <= tolerance && sd_radau_residuals(radau) == SD_FINE && rows_hold(radau, tolerance, 1))
-            return SD_FINE;
-        if (radau->linear->rank < radau->n) {
-            for (int s = 0; s < radau->method->stages; s++)
-                memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
-            if ((cause = full_correction(radau, 0, &size)))
-                break;
+        keep(radau);
+        for (size_t k = 0; k < sizeof null_pivots / sizeof *null_pivots && part == 0.0; k++) {
+            int cause;
+            if (k > 0)
+                take_back(radau);
+            part = walk(radau, null_pivots[k], tolerance, m > 1 && k == 0, &cause);
+            if (part < 0.0)
+                return SD_FINE;
+            if (cause == SD_STOPPED || cause == SD_MEMORY)
+                return cause;
         }
-        double part = damped_part(radau, fmax(size, DBL_MIN));
         if (part == 0.0 || (m >= DAMPED && part < 1.0))
             return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
-        known = 1;
     }
-    return cause ? cause : SD_NEWTON;
+    return SD_NEWTON;
 }

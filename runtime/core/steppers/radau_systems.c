@@ -46,18 +46,20 @@ static void factorise_one(void *context, int part)
     sd_radau *radau = all->radau;
     const sd_radau_method *method = radau->method;
     int32_t entries = radau->system->entries;
+    /* a pivot is small or not beside the unknowns themselves, whatever the step */
+    const double *scale = radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
     if (part == 0) {
         double real = method->gamma / radau->h;
         for (int32_t e = 0; e < entries; e++)
             radau->g[e] = radau->jy[e] + real * radau->jyd[e];
-        all->failed[0] = sd_linear_factor(radau->linear, radau->g, radau->scale);
+        all->failed[0] = sd_linear_factor(radau->linear, radau->g, scale);
         return;
     }
     double complex both = method->lambda[part - 1] / radau->h;
     double complex *gz = sd_linear_z_values(radau->complex_linear[part - 1]);
     for (int32_t e = 0; e < entries; e++)
         gz[e] = radau->jy[e] + both * radau->jyd[e];
-    all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, radau->scale);
+    all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, scale);
 }
 
 /* The factors of all matrices of a step; the failure of the first that has none.  Large ones are all made in any case: what

@@ -57,7 +57,17 @@ typedef struct sd_stepper {
 } sd_stepper;
 
 #define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the largest that unknowns have been */
+#define SD_NOISY 10.0  /* times a correction that does not shrink any more: what such ones leave open */
+#define SD_NOISE 1e-9  /* part of an unknown up to which a correction may be that */
 #define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */
+
+/* What round-off leaves open of an unknown, by the last of corrections that do not shrink any more: rows far from it with
+ * large terms leave more of a small unknown open than its own digits. */
+static inline double sd_open(double correction, double y, double met)
+{
+    double size = fmax(fabs(y), met);
+    return fmax(SD_ROUND_OFF * met, fmin(SD_NOISY * fabs(correction), SD_NOISE * size));
+}
 
 /* The largest |y| met so far, and the magnitude that grows with it. */
 static inline void sd_met(double size, double *met, double *magnitude)

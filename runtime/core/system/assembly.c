@@ -118,15 +118,19 @@ int32_t sd_first_unmet(sd_system *system, double t, const double *y, const doubl
     return first_beyond(system->rows, r, limit, s);
 }
 
-int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r,
-                        const double *jy, const double *jyd, double h, const double *magnitude, double part, double *s)
+int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
+                        const double *jy, const double *jyd, double h, const double *open, int all, double *s)
 {
     steep_terms(system, t, y, rate, s);
+    for (int32_t j = 0; j < system->unknowns && all; j++) /* of the other rows, below zero */
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            if (s[system->row[e]] <= 0.0)
+                s[system->row[e]] -= fabs(jy[e] * y[j]);
     for (int32_t i = 0; i < system->rows; i++)
-        s[i] = s[i] != 0.0 ? fabs(r[i]) : 0.0;
+        s[i] = all || s[i] > 0.0 ? fabs(r[i]) - limit * fabs(s[i]) : 0.0;
     for (int32_t j = 0; j < system->unknowns; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
-            s[system->row[e]] -= part * (fabs(jy[e]) + fabs(jyd[e]) / h) * magnitude[j];
+            s[system->row[e]] -= (fabs(jy[e]) + fabs(jyd[e]) / h) * open[j];
     for (int32_t i = 0; i < system->rows; i++)
         if (!(s[i] <= 0.0))
             return i;

@@ -73,10 +73,11 @@ void sd_slopes(const sd_system *system, double t, const double *y, const double 
  * linear model. */
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
                        const double *g, const double *scale, int all, double *s);
-/* The first steep row whose residual r at (t, y) is more than a part of the magnitudes of the unknowns, and their changes in
- * a step h, make of it, the entries jy and jyd being those of a point nearby; -1 where there is none.  rate, s: as above. */
-int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r,
-                        const double *jy, const double *jyd, double h, const double *magnitude, double part, double *s);
+/* The first steep row whose residual r at (t, y) is more than `limit` of the magnitudes of its terms and what is open of the
+ * unknowns [n], and of their changes in a step h, makes of it, the entries jy and jyd being those of the point; -1 where
+ * there is none.  rate, s, all: as above. */
+int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
+                        const double *jy, const double *jyd, double h, const double *open, int all, double *s);
 /* position of the first number that is not finite, -1 where all are */
 int32_t sd_first_bad(int32_t n, const double *x);
 
