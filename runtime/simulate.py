@@ -14,7 +14,7 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.accuracy import Achieved, Lighter, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
-from sysdyn.runtime.integrate.runs import LONG, Runs, Samples, Way
+from sysdyn.runtime.integrate.runs import LONG, LONG_STEEP, Runs, Samples, Way
 from sysdyn.runtime.integrate.second_opinion import confirmed
 from sysdyn.runtime.integrate.underlying import rateless, underlying_form
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
@@ -94,12 +94,14 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
 
 
-def _left(method: str, failure: SolverFailure) -> str:
+def _left(runs: Runs, failure: SolverFailure) -> str:
     """Why a method was left."""
+    method = runs.method
     if failure.cause == "stiff":
         return f"stiff: {method} is held to steps of {failure.step:.2g} s"
-    why = f"needs more than {LONG} steps" if failure.cause == "max_steps" else f"stopped at {failure.time:.6g} s"
-    return f"{method} {why}"
+    if failure.cause == "max_steps":
+        return f"{method} needs more than {runs.patience} steps"
+    return f"{method} stopped at {failure.time:.6g} s"
 
 
 def _targets(runs: Runs, options: Options) -> Floats:
@@ -209,7 +211,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     missed: Achieved | None = None
     stopped: SolverFailure | None = None
     while True:
-        runs.patience = LONG if runs.method == "bdf" and others and not steep else None
+        runs.patience = (LONG_STEEP if steep else LONG) if runs.method == "bdf" and others else None
         try:
             achieved = _achieved(runs, options, doubted=doubted, lighter=_lighter(runs, options, others))
         except SolverFailure as failure:
@@ -217,7 +219,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
                 if missed is None:
                     raise _told(stopped, failure) from None
                 return missed
-            doubted, why = failure.cause not in ("max_steps", "stiff"), _left(runs.method, failure)
+            doubted, why = failure.cause not in ("max_steps", "stiff"), _left(runs, failure)
             stopped = failure if doubted else stopped
         else:
             short = _short(runs, options, achieved) if steep and others else None
