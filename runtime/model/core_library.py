@@ -201,6 +201,7 @@ def _load() -> Any:
         "sd_excitation": (_D, [_P, _D, _D, _P, _P, _P, _I, _D, _P]),
         "sd_row_sizes": (c.c_int, [_P, _D, _I, _I, _P, _P, _I, _P, _P, _I, _P]),
         "sd_relaxed": (c.c_int, [_P, _P, _I, *[_P] * 4, _D, _P]),
+        "sd_response": (c.c_int, [_P, _P, _P, _D, _D, _D, *[_P] * 4]),
         "sd_magnitudes": (c.c_int, [_P, _P, _D, _D, *[_P] * 8]),
         "sd_compliance": (c.c_int, [_P] * 4),
         "sd_confirmed": (c.c_int, [_P, _P, _D, _P, _P, _P]),

@@ -4,7 +4,10 @@ A magnitude is the nominal value of the manifest where it names one.  Else the l
 the time scale of the start (never the span alone: a long run would call everything small), and a thousandth of these
 among unknowns of the same kind and unit.
 Unknowns that are zero with all of that take the magnitude that balances the rows they stand in: the other terms
-of the row, and how far the row itself moves with t over the span (sources that start at zero).
+of the row, and how far the row itself moves with t over the span (sources that start at zero).  Such a row knows
+nothing of what relieves it (the whole of a source on a diode would drive 1e8 A), and balances little where what drives
+it is round-off (a diode that blocks): those that carry the state lie within what the sources make of them by the time
+in which they move, or a thousandth of that of their like, and what by the whole span (core/start/response.h).
 During a run magnitudes grow with max |y|; a second run starts with the maxima of the first.
 """
 

@@ -67,8 +67,6 @@ def scenes(name):
 def test_scenes_run_and_hold_what_they_expect(name, scene, tmp_path, capsys):
     output = tmp_path / "trace.h5"
     options = ["--scene", scene, "--json", "-o", str(output), *settings(name), "--max-wall", "120"]
-    if name == "benchmark/ring" and os.environ.get("SYSDYN_LONG") != "1":
-        options += ["--until", "0.1 ms"]  # of 1 ms, which takes 15 s
     code = run(["simulate", str(MODELS / f"{name}.sd"), *options])
     found = result(capsys)
     assert code == 0, found

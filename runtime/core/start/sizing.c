@@ -1,6 +1,7 @@
 #include "start/sizing.h"
 
 #include "linear/linear.h"
+#include "start/response.h"
 
 #include <float.h>
 #include <math.h>
@@ -234,6 +235,35 @@ static void carriers(const sd_sizing *s, const double *jyd, int32_t *carries)
             carries[b->column[e]] = 1;
 }
 
+/* found [n]: zeros of which no rate says how far they get lie between what moves with t plainly makes of them, or GROUP of
+ * their like, and what it would make of them if it stayed there for the span; least, most [n], largest [kinds]: room */
+static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order, double t0, double quick, double span,
+                   const double *y, const double *moves, const int32_t *carries, const double *divisor, double *found,
+                   double *least, double *most, double *largest)
+{
+    const sd_balance *b = s->balance;
+    int32_t n = b->unknowns, zeros = 0;
+    for (int32_t k = 0; k < n; k++)
+        zeros += carries[k] && y[k] == 0.0 && moves[k] == 0.0 && s->nominal[k] == 0.0;
+    if (!zeros || !isfinite(quick))
+        return 0;
+    int answered = sd_response(b, system, order, t0, quick, span, y, found, least, most);
+    if (answered <= 0)
+        return answered;
+    double *bound[] = {least, most};
+    for (int side = 0; side < 2; side++) {
+        for (int32_t k = 0; k < n; k++)
+            bound[side][k] /= divisor[k];
+        group_largest(b, bound[side], largest);
+        for (int32_t k = 0; k < n; k++)
+            bound[side][k] = divisor[k] * sd_larger(bound[side][k], GROUP * largest[b->kind[k]]);
+    }
+    for (int32_t k = 0; k < n; k++)
+        if (carries[k] && y[k] == 0.0 && moves[k] == 0.0 && s->nominal[k] == 0.0 && most[k] > 0.0)
+            found[k] = sd_larger(sd_smaller(found[k], most[k]), least[k]);
+    return 0;
+}
+
 int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span, const double *y, const double *yd,
                   const double *jy, const double *jyd, const double *rate, const sd_order *order, double *found,
                   double *tau)
@@ -276,6 +306,8 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
             found[system->k_q[k]] = *tau * found[system->k_f[k]];
     for (size_t k = 0; k < n; k++)
         found[k] = found[k] > TINY ? found[k] : UNKNOWN;
+    if (rate)
+        failed |= bounded(s, system, order, t0, quick, span, y, moves, carries, divisor, found, kept, balanced, most);
     free(memory);
     free(carries);
     return failed ? -1 : 0;
