@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from handwritten import chain, ladder, mesh, power_grid, stages
+from handwritten import chain, ladder, mesh, mixed, power_grid, stages, woven
 from sysdyn.api import simulate
 from sysdyn.cli.run.prepare import Prepared, module_of
 from sysdyn.compiler.network import gathered as gathered_
@@ -24,6 +24,9 @@ NETLISTS = {
     "mesh": mesh(4, 12),
     "chain": chain(60),
     "stages": stages(18),
+    "mixed": mixed(40).replace("to 1 ms", "to 200 us"),
+    "power_grid": power_grid(40).replace("to 5 ms", "to 500 us"),
+    "woven": woven(60).replace("to 1 ms", "to 300 us"),
 }
 
 
@@ -78,7 +81,10 @@ def test_what_is_said_is_said_of_the_lines_of_the_text(name):
     families, written = (compile_network(found, gather=gather) for gather in (True, False))
     assert families.written is not None
     assert written.written is None
-    assert sorted(map(said, families.notes)) == sorted(map(said, written.notes))
+    assert sorted(said(n)[:2] for n in families.notes) == sorted(said(n)[:2] for n in written.notes)
+    short = {said(n)[:2] for n in families.notes if "a displacement of it" in n.message}  # joined by tables
+    one, other = (sorted(s for s in map(said, c.notes) if s[:2] not in short) for c in (families, written))
+    assert one == other
     one, other = (c.manifest(c.bind()) for c in (families, written))
     for part, key in (("unknowns", "name"), ("rows", "label")):
         assert {(r[key], r.get("line")) for r in one[part]} == {(r[key], r.get("line")) for r in other[part]}
@@ -106,7 +112,7 @@ def test_one_text_of_c_for_any_number_of_lines(effort):
     assert (many - few) / 300 < 2500  # lines of Python a line of text, from its characters to C
 
 
-def test_what_stands_in_no_row_is_lowered_as_it_is_written(tmp_path):
+def test_a_grid_without_order_keeps_its_names(tmp_path):
     """A grid of buses joined at random runs; each unknown keeps its name."""
     found = network(power_grid(24))
     model = compile_network(found, gather=True)
@@ -115,6 +121,23 @@ def test_what_stands_in_no_row_is_lowered_as_it_is_written(tmp_path):
     assert not any("#" in name for name in names)
     text = power_grid(24)
     assert np.isfinite(run(tmp_path, text.replace("to 5 ms", "to 500 us"), "grid", backend="numpy")).all()
+
+
+@pytest.mark.parametrize("of", [power_grid, mixed, lambda n: mesh(n // 8, 8)], ids=["power_grid", "mixed", "mesh"])
+def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
+    """Tables of indices tell what is joined to what: as many statements for any number of lines, each at equal cost."""
+
+    def made(n):
+        with fresh():
+            return compile_network(network(of(n)), gather=True)
+
+    short, few = effort(lambda: made(160))
+    long, many = effort(lambda: made(320))
+    assert len(long.family.branches) == len(short.family.branches)
+    assert len(long.form.families) == len(short.form.families)
+    assert len(long.text) < 1.05 * len(short.text)
+    lines = len(of(320).splitlines()) - len(of(160).splitlines())
+    assert (many - few) / lines < 4000  # lines of Python a line of text
 
 
 def test_a_chain_of_scalars_leaves_no_full_matrix():
