@@ -58,8 +58,7 @@ def _active(law: Node, own: Node, held: Mapping[Node, float]) -> tuple[float, fl
     if any(math.isnan(v) for v in held.values()):
         return None
     largest: Sequence[float] = (0.0, 0.0)
-    for x in DECADES:
-        value = ex.evaluate([law], lambda n, x=x: x if n is own else held.get(n, math.nan))[0]  # type: ignore[misc]
+    for x, value in zip(DECADES, ex.evaluate_along(law, own, DECADES, lambda n: held.get(n, math.nan)), strict=True):
         if not math.isfinite(value):
             continue
         if x * value < 0.0 and abs(value) > ROUND_OFF * largest[0]:
