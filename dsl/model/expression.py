@@ -636,6 +636,10 @@ def evaluate_along(
     """Values of a scalar node where one leaf takes the values of points; what does not read it is evaluated once."""
     values: dict[Node, Any] = {}
     moving: list[Node] = []
+
+    def here(node: Node) -> float:
+        return float(values[leaf]) if node is leaf else lookup(node)
+
     for node in topological_unbound([root]):
         if leaf in variables(node):
             moving.append(node)
@@ -643,7 +647,7 @@ def evaluate_along(
             values[node] = _value(node, values, lookup)
     for x in points:
         for node in moving:
-            values[node] = x if node is leaf else _value(node, values, lambda n, x=x: x if n is leaf else lookup(n))
+            values[node] = x if node is leaf else _value(node, values, here)
         yield values[root]
 
 
