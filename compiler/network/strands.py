@@ -44,14 +44,14 @@ class Strands:
 
 
 class _Graph:
-    """Branches at common-effort nodes that may stand in families: loose; free: nodes that may."""
+    """Branches that may stand in families: loose; free: nodes that may, with their domains."""
 
     def __init__(self, network: Network, shapes: Mapping[str, Shaped], taken: Collection[str]) -> None:
         told = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] == "ne"}
         self.free = {
             n.name: n.domain.name
             for n in network.nodes
-            if n.domain.common == "effort" and not n.shape and n.name not in network.read
+            if not n.shape and n.name not in network.read
             if n.name not in told and n.name not in taken
         }
         self.loose: dict[str, Branch] = {}

@@ -144,6 +144,27 @@ def woven(n: int, seed: int = 3) -> str:
     return _file(ELECTRICAL, "woven", lines, f"time 0 s to 1 ms; trace a1.e, j2.e, k3.e, i4.f, c{n - 1}.q, r7.e, Y.f")
 
 
+def lattice(n: int, seed: int = 4) -> str:
+    """Masses joined at random by springs, and by springs and dampers in series, some to a wall, told in any order; some
+    move at the start, or are off their springs' rest.
+    """
+    draw = random.Random(seed)
+    lines = [f"  node m{k}: translation" for k in range(n)]
+    lines.append("  push: effort(e = 1 N*sin(3 s^-1*t)) m1 -> ground")
+    placed = []
+    for k in range(n):
+        placed.append(f"  M{k}: kinetic(p = {draw.uniform(1, 9):.3f} kg*f) m{k} -> ground")
+        other = f"m{draw.randrange(k)}" if k else "ground"
+        placed.append(f"  K{k}: potential(e = {draw.uniform(50, 90):.3f} N/m*q) m{k} -> {other}")
+        other = draw.choice([f"m{(k + 1 + draw.randrange(n - 1)) % n}", "ground"])
+        placed.append(f"  node s{k}: translation")
+        placed.append(f"  D{k}: dissipator(e = {draw.uniform(1, 2):.3f} N.s/m*f) m{k} -> s{k}")
+        placed.append(f"  S{k}: potential(e = {draw.uniform(5, 9):.3f} N/m*q) s{k} -> {other}")
+        placed += [f"  init m{k}.f = {k % 7} mm/s"] * (k % 4 == 0) + [f"  init S{k}.q = {k % 5} mm"] * (k % 5 == 1)
+    draw.shuffle(placed)
+    return _file("", "lattice", lines + placed, f"time 0 s to 1 s; trace m2.q, m{n - 1}.f, K3.e, D4.f")
+
+
 def uneven(n: int) -> str:
     """An RC ladder of which no two numbers are equal."""
     draw = random.Random(n)

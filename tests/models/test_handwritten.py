@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from handwritten import chain, ladder, mesh, mixed, power_grid, stages, woven
+from handwritten import chain, ladder, lattice, mesh, mixed, power_grid, stages, woven
 from sysdyn.api import simulate
 from sysdyn.cli.run.prepare import Prepared, module_of
 from sysdyn.compiler.network import gathered as gathered_
@@ -26,6 +26,7 @@ NETLISTS = {
     "stages": stages(18),
     "mixed": mixed(40).replace("to 1 ms", "to 200 us"),
     "power_grid": power_grid(40).replace("to 5 ms", "to 500 us"),
+    "lattice": lattice(40),
     "woven": woven(60).replace("to 1 ms", "to 300 us"),
 }
 
