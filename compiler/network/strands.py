@@ -58,10 +58,11 @@ class _Graph:
         self.at: dict[str, list[Branch]] = {}
         self.parts = Joined[str]()
         for b in network.branches:
-            names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
+            ends = [end for end in (b.plus, b.minus) if end is not None]
+            names = [end.node for end in ends if end.node is not None]
             for name in names:
                 self.at.setdefault(name, []).append(b)
-            if len(names) == 2:
+            if len(names) == 2 and not any(end.at for end in ends):  # which element of an array it is does not show here
                 self.parts.join(*names)
             known = b.name in shapes and b.name not in taken and len(set(names)) == len(names)
             if known and any(n in self.free for n in names) and not any(n in taken for n in names):

@@ -141,6 +141,31 @@ def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
     assert (many - few) / lines < 4000  # lines of Python a line of text
 
 
+def test_a_grid_without_a_ground_is_counted_from_one_of_its_nodes(tmp_path, monkeypatch):
+    """Nothing tells by which node of a family: it is lowered as it is written."""
+    text = power_grid(30).replace("-> ground", "-> earth").replace("to 5 ms", "to 100 us")
+    text = text.replace("  node bus0:", "  node earth: electrical\n  node bus0:")
+    found = network(text)
+    assert gathered(found).authors
+    assert compile_network(found, gather=True).written is None
+    one = run(tmp_path, text, "families", backend="numpy")
+    monkeypatch.setattr(gathered_, "LEAST", 10**9)
+    assert np.array_equal(one, run(tmp_path, text, "written", backend="numpy"))
+
+
+def test_branches_of_an_array_beside_a_grid_without_order(tmp_path, monkeypatch):
+    """What a `for` joins to it stays a loop; its nodes' indices do not show that they hang together."""
+    more = "  node v[1..3]: electrical\n  for k in 1..3 { r[k]: resistor(R = k*1 ohm) v[k] -> bus4 }\n"
+    more += "  for k in 1..3 { c[k]: capacitor(C = k*1 uF) v[k] -> ground }\n  w: resistor(R = 2 ohm) v[2] -> bus9\n"
+    text = power_grid(30).replace("to 5 ms", "to 300 us").replace("\n}\n\nscene", f"\n{more}}}\n\nscene")
+    text = text.replace("trace bus3.e", "trace v[2].e, w.f, r[3].f, bus3.e")
+    assert compile_network(network(text), gather=True).written is not None
+    one = run(tmp_path, text, "families", backend="numpy")
+    monkeypatch.setattr(gathered_, "LEAST", 10**9)
+    other = run(tmp_path, text, "written", backend="numpy")
+    assert (np.abs(one - other) <= 1e-8 * np.abs(other).max(axis=1, keepdims=True)).all()
+
+
 def test_a_chain_of_scalars_leaves_no_full_matrix():
     """Definitions through one another are not followed without end: terms grow with the unknowns, not their square."""
 
