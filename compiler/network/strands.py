@@ -62,7 +62,7 @@ class _Graph:
             names = [end.node for end in ends if end.node is not None]
             for name in names:
                 self.at.setdefault(name, []).append(b)
-            if len(names) == 2 and not any(end.at for end in ends):  # which element of an array it is does not show here
+            if len(names) == 2 and not any(end.at for end in ends):  # of arrays only the family shows
                 self.parts.join(*names)
             known = b.name in shapes and b.name not in taken and len(set(names)) == len(names)
             if known and any(n in self.free for n in names) and not any(n in taken for n in names):
