@@ -155,7 +155,7 @@ def compile_network(
     """
     with at_rest(), budget.drawn():
         try:
-            families = gathered(network) if gather else network
+            families = gathered(network, irregular=not formulation.startswith("co_")) if gather else network
             if families is not network:
                 with suppress(ModelError):  # what is wrong is said of what the author wrote
                     found = _compiled(families, formulation, backend, integrating=integrating, traced=traced)

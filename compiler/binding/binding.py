@@ -8,7 +8,7 @@ touches the compiled text.  Received: a network, its program and descriptor form
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
@@ -98,12 +98,12 @@ def bind(
     starts = _starts(form, owners, parameters)
     offsets = offsets_of(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)
-    ix = [integer(slot, owners, parameters, where, network) for slot in program.slots]
+    ix = integers(program.slots, owners, parameters, where, network)
     rows = {(r.owner, r.block): k for k, r in enumerate(form.rows)}
     constants = tuple((rows[o.label, "phi"], where[o.name], offsets[o.name].size) for o in form.offsets)
     return Binding(
         p,
-        np.asarray(ix, dtype=np.int32),
+        ix,
         tuple(() if f.kind == "audit" else owners[f.owner] for f in form.families),
         tuple(() if r.block in SCALAR else owners[r.owner] for r in form.rows),
         starts,
@@ -232,7 +232,28 @@ def places_of(
     return owners, _layout(program, network, binding.parameters, offsets)[1]
 
 
-def integer(
+def integers(
+    slots: Sequence[Slot],
+    owners: dict[str, Extents],
+    parameters: Parameters,
+    where: dict[str, int],
+    network: Network,
+) -> NDArray[np.int32]:
+    """Ix: the values of all slots, and behind them the tables of indices."""
+    found: list[int] = []
+    tables: list[NDArray[np.float64]] = []
+    behind = len(slots)
+    for slot in slots:
+        if slot[0] == "picks":
+            tables.append(np.ravel(parameters.values[slot[1]]))
+            found.append(behind)
+            behind += tables[-1].size
+        else:
+            found.append(_integer(slot, owners, parameters, where, network))
+    return np.concatenate([np.asarray(found, dtype=np.int32), *(np.rint(t).astype(np.int32) for t in tables)])
+
+
+def _integer(
     slot: Slot, owners: dict[str, Extents], parameters: Parameters, where: dict[str, int], network: Network
 ) -> int:
     """The value of a slot (see `integers`)."""

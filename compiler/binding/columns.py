@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.compiler.binding.binding import Binding, Start, _owners, _refuse_outside, integer, places_of
+from sysdyn.compiler.binding.binding import Binding, Start, _owners, _refuse_outside, integers, places_of
 from sysdyn.compiler.forms.coverage import bind_covers
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.energies import EnergyModel
@@ -105,8 +105,7 @@ def reads_of_structure(
     _refuse_outside(model, owners, read, network.place)
     bind_covers(form.covers, owners, read)
     where = places_of(network, form, program, binding)[1]
-    for slot in program.slots:
-        integer(slot, owners, read, where, network)
+    integers(program.slots, owners, read, where, network)
     nodes = [node for pin in form.pins for node in pin.at]
     nodes += [node for pin in form.pins for loop in pin.nest for node in (loop.first, loop.last)]
     nodes += [node for e in network.elements for node in (*e.at, e.value)]

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.compiler.binding.binding import Binding, integer, places_of
+from sysdyn.compiler.binding.binding import Binding, integers, places_of
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.interpret import over
 from sysdyn.compiler.model.parameters import Extents, extents, positions
@@ -78,10 +78,10 @@ def following(network: Network, form: DescriptorForm, program: Program, binding:
         *_constants(form, binding, owners, where),
     ]
     made = program_of(form, program.scalars, [piece.formula for piece in pieces])
-    ix = [integer(slot, owners, binding.parameters, where, network) for slot in made.slots]
+    ix = integers(made.slots, owners, binding.parameters, where, network)
     blocks = dict.fromkeys(piece.formula.block for piece in pieces)
     groups = tuple(_group(name, [p for p in pieces if p.formula.block == name]) for name in blocks)
-    return Following(made, np.asarray(ix, dtype=np.int32), groups, follows, _structural(network, follows))
+    return Following(made, ix, groups, follows, _structural(network, follows))
 
 
 def _names(roots: Sequence[Node]) -> tuple[str, ...]:

@@ -79,7 +79,7 @@ def _bound(index: Index) -> int | list[int]:
 
 
 def _reference(place: Reference) -> list[Any]:
-    return [place.family, [[i.loop, i.slot, i.constant] for i in place.indices]]
+    return [place.family, [i.listed() for i in place.indices]]
 
 
 def manifest(

@@ -33,7 +33,8 @@ def iterations(pattern: Pattern, ix: NDArray[np.int32]) -> list[Whole]:
 
 def _value(index: Index, columns: list[Whole], ix: NDArray[np.int32]) -> Whole:
     still = index.constant + (int(ix[index.slot]) if index.slot >= 0 else 0)
-    return (columns[index.loop] if index.loop >= 0 else np.zeros(1, dtype=np.int64)) + still
+    value = (columns[index.loop] if index.loop >= 0 else np.zeros(1, dtype=np.int64)) + still
+    return value if index.table < 0 else ix[ix[index.table] + value].astype(np.int64)
 
 
 def where(place: Reference, box: Extents, columns: list[Whole], ix: NDArray[np.int32]) -> Whole:

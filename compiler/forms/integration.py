@@ -48,7 +48,8 @@ def integrate(model: EnergyModel) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
             integrated, offset = _integrated(row, model.mirror)
             rows.append(integrated)
             offsets.append(offset)
-            notes.append(_note(row, offset, tangible, model.mirror))
+            if not row.adds:
+                notes.append(_note(row, labels[row.name], offset, tangible, model.mirror))
         else:
             rows.append(row)
     return _renamed(replace(model, rows=tuple(rows), offsets=tuple(offsets)), chosen), tuple(notes)
@@ -82,11 +83,15 @@ def _primitive(expression: Node, mirror: Mirror) -> Node:
 def _integrated(row: Row, mirror: Mirror) -> tuple[Row, Offset]:
     name = f"#offset {row.name}"
     terms = tuple(Term(_primitive(t.expression, mirror), t.loops, t.place) for t in row.terms)
-    constant = Term(neg(param(name, *row.at)), row.nest, row.place)
-    return replace(row, kind="phi", terms=(*terms, constant)), Offset(name, row.name, row.at, terms, row.nest)
+    constant = () if row.adds else (Term(neg(param(name, *row.at)), row.nest, row.place),)
+    return replace(row, kind="phi", terms=(*terms, *constant)), Offset(name, row.name, row.at, terms, row.nest)
 
 
-def _note(row: Row, offset: Offset, tangible: frozenset[str], mirror: Mirror) -> Diagnostic:
+def _note(row: Row, rows: list[Row], offset: Offset, tangible: frozenset[str], mirror: Mirror) -> Diagnostic:
+    """N501 of a row; rows: all of its label."""
+    if any(r.adds for r in rows):
+        message = f"psi {row.name} was integrated because a displacement of it is tangible"
+        return Diagnostic("N501", _loops_named(message, row.nest), row.place)
     flows = [n for t in row.terms for n in local_variables(t.expression, mirror.rate)]
     touched = next((n.data[0] for n in flows if n.data[0] in tangible), flows[0].data[0])
     text = to_text(add(*(t.expression for t in offset.terms)))

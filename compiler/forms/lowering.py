@@ -70,7 +70,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     shapes += stored
     hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
     for row in model.rows:
-        if row.kind != "lambda":
+        if row.kind != "lambda" and not row.adds:
             hulls.setdefault(row.name, []).append((row.at, row.nest, row.place))
     return DescriptorForm(
         formulation,

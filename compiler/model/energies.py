@@ -37,7 +37,10 @@ class Virtual:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Rows `name[at]` for all iterations of `nest`: the sum of the terms is zero (the rate of a state)."""
+    """Rows `name[at]` for all iterations of `nest`: the sum of the terms is zero (the rate of a state).
+
+    adds: the terms add to rows that another statement declares.
+    """
 
     kind: str  # phi psi gamma lambda
     name: str
@@ -45,6 +48,7 @@ class Row:
     terms: tuple[Term, ...]
     nest: Nest
     place: Place
+    adds: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +238,7 @@ def _constraints(network: Network) -> Iterator[Row]:
     for c in network.constraints:
         nest, (expression, *at) = canonical(c.loops, flows(c.expression), *c.at)
         pieces = without_nested(split(expression, nest, c.place), f"{c.kind} '{c.name}'")
-        yield Row(c.kind, c.name, tuple(at), pieces, nest, c.place)
+        yield Row(c.kind, c.name, tuple(at), pieces, nest, c.place, c.adds)
 
 
 def _dynamics(network: Network) -> Iterator[Row]:

@@ -9,6 +9,7 @@ A slot is named by what it holds; the binding evaluates it:
     ("table", name)              position in p of a table's numbers
     ("points", name, k)          its number of breakpoints of argument k
     ("clamped", name)            1 where a table of two arguments clamps, else 0
+    ("picks", name)              position in ix, behind all slots, of a table of indices that the compiler made
 """
 
 from __future__ import annotations
@@ -24,11 +25,16 @@ Slot = tuple[Any, ...]
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """(loop variable or 0) + (ix[slot] or 0) + constant; -1 for none."""
+    """(loop variable or 0) + (ix[slot] or 0) + constant; -1 for none.  table: a slot, ix[ix[table] + that] then."""
 
     loop: int
     slot: int
     constant: int
+    table: int = -1
+
+    def listed(self) -> list[int]:
+        """Its numbers; of a table only where there is one."""
+        return [self.loop, self.slot, self.constant, *([self.table] if self.table >= 0 else [])]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,9 @@ class Integers:
 
     def index(self, node: Node, loops: dict[str, int]) -> Index:
         """An index expression as an affine form; ModelError E806 where it is none."""
+        if node.op == "param" and node.args and node.data.startswith("#"):
+            own = self.index(node.args[0], loops)
+            return Index(own.loop, own.slot, own.constant, self.slot("picks", node.data))
         constant, parts = 0.0, [(1.0, node)]
         if node.op == "const":
             constant, parts = node.data, []

@@ -56,7 +56,10 @@ def _own(node: Node, value: dict[Node, Value], found: dict[Node, Value]) -> Valu
         case "mul":
             if all(e == 1.0 for e in node.data):
                 return np.prod(np.broadcast_arrays(*sizes), axis=0)
-            return own * (1.0 + sum(abs(e) * r for e, r in zip(node.data, relative, strict=True)))
+            own = own * (1.0 + sum(abs(e) * r for e, r in zip(node.data, relative, strict=True)))
+            parts = zip(node.data, sizes, node.args, strict=True)
+            factors = [s**e if e > 0.0 else np.abs(value[a]) ** e for e, s, a in parts]  # of zeros that cancel above
+            return np.where(value[node] == 0.0, np.prod(np.broadcast_arrays(*factors), axis=0), own)
         case "pow":
             return own * (1.0 + np.abs(value[node.args[1]]) * relative[0])
         case "call" | "table":

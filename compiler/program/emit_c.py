@@ -158,7 +158,7 @@ def _comment(routine: Routine, form: DescriptorForm) -> str:
 
 def _stands(place: Reference) -> bool:
     """No loop moves it."""
-    return all(index.loop < 0 for index in place.indices)
+    return all(index.loop < 0 and index.table < 0 for index in place.indices)
 
 
 class _Writer:

@@ -199,6 +199,8 @@ class _Writer:
 
     def _apart(self, place: Reference) -> bool:
         """Whether no two iterations have one place: each loop moves an index of its own."""
+        if any(index.table >= 0 for index in place.indices):
+            return False
         moved = [index.loop for index in place.indices if index.loop >= 0]
         return sorted(moved) == list(range(self.depth))
 

@@ -73,6 +73,10 @@ def position(place: Reference | Element, head: str, loop: Callable[[int], str], 
     moving = []
     for k, index in enumerate(place.indices):
         stride = f"ix[{place.strides[k]}]" if k < len(place.strides) else ""
+        if index.table >= 0:
+            picked = f"ix[ix[{index.table}] + {bound(index, loop)}]"
+            moving.append(f"{stride}*{picked}" if stride and scaled else picked)
+            continue
         still = still_part(index)
         if still:
             fixed.append(f"{stride}*({still})" if stride else still)

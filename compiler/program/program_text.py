@@ -58,6 +58,7 @@ def _verify_indices(indices: tuple[Index, ...], depth: int, slots: int) -> None:
     for index in indices:
         assert -1 <= index.loop < depth, f"{index}: no such loop"
         assert -1 <= index.slot < slots, f"{index}: no such slot"
+        assert -1 <= index.table < slots, f"{index}: no such slot"
 
 
 def show(program: Program) -> str:
@@ -94,7 +95,8 @@ def _operand(value: Operand) -> str:
 def _text(index: Index) -> str:
     parts = [f"i{index.loop}"] if index.loop >= 0 else []
     parts += [f"ix[{index.slot}]"] if index.slot >= 0 else []
-    return " + ".join([*parts, str(index.constant)] if index.constant or not parts else parts)
+    text = " + ".join([*parts, str(index.constant)] if index.constant or not parts else parts)
+    return text if index.table < 0 else f"ix[ix[{index.table}] + {text}]"
 
 
 def _place(head: str, place: Reference | Element | int) -> str:

@@ -630,6 +630,27 @@ def evaluate(roots: Sequence[Node], lookup: Callable[[Node], float]) -> list[flo
     return [values[r] for r in roots]
 
 
+def evaluate_along(
+    root: Node, leaf: Node, points: Iterable[float], lookup: Callable[[Node], float]
+) -> Iterator[float]:
+    """Values of a scalar node where one leaf takes the values of points; what does not read it is evaluated once."""
+    values: dict[Node, Any] = {}
+    moving: list[Node] = []
+
+    def here(node: Node) -> float:
+        return float(values[leaf]) if node is leaf else lookup(node)
+
+    for node in topological_unbound([root]):
+        if leaf in variables(node):
+            moving.append(node)
+        else:
+            values[node] = _value(node, values, lookup)
+    for x in points:
+        for node in moving:
+            values[node] = x if node is leaf else _value(node, values, here)
+        yield values[root]
+
+
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "==": lambda a, b: a == b,
     "!=": lambda a, b: a != b,

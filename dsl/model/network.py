@@ -220,7 +220,10 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Constraint:
-    """`kind name[at]: left = right` as left - right = 0; at: indices in the family of that label."""
+    """`kind name[at]: left = right` as left - right = 0; at: indices in the family of that label.
+
+    adds: it adds to rows that another statement declares, to one of them as often as its loops come by.
+    """
 
     kind: str  # phi psi gamma
     name: str
@@ -229,6 +232,7 @@ class Constraint:
     loops: tuple[Loop, ...]
     unit: Unit
     place: Place
+    adds: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """E313: the law of a dissipator with power e f below zero somewhere: an active element.
 
-Judged with the values bound, at both signs over the decades; a linear law is judged by its slope (E325), one that reads
+Judged with the values bound: by the sign of its slope where it goes through the origin, else at both signs over the
+decades; a linear law is judged by its slope (E325), one that reads
 other unknowns not at all.
 """
 
@@ -12,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Network
+from sysdyn.dsl.model.signs import ALL, Reals, reals
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -39,10 +41,13 @@ def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
     if len(own) != 1 or own[0].data[0] != branch.name or any(n.op in ("time", "table") for n in nodes):
         return
     slope = ex.derivative(law, own[0])
-    if ex.is_const(ex.substitute(law, {own[0]: ex.const(0.0)}), 0.0) and not ex.variables(slope):
+    through = ex.is_const(ex.substitute(law, {own[0]: ex.const(0.0)}), 0.0)
+    if through and not ex.variables(slope):
         return
     bound: dict[Node, float] = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
     held = {n: known.number(n, bound) for n in nodes if n.op == "param"} | bound
+    if through and reals(slope, {n: Reals(v, v, v != 0.0) for n, v in held.items()} | {own[0]: ALL}).low >= 0.0:
+        return  # it rises from the origin
     found = _active(law, own[0], held)
     if found is not None:
         x, value = found
@@ -58,8 +63,7 @@ def _active(law: Node, own: Node, held: Mapping[Node, float]) -> tuple[float, fl
     if any(math.isnan(v) for v in held.values()):
         return None
     largest: Sequence[float] = (0.0, 0.0)
-    for x in DECADES:
-        value = ex.evaluate([law], lambda n, x=x: x if n is own else held.get(n, math.nan))[0]  # type: ignore[misc]
+    for x, value in zip(DECADES, ex.evaluate_along(law, own, DECADES, lambda n: held.get(n, math.nan)), strict=True):
         if not math.isfinite(value):
             continue
         if x * value < 0.0 and abs(value) > ROUND_OFF * largest[0]:

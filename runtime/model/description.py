@@ -21,8 +21,10 @@ from sysdyn.values import dataclass
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Shape = tuple[tuple[int, int], ...]
-Index = tuple[int, int, int]
-"""(loop, slot, constant): the value is (loop variable or 0) + (ix[slot] or 0) + constant; loop, slot -1: none."""
+Index = tuple[int, ...]
+"""(loop, slot, constant): the value is (loop variable or 0) + (ix[slot] or 0) + constant; loop, slot -1: none.
+(loop, slot, constant, table): it is ix[ix[table] + that].
+"""
 
 KINDS = ("q", "f", "p", "s", "e", "kappa", "mu", "start", "slack", "unsaid", "audit")
 START = ("start", "slack", "unsaid")
@@ -212,7 +214,7 @@ def _shapes(value: Any, names: Sequence[str]) -> list[Shape]:
 
 def _reference(value: Any) -> Reference:
     family, indices = value
-    return Reference(int(family), tuple((int(a), int(b), int(c)) for a, b, c in indices))
+    return Reference(int(family), tuple(tuple(map(int, index)) for index in indices))
 
 
 def _pairs(value: Any) -> tuple[tuple[Reference, Reference], ...]:

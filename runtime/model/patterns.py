@@ -66,9 +66,12 @@ def read_only(array: Array) -> Array:
 
 def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:
     """Value of an index in each iteration [number]."""
-    loop, slot, constant = index
+    loop, slot, constant, *table = index
     value = np.full(number, constant + (int(ix[slot]) if slot >= 0 else 0), dtype=np.int64)
-    return value if loop < 0 else value + columns[loop]
+    value = value if loop < 0 else value + columns[loop]
+    for place in table:
+        value = ix[ix[place] + value].astype(np.int64)
+    return value
 
 
 def _iterations(kernel: Kernel, ix: Ints) -> list[Longs]:
@@ -107,8 +110,10 @@ def _place(reference: Reference, shape: Shape, ix: Ints) -> int:
             f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
         )
     for index, (first, last) in zip(reference.indices, shape, strict=True):
-        _, slot, constant = index
+        _, slot, constant, *table = index
         value = constant + (int(ix[slot]) if slot >= 0 else 0)
+        for listed in table:
+            value = int(ix[ix[listed] + value])
         if not first <= value <= last:
             raise ContractError(f"an index runs over {value}..{value} outside {first}..{last}")
         position = position * (last - first + 1) + value - first

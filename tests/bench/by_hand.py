@@ -1,8 +1,8 @@
 """What netlists written line by line cost: python tests/bench/by_hand.py [--lines N ...] [NAME ...]
 
 CPU seconds and largest resident memory, imports and C compiler included, of `check` and of the text to its first step
-(`simulate --max-steps 1`); NAME: ladder chain mesh stages uneven mixed power_grid (tests/models/handwritten.py), all
-where none.
+(`simulate --max-steps 1`); NAME: ladder chain mesh stages uneven mixed lattice power_grid
+(tests/models/handwritten.py), all where none.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ LINES = {
     "stages": lambda lines: texts.stages(lines // 9),
     "uneven": lambda lines: texts.uneven(lines // 3),
     "mixed": lambda lines: texts.mixed(3 * lines // 11),
+    "lattice": lambda lines: texts.lattice(int(lines / 6.45)),
     "power_grid": lambda lines: texts.power_grid(max(int(lines / 7.5), 20)),
 }
 

@@ -6,9 +6,9 @@ from sysdyn.compiler.model.interpret import evaluate
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
 from sysdyn.compiler.network.primal.integrals import antiderivative
 from sysdyn.compiler.network.primal.inverses import inverse
-from sysdyn.compiler.network.primal.signs import ALL, NEGATIVE, NOT_NEGATIVE, POSITIVE, Reals, reals
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Table
+from sysdyn.dsl.model.signs import ALL, NEGATIVE, NOT_NEGATIVE, POSITIVE, Reals, reals
 
 VALUES = {"a": 2.0, "b": 0.025, "k": 3.0, "n": -1.5, "z": 0.0}
 A, B, K, N, Z = (x.param(name) for name in VALUES)
@@ -17,6 +17,7 @@ A, B, K, N, Z = (x.param(name) for name in VALUES)
 class _Slopes:
     def values(self, branch, node):
         return np.array([float(evaluate([node], lambda leaf, args: VALUES[leaf.data])[0])])
+
 
 pytestmark = pytest.mark.usefixtures("fresh")
 

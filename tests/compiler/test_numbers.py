@@ -34,6 +34,9 @@ def test_what_cancels_is_as_uncertain_as_its_terms():
     assert size(x.scale(-3.0, gap), **near) == 3.0 * (2e6 - 1.0)
     # products: by the magnitudes; powers: |e| times the relative one; exp: its argument is the condition
     assert size(x.mul(gap, b), **near) == (2e6 - 1.0) * (1e6 - 1.0)
+    # over another factor too, where all of it cancels
+    assert size(x.mul(gap, x.power(b, x.const(-1.0))), a=3.0, b=3.0) == 2.0
+    assert size(x.mul(x.power(gap, x.const(2.0)), b), a=3.0, b=3.0) == 36.0 * 3.0
     assert size(x.power(gap, x.const(-2.0)), **near) == pytest.approx(1.0 + 2.0 * (2e6 - 1.0))
     assert size(x.call("exp", gap), **near) == pytest.approx(math.e * (1.0 + 2e6 - 1.0))
     assert size(x.call("sin", x.const(0.5)), **near) == pytest.approx(math.sin(0.5))

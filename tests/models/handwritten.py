@@ -114,6 +114,57 @@ def mixed(n: int, seed: int = 2) -> str:
     return _file(head, "mixed", lines, f"time 0 s to 1 ms; trace a1.e, L1.f, a{n - 1}.e")
 
 
+def woven(n: int, seed: int = 3) -> str:
+    """Nodes joined at random by a resistor, an inductor and a capacitor in series, told in either sense and any order;
+    some start charged; one node in ten has a conductance of another law, and two nodes float.
+    """
+    draw = random.Random(seed)
+    lines = [f"  node a{k}: electrical" for k in range(n)]
+    lines.append("  feed: voltage(v = 1 V*sin(2*pi*1000 s^-1*t)) a0 -> ground")
+    for k in range(n):
+        other = f"a{draw.randrange(k)}" if k else "ground"
+        lines.append(f"  C{k}: capacitor(C = {draw.uniform(1, 9):.3f} uF) a{k} -> {draw.choice(['ground', other])}")
+        lines.append(f"  R{k}: resistor(R = {draw.uniform(1, 9):.3f} kohm) a{k} -> {other}")
+        if k % 10 == 5:
+            lines.append(f"  N{k}: dissipator(f = {draw.uniform(1, 9):.3f} uA*sinh(e/(1 V))) a{k} -> ground")
+        points = [f"a{k}", f"j{k}", f"k{k}", "ground" if draw.random() < 0.3 else f"a{draw.randrange(n)}"]
+        lines += [f"  node j{k}: electrical", f"  node k{k}: electrical"]
+        laws = [f"resistor(R = {draw.uniform(10, 90):.2f} ohm)", f"inductor(L = {draw.uniform(1, 9):.3f} mH)"]
+        laws.append(f"capacitor(C = {draw.uniform(1, 9):.3f} uF)")
+        if draw.random() < 0.5:
+            points, laws = points[::-1], laws[::-1]
+        placed = [f"  {laws[j][0]}{k}: {laws[j]} {points[j]} -> {points[j + 1]}" for j in range(3)]
+        if draw.random() < 0.4:
+            placed[1] = f"  {laws[1][0]}{k}: {laws[1]} {points[2]} -> {points[1]}"
+        draw.shuffle(placed)
+        lines += placed
+        lines += [f"  init c{k}.e = {k % 5} mV"] * (k % 3 == 0)
+    lines += ["  node x: electrical", "  node y: electrical"]
+    lines += ["  X: capacitor(C = 1 uF) x -> y", "  Y: resistor(R = 1 kohm) y -> x", "  init X.e = 1 V"]
+    return _file(ELECTRICAL, "woven", lines, f"time 0 s to 1 ms; trace a1.e, j2.e, k3.e, i4.f, c{n - 1}.q, r7.e, Y.f")
+
+
+def lattice(n: int, seed: int = 4) -> str:
+    """Masses joined at random by springs, and by springs and dampers in series, some to a wall, told in any order; some
+    move at the start, or are off their springs' rest.
+    """
+    draw = random.Random(seed)
+    lines = [f"  node m{k}: translation" for k in range(n)]
+    lines.append("  push: effort(e = 1 N*sin(3 s^-1*t)) m1 -> ground")
+    placed = []
+    for k in range(n):
+        placed.append(f"  M{k}: kinetic(p = {draw.uniform(1, 9):.3f} kg*f) m{k} -> ground")
+        other = f"m{draw.randrange(k)}" if k else "ground"
+        placed.append(f"  K{k}: potential(e = {draw.uniform(50, 90):.3f} N/m*q) m{k} -> {other}")
+        other = draw.choice([f"m{(k + 1 + draw.randrange(n - 1)) % n}", "ground"])
+        placed.append(f"  node s{k}: translation")
+        placed.append(f"  D{k}: dissipator(e = {draw.uniform(1, 2):.3f} N.s/m*f) m{k} -> s{k}")
+        placed.append(f"  S{k}: potential(e = {draw.uniform(5, 9):.3f} N/m*q) s{k} -> {other}")
+        placed += [f"  init m{k}.f = {k % 7} mm/s"] * (k % 4 == 0) + [f"  init S{k}.q = {k % 5} mm"] * (k % 5 == 1)
+    draw.shuffle(placed)
+    return _file("", "lattice", lines + placed, f"time 0 s to 1 s; trace m2.q, m{n - 1}.f, K3.e, D4.f")
+
+
 def uneven(n: int) -> str:
     """An RC ladder of which no two numbers are equal."""
     draw = random.Random(n)

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from handwritten import chain, ladder, mesh, power_grid, stages
+from handwritten import chain, ladder, lattice, mesh, mixed, power_grid, stages, woven
 from sysdyn.api import simulate
 from sysdyn.cli.run.prepare import Prepared, module_of
 from sysdyn.compiler.network import gathered as gathered_
@@ -24,6 +24,10 @@ NETLISTS = {
     "mesh": mesh(4, 12),
     "chain": chain(60),
     "stages": stages(18),
+    "mixed": mixed(40).replace("to 1 ms", "to 200 us"),
+    "power_grid": power_grid(40).replace("to 5 ms", "to 500 us"),
+    "lattice": lattice(40),
+    "woven": woven(60).replace("to 1 ms", "to 300 us"),
 }
 
 
@@ -78,7 +82,10 @@ def test_what_is_said_is_said_of_the_lines_of_the_text(name):
     families, written = (compile_network(found, gather=gather) for gather in (True, False))
     assert families.written is not None
     assert written.written is None
-    assert sorted(map(said, families.notes)) == sorted(map(said, written.notes))
+    assert sorted(said(n)[:2] for n in families.notes) == sorted(said(n)[:2] for n in written.notes)
+    short = {said(n)[:2] for n in families.notes if "a displacement of it" in n.message}  # joined by tables
+    one, other = (sorted(s for s in map(said, c.notes) if s[:2] not in short) for c in (families, written))
+    assert one == other
     one, other = (c.manifest(c.bind()) for c in (families, written))
     for part, key in (("unknowns", "name"), ("rows", "label")):
         assert {(r[key], r.get("line")) for r in one[part]} == {(r[key], r.get("line")) for r in other[part]}
@@ -106,7 +113,7 @@ def test_one_text_of_c_for_any_number_of_lines(effort):
     assert (many - few) / 300 < 2500  # lines of Python a line of text, from its characters to C
 
 
-def test_what_stands_in_no_row_is_lowered_as_it_is_written(tmp_path):
+def test_a_grid_without_order_keeps_its_names(tmp_path):
     """A grid of buses joined at random runs; each unknown keeps its name."""
     found = network(power_grid(24))
     model = compile_network(found, gather=True)
@@ -115,6 +122,48 @@ def test_what_stands_in_no_row_is_lowered_as_it_is_written(tmp_path):
     assert not any("#" in name for name in names)
     text = power_grid(24)
     assert np.isfinite(run(tmp_path, text.replace("to 5 ms", "to 500 us"), "grid", backend="numpy")).all()
+
+
+@pytest.mark.parametrize("of", [power_grid, mixed, lambda n: mesh(n // 8, 8)], ids=["power_grid", "mixed", "mesh"])
+def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
+    """Tables of indices tell what is joined to what: as many statements for any number of lines, each at equal cost."""
+
+    def made(n):
+        with fresh():
+            return compile_network(network(of(n)), gather=True)
+
+    short, few = effort(lambda: made(160))
+    long, many = effort(lambda: made(320))
+    assert len(long.family.branches) == len(short.family.branches)
+    assert len(long.form.families) == len(short.form.families)
+    assert len(long.text) < 1.05 * len(short.text)
+    lines = len(of(320).splitlines()) - len(of(160).splitlines())
+    assert (many - few) / lines < 4000  # lines of Python a line of text
+
+
+def test_a_grid_without_a_ground_is_counted_from_one_of_its_nodes(tmp_path, monkeypatch):
+    """Nothing tells by which node of a family: it is lowered as it is written."""
+    text = power_grid(30).replace("-> ground", "-> earth").replace("to 5 ms", "to 100 us")
+    text = text.replace("  node bus0:", "  node earth: electrical\n  node bus0:")
+    found = network(text)
+    assert gathered(found).authors
+    assert compile_network(found, gather=True).written is None
+    one = run(tmp_path, text, "families", backend="numpy")
+    monkeypatch.setattr(gathered_, "LEAST", 10**9)
+    assert np.array_equal(one, run(tmp_path, text, "written", backend="numpy"))
+
+
+def test_branches_of_an_array_beside_a_grid_without_order(tmp_path, monkeypatch):
+    """What a `for` joins to it stays a loop; its nodes' indices do not show that they hang together."""
+    more = "  node v[1..3]: electrical\n  for k in 1..3 { r[k]: resistor(R = k*1 ohm) v[k] -> bus4 }\n"
+    more += "  for k in 1..3 { c[k]: capacitor(C = k*1 uF) v[k] -> ground }\n  w: resistor(R = 2 ohm) v[2] -> bus9\n"
+    text = power_grid(30).replace("to 5 ms", "to 300 us").replace("\n}\n\nscene", f"\n{more}}}\n\nscene")
+    text = text.replace("trace bus3.e", "trace v[2].e, w.f, r[3].f, bus3.e")
+    assert compile_network(network(text), gather=True).written is not None
+    one = run(tmp_path, text, "families", backend="numpy")
+    monkeypatch.setattr(gathered_, "LEAST", 10**9)
+    other = run(tmp_path, text, "written", backend="numpy")
+    assert (np.abs(one - other) <= 1e-8 * np.abs(other).max(axis=1, keepdims=True)).all()
 
 
 def test_a_chain_of_scalars_leaves_no_full_matrix():

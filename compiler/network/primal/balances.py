@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, box_holds, parts, union, without
+from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, box_holds, number, parts, union, without
 from sysdyn.compiler.network.primal.incidence import (
     MINUS,
     Contact,
@@ -24,7 +24,7 @@ from sysdyn.compiler.network.primal.incidence import (
     unrolled,
 )
 from sysdyn.compiler.network.primal.index_classes import Cell, End, IndexClasses, Link
-from sysdyn.dsl.model.expression import Node, index, linear, reduction, var
+from sysdyn.dsl.model.expression import Node, index, linear, reduction, scale, var
 from sysdyn.dsl.model.network import Constraint
 from sysdyn.values import dataclass
 
@@ -68,11 +68,20 @@ class _Components:
             for bound in (interval.first, interval.last.plus(1))
         ]
         boxes = [incidence.boxes[name] for name in self.names]
+        self.tied = {cell.node: cell.box for cell in incidence.all_cells() if cell.scattered}
         links = [Link(e.box, self._end(e, e.ends[0]), self._end(e, e.ends[1])) for e in branches]
-        self.likeness = IndexClasses(boxes, links, cuts)
+        self.likeness = IndexClasses(boxes, [*links, *(self._tie(*item) for item in self.tied.items())], cuts)
         self._refused(branches, links)
 
+    def _tie(self, name: str, box: Box) -> Link:
+        """Nodes that a table of indices reaches belong together: neighbours do."""
+        (whole,) = box
+        one, other = (End(self.number[name], ((0, number(k)),)) for k in (0, 1))
+        return Link((Interval(whole.first, whole.last.minus(1)),), one, other)
+
     def _end(self, element: Element, contact: Contact) -> End:
+        if contact.node in self.tied:
+            return End(self.number[contact.node], ((None, self.tied[contact.node][0].first),))
         at: list[tuple[int | None, Bound]] = [
             (None if a.loop is None else element.loops.index(a.loop), a.offset) for a in contact.at
         ]
@@ -115,7 +124,7 @@ def balances(incidence: Incidence, merged: Sequence[NodeCell]) -> Balances:
         Effort(cell.node, box, MULTIPLIER, label.name, cell, gauge)
         for (cell, box, gauge), label in zip(rows, labels, strict=True)
     ]
-    constraints = [_row(e) for e in efforts]
+    constraints = [row for e in efforts for row in _rows(e, incidence)]
     return Balances(tuple(constraints), tuple(_fewer([*efforts, *still])))
 
 
@@ -188,8 +197,22 @@ def _fewer(efforts: Sequence[Effort]) -> Iterator[Effort]:
             yield Effort(same[0].node, box, same[0].how, same[0].label, same[0].cell, same[0].ground)
 
 
+def _rows(effort: Effort, incidence: Incidence) -> Iterator[Constraint]:
+    """The sum of flows into each node of the box, and what scattered ends add to it."""
+    cell = effort.cell
+    yield _row(effort)
+    if cell.scattered and effort.box != incidence.boxes[cell.node]:
+        raise unrolled(f"which node of {cell.node} the others are counted from", cell.place)
+    for element, end in cell.scattered:
+        here = {name: index(name) for name in element.loops}
+        at = tuple(a.at(here) for a in element.ends[end].at)
+        flow = scale(1.0 if end == MINUS else -1.0, var(element.name, "bf", *(a.at(here) for a in element.at)))
+        unit, loops = cell.domain.flow, element.branch.loops
+        yield Constraint("psi", effort.label, at, flow, loops, unit, cell.place, adds=True)
+
+
 def _row(effort: Effort) -> Constraint:
-    """The sum of flows into each node of the box."""
+    """The sum of flows into each node of the box from the ends that touch all of them."""
     at = indices(effort.box)
     terms: list[tuple[float, Node]] = []
     for touch in effort.cell.touches:

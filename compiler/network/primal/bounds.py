@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterator, Sequence
 
-from sysdyn.dsl.model.expression import Node, add, const, evaluate, index, sub, substitute, to_text
+from sysdyn.dsl.model.expression import Node, add, const, evaluate, index, param, sub, substitute, to_text
 from sysdyn.dsl.model.network import Network, Parameter, Shape
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 from sysdyn.values import dataclass
@@ -155,6 +155,36 @@ class Affine:
         return ranges[self.loop].plus(self.offset)
 
 
+@dataclass(frozen=True, slots=True)
+class Picked:
+    """An index from a table of whole numbers that the compiler made: table[along]; values: from index 0 on."""
+
+    table: str
+    along: Affine
+    values: tuple[int, ...]
+
+    @property
+    def loop(self) -> None:
+        """It moves along no loop."""
+        return None
+
+    @property
+    def offset(self) -> Bound:
+        """The first that is picked."""
+        return number(self.values[0])
+
+    def at(self, values: dict[str, Node]) -> Node:
+        """The index with loop variables replaced."""
+        own = self.along.at(values)
+        return const(self.values[int(own.data)]) if own.op == "const" else param(self.table, own)
+
+    def over(self, ranges: dict[str, Interval]) -> Interval:
+        """What holds all its values."""
+        own = self.along.over(ranges)
+        found = self.values[own.first.value : own.last.value + 1]
+        return Interval(number(min(found)), number(max(found)))
+
+
 class Sizes:
     """Values of whole-number expressions with a network's own parameter values; only what is asked is computed."""
 
@@ -197,9 +227,16 @@ class Sizes:
         text = f"index {to_text(node)} is not affine: i + c with whole c is meant"
         raise ModelError([Diagnostic("E806", text, place)])
 
+    def index(self, node: Node, loops: Collection[str], place: Place | None) -> Affine | Picked:
+        """An index as i + c, or from a table of the compiler's own (parameters whose names begin with #)."""
+        if node.op != "param" or not node.args or not node.data.startswith("#"):
+            return self.affine(node, loops, place)
+        found = tuple(round(self.value(v)) for v in self._parameters[node.data].values)
+        return Picked(node.data, self.affine(node.args[0], loops, place), found)
+
     def reach(self, at: Sequence[Node], within: dict[str, Interval], place: Place | None) -> Box:
         """All values of indices over the ranges of loop variables."""
-        return tuple(self.affine(node, within, place).over(within) for node in at)
+        return tuple(self.index(node, within, place).over(within) for node in at)
 
     def _leaf(self, node: Node) -> float:
         if node.op != "param" or node.data not in self._parameters:

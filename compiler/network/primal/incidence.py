@@ -1,7 +1,8 @@
 """The branch graph by index classes: branches with their ranges, and common-effort nodes with what touches them.
 
 A node family is cut where the reach of a terminal begins or ends; in each box so made every node is touched by the same
-branches, so its degree is known (language, 8.5).  A domain's ground is a node without indices.
+branches, so its degree is known (language, 8.5).  A family that terminals reach by a table of indices is one cell; such
+families are connected in themselves (`gathered.py`).  A domain's ground is a node without indices.
 """
 
 from __future__ import annotations
@@ -9,7 +10,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Sizes, between, box_holds, box_size
+from sysdyn.compiler.network.primal.bounds import (
+    Affine,
+    Bound,
+    Box,
+    Interval,
+    Picked,
+    Sizes,
+    between,
+    box_holds,
+    box_size,
+)
 from sysdyn.dsl.model.expression import Node, index, sub
 from sysdyn.dsl.model.network import Branch, Domain, Loop, Network, NodeFamily, Terminal
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
@@ -23,7 +34,7 @@ class Contact:
     """One end of a branch at a node: the flow leaves the node at plus and enters it at minus."""
 
     node: str  # family, or the ground's name
-    at: tuple[Affine, ...]
+    at: tuple[Affine | Picked, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,18 +94,21 @@ class Touch:
 
 @dataclass(frozen=True, slots=True)
 class NodeCell:
-    """Nodes of one family that the same branches touch."""
+    """Nodes of one family that the same branches touch; scattered: ends of branches that touch any of them."""
 
     node: str
     domain: Domain
     box: Box
     touches: tuple[Touch, ...]
     place: Place
+    scattered: tuple[tuple[Element, int], ...] = ()
 
     @property
     def degree(self) -> int:
-        """Number of branch ends at each of them."""
-        return sum(box_size(tuple(t.element.ranges[name] for name in t.free)) for t in self.touches)
+        """Number of branch ends at each of them, on the average of what is scattered."""
+        ends = sum(box_size(e.box) for e, _ in self.scattered)
+        each = sum(box_size(tuple(t.element.ranges[name] for name in t.free)) for t in self.touches)
+        return each + ends // max(box_size(self.box), 1)
 
 
 def ground(domain: Domain) -> str:
@@ -129,14 +143,14 @@ def _element(number: int, branch: Branch, sizes: Sizes) -> Iterator[Element]:
 
 def _contact(terminal: Terminal, branch: Branch, loops: tuple[str, ...], sizes: Sizes) -> Contact:
     name = ground(branch.domain) if terminal.node is None else terminal.node
-    at = tuple(sizes.affine(node, loops, branch.place) for node in terminal.at)
+    at = tuple(sizes.index(node, loops, branch.place) for node in terminal.at)
     used = [a.loop for a in at if a.loop is not None]
     if len(used) != len(set(used)):
         raise unrolled(f"{branch.name} meets node {name} along a diagonal", branch.place)
     return Contact(name, at)
 
 
-def unrolled(what: str, place: Place) -> ModelError:
+def unrolled(what: str, place: Place | None) -> ModelError:
     """E806: a pattern that index classes cannot hold."""
     return ModelError([Diagnostic("E806", f"{what}: it would have to be unrolled", place)])
 
@@ -169,6 +183,10 @@ class Incidence:
                 at = ", ".join(f"{i.first.value}..{i.last.value}" for i in reach)
                 text = f"{e.name} meets {name}[{at}], outside its range"
                 raise ModelError([Diagnostic("E805", text, e.branch.place)])
+        if any(isinstance(a, Picked) for _, _, c in self._contacts.get(name, ()) for a in c.at):
+            ends = tuple((e, k) for e, k, _ in reaches)
+            self.cells[name] = (NodeCell(name, family.domain, box, (), family.place, ends),)
+            return
         sides: list[list[Interval]] = []
         for d, whole in enumerate(box):
             cuts: dict[int, Bound] = {}

@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import Value, evaluate
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
-from sysdyn.compiler.network.primal.signs import ALL, NEGATIVE, NOT_NEGATIVE, POSITIVE, Reals, reals
 from sysdyn.compiler.network.primal.slopes import Slopes
 from sysdyn.dsl.model.expression import (
     Node,
@@ -48,6 +47,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.network import Branch, Table
+from sysdyn.dsl.model.signs import ALL, NEGATIVE, NOT_NEGATIVE, POSITIVE, Reals, reals
 from sysdyn.values import dataclass
 
 _SHELLS = {

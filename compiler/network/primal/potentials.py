@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sysdyn.compiler.network.primal.balances import MULTIPLIER, WALK, ZERO, Effort
-from sysdyn.compiler.network.primal.bounds import Affine, Bound, Interval
+from sysdyn.compiler.network.primal.bounds import Affine, Bound, Interval, Picked
 from sysdyn.compiler.network.primal.incidence import PLUS, Touch, unrolled
 from sysdyn.compiler.network.primal.reading import Range, Ranges, Rewriter
 from sysdyn.dsl.model.expression import Node, add, const, index, linear, neg, reduction, sub, var
@@ -147,7 +147,7 @@ def _other(effort: Effort, arrival: Touch) -> Touch:
     return next(t for t in effort.cell.touches if (t.element.number, t.end) != by)
 
 
-def _limits(effort: Effort, at: tuple[Affine, ...], counter: str, step: int) -> list[Bound]:
+def _limits(effort: Effort, at: tuple[Affine | Picked, ...], counter: str, step: int) -> list[Bound]:
     """How far the counter may run before this node leaves the box in which it is merged."""
-    boxes: list[tuple[Interval, Affine]] = list(zip(effort.box, at, strict=True))
+    boxes: list[tuple[Interval, Affine | Picked]] = list(zip(effort.box, at, strict=True))
     return [(i.first if step < 0 else i.last).minus(a.offset) for i, a in boxes if a.loop == counter]

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import TypeVar
 
-from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Sizes, box_holds
-from sysdyn.compiler.network.primal.incidence import Contact, Element
+from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Picked, Sizes, box_holds
+from sysdyn.compiler.network.primal.incidence import Contact, Element, unrolled
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
     Node,
@@ -283,9 +283,9 @@ class Rewriter:
 
     # -- where --------------------------------------------------------------------------------------------------
 
-    def affine(self, at: tuple[Node, ...], ranges: Ranges) -> tuple[Affine, ...]:
-        """Indices as affine forms."""
-        return tuple(self.sizes.affine(node, ranges.keys(), self.place) for node in at)
+    def affine(self, at: tuple[Node, ...], ranges: Ranges) -> tuple[Affine | Picked, ...]:
+        """Indices as affine forms, or from tables."""
+        return tuple(self.sizes.index(node, ranges.keys(), self.place) for node in at)
 
     def piece(self, name: str, at: tuple[Node, ...], ranges: Ranges) -> IndexBox:
         """The piece of a branch family that a reference lies in."""
@@ -305,7 +305,8 @@ class Rewriter:
             if len(box) == len(corner) and box_holds(box, corner):
                 k = next(k for k, (b, r) in enumerate(zip(box, reach, strict=True)) if not b.holds(r))
                 loop = places[k].loop
-                assert loop is not None
+                if loop is None:
+                    raise unrolled(f"{name} by a table of indices", self.place)
                 raise _BoxSplitError(loop, box[k].last.plus(1).minus(places[k].offset), name)
         text = ", ".join(str(i.first.value) for i in reach)
         raise ModelError([Diagnostic("E805", f"{name}[{text}] is outside its range", self.place)])

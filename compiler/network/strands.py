@@ -1,0 +1,183 @@
+"""Branches in series between nodes that are no mere links of two: what irregular netlists have alike.
+
+A *joint* is a node that two branches touch, and nothing else.  A *strand* is a way through joints from one other node,
+a *bus*, to the next; a branch between buses is one by itself.  Strands of the same laws in the same senses are alike
+whatever they join: the k-th of them is element k of one family of branches for each link, and of one family of nodes
+for each joint; which buses they join stands in tables of indices.
+
+Received: a Network, shapes of laws, and what stands in families already.  Returned: classes of strands, and the buses.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+from sysdyn.compiler.network.neighbourhoods import RUN, Found, Run, Site
+from sysdyn.compiler.network.skeleton import Shaped
+from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.network import Branch, Network
+from sysdyn.values import dataclass
+
+MANY = 4
+"""Ends of strands that a family of buses has for each end of another branch there, at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Strand:
+    """Branches in the order of the way, each with its sense, and the nodes before, between and behind them."""
+
+    branches: tuple[tuple[Branch, bool], ...]
+    nodes: tuple[str | None, ...]
+
+    def reversed(self) -> Strand:
+        """The same the other way round."""
+        return Strand(tuple((b, not sense) for b, sense in reversed(self.branches)), self.nodes[::-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Strands:
+    """Classes of strands that are alike; families of buses by a key: names in the order of the text."""
+
+    classes: tuple[tuple[Strand, ...], ...]
+    buses: Mapping[str, tuple[str, ...]]
+
+
+class _Graph:
+    """Branches that may stand in families: loose; free: nodes that may, with their domains."""
+
+    def __init__(self, network: Network, shapes: Mapping[str, Shaped], taken: Collection[str]) -> None:
+        told = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] == "ne"}
+        self.free = {
+            n.name: n.domain.name
+            for n in network.nodes
+            if not n.shape and n.name not in network.read
+            if n.name not in told and n.name not in taken
+        }
+        self.loose: dict[str, Branch] = {}
+        self.at: dict[str, list[Branch]] = {}
+        self.parts = Joined[str]()
+        for b in network.branches:
+            ends = [end for end in (b.plus, b.minus) if end is not None]
+            names = [end.node for end in ends if end.node is not None]
+            for name in names:
+                self.at.setdefault(name, []).append(b)
+            if len(names) == 2 and not any(end.at for end in ends):  # of arrays only the family shows
+                self.parts.join(*names)
+            known = b.name in shapes and b.name not in taken and len(set(names)) == len(names)
+            if known and any(n in self.free for n in names) and not any(n in taken for n in names):
+                self.loose[b.name] = b
+
+    def joint(self, name: str | None) -> bool:
+        """Whether two loose branches meet there, and nothing else does."""
+        here = self.at.get(name, ()) if name in self.free else ()
+        return len(here) == 2 and all(b.name in self.loose for b in here)
+
+    def strands(self) -> Iterator[Strand]:
+        """All, in the order of their first branches; circles of joints alone are none."""
+        seen = set[str]()
+        for b in self.loose.values():
+            if b.name in seen:
+                continue
+            ahead, behind = self._way(b, sense=True), self._way(b, sense=False)
+            seen |= {c.name for c, _ in (*ahead[0], *behind[0])}
+            if not self.joint(ahead[1][-1]):
+                back = Strand(*behind).reversed()
+                yield Strand((*back.branches[:-1], *ahead[0]), (*back.nodes[:-2], *ahead[1]))
+
+    def _way(self, b: Branch, *, sense: bool) -> tuple[tuple[tuple[Branch, bool], ...], tuple[str | None, ...]]:
+        """From a branch on, in one sense, until a node that is no joint or the branch itself."""
+        branches, nodes = [(b, sense)], [_end(b, not sense), _end(b, sense)]
+        while self.joint(nodes[-1]):
+            last, here = branches[-1][0], nodes[-1]
+            assert here is not None
+            after = next(c for c in self.at[here] if c is not last)
+            if after is b:
+                break
+            onward = _end(after, False) == here
+            branches.append((after, onward))
+            nodes.append(_end(after, onward))
+        return tuple(branches), tuple(nodes)
+
+
+def _end(b: Branch, sense: bool) -> str | None:
+    """The node behind a branch that is passed in a sense."""
+    end = b.minus if sense else b.plus
+    assert end is not None
+    return end.node
+
+
+def in_strands(network: Network, shapes: dict[str, Shaped], kept: Found) -> Found:
+    """What stands in families already, and strands in others: joints go on by one, buses are picked."""
+    found = strands(network, shapes, {b.name for run in kept[1] for b, _ in run.members} | set(kept[0]))
+    buses = {name: (f"bus {key}", k) for key, names in found.buses.items() for k, name in enumerate(names)}
+    joints: dict[str, Site] = {}
+    runs = []
+    for number, same in enumerate(found.classes):
+        for k, strand in enumerate(same):
+            joints |= {n: (f"joint {number} {j}", k) for j, n in enumerate(strand.nodes[1:-1]) if n is not None}
+        for j, (head, _) in enumerate(same[0].branches):
+            nodes = [end.node for end in (head.plus, head.minus) if end is not None]
+            one, two = (joints.get(n or "", buses.get(n or "", (n or "", -1))) for n in nodes)
+            moves, picked = ((nodes[0] in of, nodes[1] in of) for of in (joints, buses))
+            members = tuple((b, shapes[b.name]) for b, _ in (strand.branches[j] for strand in same))
+            runs.append(Run(members, (one, two), moves, picked))
+    return {**kept[0], **buses, **joints}, [*kept[1], *runs]
+
+
+def strands(network: Network, shapes: Mapping[str, Shaped], taken: Collection[str]) -> Strands:
+    """Classes of at least RUN strands; taken: names of nodes and branches that stand in families already."""
+    graph = _Graph(network, shapes, taken)
+    ways = list(graph.strands())
+    of = _buses(network, graph, ways)
+    while True:
+        size = Counter(of.values())
+        of = {name: key for name, key in of.items() if size[key] >= RUN}
+        classes = _classes(ways, shapes, of)
+        ends = Counter(of[n] for same in classes for s in same for n in (s.nodes[0], s.nodes[-1]) if n in of)
+        every = Counter(of[name] for name in of for _ in graph.at[name])
+        lost = {key for key, number in every.items() if (1 + MANY) * (number - ends[key]) > number}
+        if not lost:
+            break
+        of = {name: key for name, key in of.items() if key not in lost}
+    buses: dict[str, list[str]] = {}
+    for name, key in of.items():
+        buses.setdefault(key, []).append(name)
+    return Strands(classes, {key: tuple(names) for key, names in buses.items()})
+
+
+def _buses(network: Network, graph: _Graph, ways: Sequence[Strand]) -> dict[str, str]:
+    """The family of each free node that is no joint of a strand: those of a connected part whose balances are alike in
+    whether potential stores, and branches that are no strands, touch them.
+    """
+    inner = {name for way in ways for name in way.nodes[1:-1]}
+    storing = {n for way in ways if any(b.kind == "potential" for b, _ in way.branches) for n in way.nodes}
+    found = {}
+    for node in network.nodes:
+        if node.name in graph.free and node.name in graph.at and node.name not in inner:
+            others = any(b.name not in graph.loose for b in graph.at[node.name])
+            key = f"{graph.parts.first(node.name)} {node.domain.name} {node.name in storing} {others}"
+            found[node.name] = key
+    return found
+
+
+def _classes(
+    ways: Sequence[Strand], shapes: Mapping[str, Shaped], of: Mapping[str, str]
+) -> tuple[tuple[Strand, ...], ...]:
+    """Strands of the same laws in the same senses between the same families (or the same nodes), one way round."""
+    numbers: dict[object, int] = {}
+    found: dict[object, list[Strand]] = {}
+
+    def key(way: Strand) -> tuple[tuple[tuple[bool, int], ...], tuple[int, ...]]:
+        links = []
+        for b, sense in way.branches:
+            law = b.domain.name, b.kind, b.side, shapes[b.name].key
+            links.append((not sense, numbers.setdefault(law, len(numbers))))
+        ends = (numbers.setdefault(("end", of.get(n or "", n)), len(numbers)) for n in (way.nodes[0], way.nodes[-1]))
+        return tuple(links), tuple(ends)
+
+    for way in ways:
+        one = min((way, way.reversed()), key=key)
+        if any(n in of for n in (one.nodes[0], one.nodes[-1])):
+            found.setdefault(key(one), []).append(one)
+    return tuple(tuple(same) for same in found.values() if len(same) >= RUN)
