@@ -168,9 +168,9 @@ class Instant:
         """Whether inertia leaves flows open that it has: nodes that stores only tie together."""
         inertia = self.system.jacobian(t, y, yd)[1]
         inert = self._balances[self._row] & (self.system.kinds == "f")[self._column] & (inertia != 0.0)
-        (rows, i), (flows, j) = (np.unique(item[inert], return_inverse=True) for item in (self._row, self._column))
-        free = free_unknowns((rows.size, flows.size), (i, j, inertia[inert] * magnitude[flows][j]))
-        return free is not None and bool(free.any())
+        row, column = self._row[inert], self._column[inert]
+        free = free_unknowns((self.system.rows, y.size), (row, column, inertia[inert] * magnitude[column]))
+        return free is not None and bool(free[column].any())
 
     def _sloping(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
         """Y with implicit efforts at their magnitudes where their laws are flat: a flat one decides about the flows."""
