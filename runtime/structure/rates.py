@@ -43,8 +43,7 @@ def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     y, yd = start.for_form(system)
     _, jyd = system.jacobian(start.t, y, yd)
     free = ~unique(system, jyd)
-    for _, flows in with_flows(system):  # functions of the tested momenta
-        free[flows] = False
+    free[with_flows(system)[1]] = False  # functions of the tested momenta
     if not free.any():
         return np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
     nudges = system.once_if_small("nudges", lambda: _nudges(y.size))
