@@ -118,10 +118,12 @@ class Instant:
         columns = np.append(2 * self._moved[self._column[through]], 2 * self._column[forced] + 1)
         integrals = 2 * self._row[at] + 1, columns, np.where(heavy, inertia, slope)[at]
         ease = np.where(np.isin(self.system.kinds, FOLLOWS), LOOSE, 1.0)
-        rows = _Rows(self._now(self._given), np.ones(y.size, dtype=bool), lambda *_: integrals, ease)
+        behind = self._given.copy()
+        behind[self.system.held[0]] = True  # they read "multiplier = 0"
+        rows = _Rows(behind, np.ones(y.size, dtype=bool), lambda *_: integrals, ease)
         found, impulse = self._jump((t, y, yd), magnitude, rows)
         found = np.where(self.system.kinds == "q", found, y)
-        return found, self._pushed(slope, found - y, impulse)
+        return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
 
     def _slopes(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
         """dF/dy [entries] at flows as large as those of an impulse (at those of y where that is no number), dF/dyd."""
@@ -129,11 +131,13 @@ class Instant:
         at_rest = self.system.jacobian(t, y, yd)[0]
         return np.where(np.isfinite(slope), slope, np.where(np.isfinite(at_rest), at_rest, 0.0)), inertia
 
-    def _pushed(self, slope: Floats, moved: Floats, impulse: Floats) -> Floats:
-        """What displacements that moved, and impulses of forces [unknowns], do to balances with inertia [rows]."""
+    def _pushed(self, slope: Floats, moved: Floats, impulse: Floats, inertia: Floats) -> Floats:
+        """What displacements that moved, and impulses of forces [unknowns], do to balances with inertia [rows]; what is
+        nothing beside its terms and the impulses of flows as large as their magnitudes (inertia [entries]) is none.
+        """
         by = np.where(self._moved >= 0, moved[self._moved], impulse)[self._column]
         terms = np.where(self._heavy[self._row], slope * by, 0.0)
-        found, size = (np.bincount(self._row, item, self.system.rows) for item in (terms, np.abs(terms)))
+        found, size = (np.bincount(self._row, v, self.system.rows) for v in (terms, np.abs(terms) + np.abs(inertia)))
         return np.where(np.abs(found) > BROKEN * size, found, 0.0)
 
     def flows(
