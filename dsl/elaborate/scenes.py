@@ -84,9 +84,10 @@ class SceneReader:
         except Failed:
             return
 
-    def _once(self, key: str, value: object, span: syntax.Span) -> None:
+    def _once(self, key: str, value: object, span: syntax.Span, word: str | None = None) -> None:
+        """What the scene may say once; word: the author's, where it is not the key."""
         if key in self._found:
-            raise self.resolver.fail("E106", f"the scene says '{key}' twice", span)
+            raise self.resolver.fail("E106", f"the scene says '{word or key}' twice", span)
         self._found[key] = value
 
     # -- set -----------------------------------------------------------------------------------------------
@@ -188,7 +189,7 @@ class SceneReader:
     def _time(self, s: syntax.Time) -> None:
         start = self._constant(s.start, dim.TIME, f"the start '{self._text(s.start)}'")
         end = self._constant(s.stop, dim.TIME, f"the end '{self._text(s.stop)}'")
-        self._once("start", start, s.span)
+        self._once("start", start, s.span, "time")
         if start.op == end.op == "const" and end.data < start.data:
             message = f"the time ends before it starts: {self._text(s.start)} to {self._text(s.stop)}"
             help_ = f"time {self._text(s.stop)} to {self._text(s.start)}"

@@ -63,7 +63,7 @@ def law_of(
         raise _off_diagram(context, side, others[0], span)
     if wanted in ("effort", "flow") and _controlled(context, branch, value, node):
         if side != wanted[0]:
-            raise context.fail("E303", f"'{branch.name}' is a {wanted} source, but its law gives {side}", span)
+            raise context.fail("E303", f"the law of {wanted} source '{branch.name}' gives {side}", span)
         return LawOf(wanted, side, node)
     if wanted in ("effort", "flow"):
         help_ = f"that is a {kind}: '{kind}({side} = ...)'"
@@ -76,9 +76,7 @@ def law_of(
     return LawOf(kind, side, node)
 
 
-def _in_dimension(
-    context: Context, branch: BranchSymbol, side: str, value: syntax.Expr, wanted: str | None
-) -> Node:
+def _in_dimension(context: Context, branch: BranchSymbol, side: str, value: syntax.Expr, wanted: str | None) -> Node:
     """The law as a node; E208 where its dimension is not that of its side."""
     dimension = branch_dimension(branch.domain, side)
     read = context.scalar(value)

@@ -262,7 +262,7 @@ def _valued(node: Node, value: float, model: Elaborator) -> str:
 
 
 def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
-    for inner in ex.topological([node]) if node.args else ():
+    for inner in _always(node) if node.args else ():
         if inner.op != "mul" or not any(e < 0 for e in inner.data):
             continue
         for exponent, factor in zip(inner.data, inner.args, strict=True):
@@ -271,6 +271,17 @@ def _divisions(model: Elaborator, node: Node, place: Place, known: Values, repor
                 shown = ", ".join(_valued(n, known.number(n), model) for n in names) or f"{factor} = 0"
                 report.error("E324", f"division by zero with the values bound: {inner}, {shown}", place)
                 return
+
+
+def _always(root: Node) -> Iterable[Node]:
+    """What is evaluated whatever conditions say."""
+    found, left = dict[Node, None](), [root]
+    while left:
+        node = left.pop()
+        if node not in found:
+            found[node] = None
+            left += node.args[:1] if node.op == "cond" else node.args
+    return found
 
 
 def _is_constant(node: Node) -> bool:
@@ -339,6 +350,11 @@ def _indices(model: Elaborator, known: Values, report: Report) -> None:
 
 def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
     """Every expression that the model's equations are made of."""
+    for b in model.parts.branches:
+        if b.law is not None:
+            yield b.law, b.place
+    for coupling in model.parts.couplings:
+        yield coupling.ratio, coupling.place
     for e in model.parts.energies:
         yield e.expression, e.place
     for w in model.parts.works:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -18,6 +19,8 @@ from sysdyn.dsl.tree import syntax
 
 NEAR = 3
 """Names that a finding shows beside a node's."""
+_End = tuple[str, str | None, tuple[Node, ...]]
+"""Domain, node and indices; None for the ground."""
 
 
 def run(model: Elaborator, known: Values, read: frozenset[str], report: Report) -> None:
@@ -83,22 +86,30 @@ def _mentioned(model: Elaborator) -> frozenset[str]:
 
 def _loops_of_sources(model: Elaborator, report: Report) -> None:
     """E411: sources that fix one quantity twice: effort sources between common-effort nodes, flow sources dually."""
-    groups: dict[tuple[str, str], Branch] = {}
-    joined = Joined[tuple[str, str | None, tuple[Node, ...]]]()
+    found: list[tuple[_End, _End, str]] = []
+    joined = Joined[_End]()
     for branch in model.parts.branches:
         if branch.kind != branch.domain.common or branch.loops or branch.plus is None or branch.minus is None:
             continue
-        ends = [(branch.domain.name, t.node, t.at) for t in (branch.plus, branch.minus)]
-        if not joined.join(*ends):
-            what = "effort" if branch.kind == "effort" else "flow"
-            others = [g.name for (kind, _), g in groups.items() if kind == branch.domain.name]
-            message = (
-                f"loop of {what} sources: {', '.join((*others, branch.name))} fix the {what} between two nodes twice"
-            )
-            place = replace(branch.place, element=branch.name)
-            report.error("E411", message, place)
-        groups[branch.domain.name, branch.name] = branch
+        plus, minus = ((branch.domain.name, t.node, t.at) for t in (branch.plus, branch.minus))
+        if joined.join(plus, minus):
+            found.append((plus, minus, branch.name))
+            continue
+        names = ", ".join((*_between(found, plus, minus), branch.name))
+        message = f"loop of {branch.kind} sources: {names} fix the {branch.kind} between two nodes twice"
+        report.error("E411", message, replace(branch.place, element=branch.name))
     _cutsets(model, report)
+
+
+def _between(tree: list[tuple[_End, _End, str]], start: _End, goal: _End) -> list[str]:
+    """Names of the sources of a tree on the way between two of its ends, in the order of the text."""
+    left = list(tree)
+    while True:  # what hangs on one end alone, and is no end of the way, leads nowhere
+        touched = Counter((start, goal, *(end for source in left for end in source[:2])))
+        kept = [source for source in left if touched[source[0]] > 1 and touched[source[1]] > 1]
+        if len(kept) == len(left):
+            return [name for _, _, name in kept]
+        left = kept
 
 
 def _cutsets(model: Elaborator, report: Report) -> None:
@@ -137,9 +148,12 @@ def _lossless(model: Elaborator, report: Report) -> None:
         place = Place(space.source, claims[0][0].span)
         wrong = next((b for b in inside if b.kind in ("dissipator", "effort", "flow", "kinetic", "potential")), None)
         if wrong is not None and wrong.kind in ("dissipator", "effort", "flow"):
-            message = f"'lossless' fails: '{wrong.name}' is a {wrong.kind}" + (
-                " source" if wrong.kind != "dissipator" else ""
+            what = (
+                "a dissipator"
+                if wrong.kind == "dissipator"
+                else {"effort": "an effort source", "flow": "a flow source"}[wrong.kind]
             )
+            message = f"'lossless' fails: '{wrong.name}' is {what}"
             report.error("E314", message, place)
 
 
@@ -160,14 +174,13 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
     if not value < 0.0:
         return
     name = branch.name.rpartition("#")[0] or branch.name
+    shown = f"{value:g}" if slope.op == "const" else f"{slope} = {value:g}"
     if branch.kind == "kinetic":
-        message = (
-            f"'{name}': the inertia is negative ({slope} = {value:g}): the motion is not determined forward in time"
-        )
+        message = f"'{name}': the inertia is negative ({shown}): the motion is not determined forward in time"
         report.error("E321", message, branch.place)
         return
     what = {"potential": "stiffness or capacitance", "dissipator": "resistance or damping"}[branch.kind]
-    message = f"'{name}': negative {what} ({slope} = {value:g})"
+    message = f"'{name}': negative {what} ({shown})"
     function = "V = 1/2*k*x.q^2" if branch.kind == "potential" else "D = 1/2*b*x.f^2"
     keyword = "energy" if branch.kind == "potential" else "content"
     report.error(

@@ -457,7 +457,7 @@ class Handler:
 
     def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
         assert self.restart is not None
-        return self.restart.impulses.after(t, y, yd, self.restart.magnitude(y.size), aims)
+        return self.restart.instant.flows(t, y, yd, self.restart.magnitude(y.size), aims)
 
     def _guards(self, t: float, y: Floats, yd: Floats) -> None:
         values = self.observer(t, y, yd)
@@ -525,7 +525,7 @@ class Handler:
 
     def _momenta(self, t: float, y: Floats, yd: Floats) -> Floats:
         """Momenta that follow from flows that were assigned: the rows of block momentum, solved for p."""
-        settled = self.restart.impulses.system if self.restart else self.system
+        settled = self.restart.instant.system if self.restart else self.system
         rows = np.flatnonzero(settled.of_groups("momentum"))
         p = np.flatnonzero(settled.kinds == "p")
         for _ in range(3 if rows.size else 0):

@@ -20,12 +20,8 @@ class LeastNorm:
         self.system = settled
         pattern = settled.pattern
         columns = pattern.columns_of()
-        place = np.flatnonzero(np.isin(settled.kinds, ("kappa", "mu"))).astype(np.int32)
-        dynamics = np.zeros(settled.rows, dtype=bool)
-        for group, family, first in settled.form.groups:
-            if group == "dynamics":
-                dynamics[first : first + settled.description.rows[family].size] = True
-        source = np.flatnonzero(dynamics[pattern.row] & np.isin(columns, place))
+        place = np.flatnonzero(settled.are("kappa", "mu")).astype(np.int32)
+        source = np.flatnonzero(settled.of_groups("dynamics")[pattern.row] & np.isin(columns, place))
         rows, coordinate = np.unique(pattern.row[source], return_inverse=True)
         m, n = place.size, rows.size
         which, behind = np.searchsorted(place, columns[source]), m + coordinate.astype(np.int64)

@@ -4,6 +4,8 @@ the place of their equation.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Description
@@ -13,36 +15,46 @@ LeftOut = tuple[tuple[int, int], ...]
 """(family, position) of multipliers."""
 Longs = NDArray[np.int64]
 
-_ROWS = {
-    "3": {"kappa": "phi", "mu": "psi"},
-    "2": {"kappa": "phi_rate", "nu": "phi", "mu": "psi"},
-    "2v": {"kappa": "phi_rate", "mu": "psi"},
-    "1": {"kappa": "phi_acceleration", "mu": "psi_rate"},
-    "0": {"kappa": "phi_acceleration", "mu": "psi_rate"},
-    "constraints": {},
-    "settled": {"kappa": "phi_acceleration", "mu": "psi_rate"},
-    "rated": {"kappa": "phi_acceleration", "mu": "psi_rate"},
-    "start": {"kappa": "phi_acceleration", "mu": "psi_rate"},
+_HELD = {
+    "3": (("phi", "kappa"), ("psi", "mu")),
+    "2": (("phi_rate", "kappa"), ("phi", "nu"), ("psi", "mu")),
+    "2v": (("phi_rate", "kappa"), ("psi", "mu")),
+    "1": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
+    "0": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
+    "constraints": (("phi", "kappa"), ("phi_rate", "kappa"), ("psi", "mu")),
 }
-"""Form -> multiplier -> group of rows whose row it is.  Where rows and their derivatives all stand, the derivative that
-determines the multiplier goes; the others hold with those that they depend on."""
+_HELD["settled"] = _HELD["rated"] = _HELD["start"] = (
+    *_HELD["constraints"], ("phi_acceleration", "kappa"), ("psi_rate", "mu"),
+)  # fmt: skip
+"""Form -> groups of rows of a constraint, and the unknown that each reads where the constraint does not hold.  Where it
+is left out, only the last row of an unknown reads it, which determines it: the others hold with those they depend on.
+"""
+_RATES = {"start": {"kappa": "phi_acceleration", "mu": "psi_rate"}}
+_RATES["rated"] = _RATES["start"]
+"""Form -> multiplier -> group whose rows read its derivative: a force that is zero stays it, and what balances without
+inertia follows from that.  Only where the derivatives of balances stand among the rows.
+"""
+
+
+def _rows_of(description: Description, form: Form, places: LeftOut) -> Iterator[tuple[int, str, str, int, int]]:
+    """Of multipliers: number, each group of rows, the unknown that it reads, the places of both."""
+    first, families = {(group, k): at for group, k, at in form.groups}, description.families
+    row = {family: multiplier_row(description, family) for family in dict(places)}
+    for number, (family, position) in enumerate(places):
+        at = {families[family].kind: int(form.at[family])}
+        if "kappa" in at:
+            at["nu"] = nu_place(description, form, family)
+        for group, read in _HELD[form.base]:
+            if at.get(read, -1) >= 0 and (group, row[family]) in first:
+                yield number, group, read, first[group, row[family]] + position, at[read] + position
 
 
 def held_rows(description: Description, form: Form, left_out: LeftOut) -> tuple[Longs, Longs]:
     """Rows, and the unknowns that vanish there."""
-    first = {(group, family): row for group, family, row in form.groups}
-    rows: list[int] = []
-    unknowns: list[int] = []
-    for family, position in left_out:
-        item = description.families[family]
-        row = multiplier_row(description, family)
-        groups = _ROWS[form.base]
-        for kind, at in ((item.kind, int(form.at[family])), ("nu", nu_place(description, form, family))):
-            group = groups.get(kind) if kind != "nu" or item.kind == "kappa" else None
-            if group is not None and at >= 0 and (group, row) in first:
-                rows.append(first[group, row] + position)
-                unknowns.append(at + position)
-    return np.asarray(rows, dtype=np.int64), np.asarray(unknowns, dtype=np.int64)
+    own = {} if form.base == "constraints" else {read: group for group, read in _HELD[form.base]}  # the last of each
+    found = [(row, at) for _, group, read, row, at in _rows_of(description, form, left_out) if own.get(read) == group]
+    table = np.asarray(found, dtype=np.int64).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
 
 
 def multiplier_row(description: Description, family: int) -> int:
@@ -61,36 +73,10 @@ def nu_place(description: Description, form: Form, family: int) -> int:
     return form.written + before
 
 
-_HELD = {
-    "3": (("phi", "kappa"), ("psi", "mu")),
-    "2": (("phi_rate", "kappa"), ("phi", "nu"), ("psi", "mu")),
-    "2v": (("phi_rate", "kappa"), ("psi", "mu")),
-    "1": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
-    "0": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
-    "constraints": (("phi", "kappa"), ("phi_rate", "kappa"), ("psi", "mu")),
-}
-_HELD["settled"] = _HELD["rated"] = _HELD["start"] = (
-    *_HELD["constraints"], ("phi_acceleration", "kappa"), ("psi_rate", "mu"),
-)  # fmt: skip
-"""Form -> groups of rows of a constraint, and the unknown that each reads where the constraint does not hold."""
-_RATES = {"start": {"kappa": "phi_acceleration", "mu": "psi_rate"}}
-_RATES["rated"] = _RATES["start"]
-"""Form -> multiplier -> group whose rows read its derivative: a force that is zero stays it, and what balances without
-inertia follows from that.  Only where the derivatives of balances stand among the rows.
-"""
-
-
 def switch_rows(description: Description, form: Form) -> tuple[Longs, Longs, Longs, Longs]:
     """Rows, the unknowns that vanish there, the numbers of their switches; 1 where their derivative does."""
-    first = {(group, family): row for group, family, row in form.groups}
-    found: list[tuple[int, int, int, int]] = []
     rates = _RATES.get(form.name, {}) if "dynamics_rate" in description.blocks else {}
-    for k, (family, position) in enumerate(description.switches.places):
-        item = description.families[family]
-        row = multiplier_row(description, family)
-        for group, kind in _HELD[form.base]:
-            place = nu_place(description, form, family) if kind == "nu" else int(form.at[family])
-            if item.kind == ("kappa" if kind == "nu" else kind) and place >= 0 and (group, row) in first:
-                found.append((first[group, row] + position, place + position, k, int(rates.get(kind) == group)))
+    rows = _rows_of(description, form, description.switches.places)
+    found = [(row, at, number, int(rates.get(read) == group)) for number, group, read, row, at in rows]
     table = np.asarray(found, dtype=np.int64).reshape(-1, 4)
     return table[:, 0], table[:, 1], table[:, 2], table[:, 3]

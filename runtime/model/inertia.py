@@ -6,8 +6,6 @@ give it as -(dr/dp)^-1 dr/df (Hamilton).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
@@ -42,9 +40,9 @@ def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
     """
     found = _own(system, jyd, "dynamics", "f")
     by_flow, by_momentum = _own(system, jy, "momentum", "f"), _own(system, jy, "momentum", "p")
-    for momenta, flows in with_flows(system):
-        one, other = by_flow[flows], by_momentum[momenta]
-        found[flows] -= np.divide(one, other, out=np.zeros_like(one), where=other != 0.0)
+    momenta, flows = with_flows(system)
+    one, other = by_flow[flows], by_momentum[momenta]
+    found[flows] -= np.divide(one, other, out=np.zeros_like(one), where=other != 0.0)
     return found
 
 
@@ -56,8 +54,8 @@ def inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
     moving = system.are("f")
     size, flow = int(moving.sum()), np.where(moving, np.cumsum(moving) - 1, -1)
     momentum = np.full(system.unknowns, -1, dtype=np.int64)
-    for momenta, flows in with_flows(system):
-        momentum[momenta] = flow[flows]
+    momenta, flows = with_flows(system)
+    momentum[momenta] = flow[flows]
 
     def gathered(group: str, unknown: NDArray[np.int64], values: Floats) -> Floats:
         """Entries of a group's rows at unknowns, both by the flow of their coordinate (unknown: of each, or -1)."""
@@ -95,10 +93,11 @@ def _own_places(system: System, group: str, kind: str) -> NDArray[np.int64]:
     return system.once(("own", group, kind), find)
 
 
-def with_flows(system: System) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Momenta of each family, and the flows of their coordinates."""
-    families, at = system.description.families, system.form.at
-    flow = {family.owner: k for k, family in enumerate(families) if family.kind == "f"}
-    for k, family in enumerate(families[: len(at)]):
-        if family.kind == "p" and family.owner in flow:
-            yield slice(at[k], at[k] + family.size), at[flow[family.owner]] + np.arange(family.size)
+def with_flows(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places of momenta, and of the flows of the same coordinates."""
+    families = list(zip(system.description.families, system.form.at, strict=False))
+    flow = {family.owner: first for family, first in families if family.kind == "f"}
+    paired = [(family, first) for family, first in families if family.kind == "p" and family.owner in flow]
+    both = [(first + np.arange(f.size), flow[f.owner] + np.arange(f.size)) for f, first in paired]
+    momenta, flows = np.hstack([np.zeros((2, 0), dtype=np.int64), *both])
+    return momenta, flows

@@ -59,8 +59,8 @@ def _sizing(system: System) -> Sizing:
     kind, own = _kinds(system), [places.astype(np.int32) for places in own_places(system)]
     effort, moved = (item.astype(np.int32) for item in _displaced(system))
     partner = np.full(system.unknowns, -1, dtype=np.int32)
-    for momenta, flows in with_flows(system):
-        partner[momenta] = flows
+    momenta, flows = with_flows(system)
+    partner[momenta] = flows
     arrays = nominal, kind, partner, *own, effort, moved
     core = lib.Sizing(
         balance=rows.address,

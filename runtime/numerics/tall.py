@@ -106,7 +106,11 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
 
 def free_unknowns(shape: tuple[int, int], entries: Entries) -> NDArray[np.bool_] | None:
     """Unknowns that rows of any size leave open; None where that would cost too much."""
-    i, j, v = entries
+    i, j, v = (item[entries[2] != 0.0] for item in entries)
+    if (np.bincount(i, minlength=1) <= 1).all():  # each row determines its own
+        open_ = np.ones(shape[1], dtype=bool)
+        open_[j] = False
+        return open_
     row, column = sparse_factors(i, j, np.abs(v), shape)
     free = left_open(shape, (i, j, v * row[i] * column[j]))
     return None if free is None else np.abs(free) > OPEN

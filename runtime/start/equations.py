@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
-from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
@@ -19,13 +18,6 @@ from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.integer]
-
-
-def pairs(system: System) -> tuple[Ints, Ints]:
-    """Places of momenta, and of the flows of the same coordinates."""
-    found = [(np.arange(momenta.start, momenta.stop), flows) for momenta, flows in with_flows(system)]
-    momenta, flows = np.hstack([np.zeros((2, 0), dtype=np.int64), *found])
-    return momenta, flows
 
 
 class Equations:
@@ -41,7 +33,7 @@ class Equations:
         self.rates = rates_of(settled)
         self.unsettled = inertial_rates(settled)
         self.unknowns = self.n + self.rates.size
-        self.momentum, self.flow = pairs(system)
+        self.momentum, self.flow = with_flows(system)
         self._entries(settled)
         misses = np.append(settled.are("slack", "unsaid"), np.zeros(self.rates.size, dtype=bool))[self.columns]
         self.guessed = self.rows[misses], self.columns[misses]

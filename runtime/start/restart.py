@@ -1,20 +1,16 @@
 """Across an instant at which the text of the model jumps: the state is kept, what follows from it is found anew.
 
 Displacements, momenta, flows with inertia and dynamic variables keep their values unless a constraint forces them
-(impulses.py, displacements.py); multipliers, implicit efforts, flows without inertia and rates are found behind it.
+(instant.py); multipliers, implicit efforts, flows without inertia and rates are found behind it.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.rank import NotFiniteError
-from sysdyn.runtime.start.displacements import Displacements
-from sysdyn.runtime.start.impulses import Impulses
+from sysdyn.runtime.start.instant import Instant
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import behind
 from sysdyn.runtime.start.starter import Starter
@@ -27,8 +23,6 @@ SLACK = 1e-6
 """Of its magnitude: what a state may move by where rows hold only nearly."""
 NEXT_TO_ZERO = 1e-6
 """Of its magnitude: what follows and is less says nothing of its size."""
-ROUND_OFF = 1e-14
-"""Of its magnitude: what a search moves an unknown by that stays where it is."""
 
 
 def still(
@@ -53,8 +47,7 @@ class Restart:
 
     def __init__(self, settler: Settler, state: NDArray[np.bool_]) -> None:
         self.settler, self.state = settler, state
-        self.impulses = Impulses(settler.system)
-        self._displacements: Displacements | None = None
+        self.instant = Instant(settler.system)
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
@@ -64,18 +57,15 @@ class Restart:
     def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there."""
         magnitude = self.magnitude(y.size)
-        impulse, before = np.zeros(y.size), y
+        before = y
         same, moved = _held(self.settler, t, (y, yd), magnitude)
         moved &= self.state
         if same is not None and not moved.any():  # no state need jump: there is no impulse
-            return *same, impulse
+            return *same, np.zeros(y.size)
+        push = None
         if same is None or moved[self.settler.system.kinds == "q"].any():
-            if self._displacements is None:
-                self._displacements = Displacements(self.settler.system)
-            y = self._sought(self._displacements.after, t, y, yd, magnitude)
-        if self.impulses.broken(t, y, yd, magnitude):
-            y, impulse = self.impulses.after(t, y, yd, magnitude)
-        y = self._sought(self.impulses.balanced, t, y, yd, magnitude)
+            y, push = self.instant.displacements(t, y, yd, magnitude)
+        y, impulse = self.instant.flows(t, y, yd, magnitude, push=push)
         kept = self._kept(t, y, yd, magnitude)
         if kept is not None:
             return *kept, impulse
@@ -102,15 +92,6 @@ class Restart:
             if (found := still(self.settler, t, beside, self.state, magnitude)) is not None:
                 return found
         return None
-
-    def _sought(self, found: Callable[..., Floats], t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
-        """What a search finds, without its round-off; y where it finds no numbers."""
-        try:
-            new = found(t, y, yd, magnitude)
-        except NotFiniteError:
-            return y
-        jumps = np.abs(new - y) > ROUND_OFF * magnitude
-        return np.where(jumps, new, y) if np.isfinite(new).all() else y
 
     def magnitude(self, number: int) -> Floats:
         """Magnitudes [number] of the first unknowns."""

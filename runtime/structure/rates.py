@@ -26,13 +26,10 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     """[unknowns]: derivatives that F = 0 determines: none moves along what dF/dyd leaves open; of matrices for which
     that would cost too much all that occur.
     """
-    there, found = jyd != 0.0, np.zeros(system.unknowns, dtype=bool)
+    there = jyd != 0.0
     row, column, value = system.pattern.row[there], system.pattern.columns_of()[there], jyd[there]
-    found[column] = True
-    if (np.bincount(row, minlength=1) <= 1).all():  # each determines its own
-        return found
     free = free_unknowns((system.rows, system.unknowns), (row, column, value))
-    return found if free is None else found & ~free
+    return np.isin(np.arange(system.unknowns), column) if free is None else ~free
 
 
 def _nudges(number: int) -> list[tuple[Floats, Floats]]:
@@ -46,8 +43,7 @@ def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     y, yd = start.for_form(system)
     _, jyd = system.jacobian(start.t, y, yd)
     free = ~unique(system, jyd)
-    for _, flows in with_flows(system):  # functions of the tested momenta
-        free[flows] = False
+    free[with_flows(system)[1]] = False  # functions of the tested momenta
     if not free.any():
         return np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
     nudges = system.once_if_small("nudges", lambda: _nudges(y.size))

@@ -16,6 +16,7 @@ import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
@@ -178,14 +179,8 @@ def _place(system: System, multiplier: int) -> tuple[int, int]:
 
 def _label(system: System, multiplier: int) -> RowLabel:
     """Label of the constraint of a multiplier."""
-    number, position = _place(system, multiplier)
-    family = system.description.families[number]
-    block = "phi" if family.kind == "kappa" else "psi"
-    for k in system.description.rows_of(block):
-        row = system.description.rows[k]
-        if family.owner in (row.owner, row.label):
-            return row.at(position)
-    return RowLabel(family.owner, block)
+    family, position = _place(system, multiplier)
+    return system.description.rows[multiplier_row(system.description, family)].at(position)
 
 
 def _roused(system: System, t: float, jy: Floats) -> Floats:

@@ -74,6 +74,23 @@ scene s of m {
 }
 """
 
+PUSHED = DAMPER.replace("spring:", "mass: kinetic(p = (4 kg)*f) b -> ground\n  init mass.f = 0 m/s\n  spring:")
+TAKEN = """model m {
+  node a, b: translation
+  damper: dissipator(e = (2 N.s/m)*f) a -> ground
+  mass: kinetic(p = (4 kg)*f) b -> ground
+  spring: potential(e = (5 N/m)*q) b -> ground
+  phi rod: b.q - a.q = 1 m*step(t - 0.5 s)
+  init b.q = 0 m
+  init mass.f = 0 m/s
+}
+scene s of m {
+  time 0 s to 1 s
+  accuracy 1e-9
+  trace b.q as v every 0.1 s
+}
+"""
+
 
 def beside(t):
     """V C1 (V): C1 v' = (1 - v) + (w - v), C2 w' = (v - w) + (1 - w)/3."""
@@ -107,6 +124,18 @@ def test_a_damper_takes_along_what_hangs_on_it(tmp_path, formulation):
     trace = trace_of(tmp_path, DAMPER, formulation=formulation)
     late = trace.time > 0.5
     assert np.abs(trace["v"].values[late] - np.exp(-2.5 * (trace.time[late] - 0.5))).max() < 3e-9
+
+
+@pytest.mark.parametrize("text", [PUSHED, TAKEN], ids=["pushed", "taken"])
+@pytest.mark.parametrize("formulation", [*FOUR[:2], "kane"])
+def test_a_damper_that_is_displaced_pushes_a_mass(tmp_path, text, formulation):
+    """c dq = 2 N.s on 4 kg, through the damper or as the reaction of a rod: behind it 4 x'' + 2 x' + 5 x = 0."""
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    late = trace.time > 0.5
+    rates = np.array([[0.0, 1.0], [-1.25, -0.5]])
+    exact = [(expm(rates * (t - 0.5)) @ [0.0, 0.5])[0] for t in trace.time[late]]
+    assert np.abs(trace["v"].values[late] - exact).max() < 3e-9
+    assert np.abs(trace["v"].values[~late]).max() < 1e-12
 
 
 LADDER = """from std.electrical import resistor, capacitor

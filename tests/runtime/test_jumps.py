@@ -7,8 +7,7 @@ from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.displacements import Displacements
-from sysdyn.runtime.start.impulses import Impulses
+from sysdyn.runtime.start.instant import Instant
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.runtime.start.start import consistent_start
 
@@ -45,14 +44,14 @@ def test_two_masses_that_are_coupled_go_on_with_their_common_momentum(form, scal
     momenta = {"p_a": 4.0} if form == "hamiltonian" else {}
     y = values(system, f_a=4.0, **momenta)
     rates, size = np.zeros(y.size), np.full(y.size, scale)
-    impulses = Impulses(system)
-    assert impulses.broken(0.0, y, rates, size)
-    after, impulse = impulses.after(0.0, y, rates, size)
+    instant = Instant(system)
+    assert instant.broken(0.0, y, rates, size)
+    after, impulse = instant.flows(0.0, y, rates, size)
     assert read(system, after, "f_a", "f_b") == pytest.approx([1.0, 1.0], rel=1e-12)
     if momenta:
         assert read(system, after, "p_a", "p_b") == pytest.approx([1.0, 3.0], rel=1e-12)
     assert read(system, impulse, "mu_clutch") == pytest.approx([3.0], rel=1e-12)
-    assert not impulses.broken(0.0, after, rates, size)
+    assert not instant.broken(0.0, after, rates, size)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -61,7 +60,7 @@ def test_a_rod_takes_away_the_speed_along_itself(form):
     system = settled_of("x y", "7*(f_x**2 + f_y**2)/2", phi={"rod": "(q_x**2 + q_y**2 - 25)/2"}, form=form)
     momenta = {"p_x": 7.0, "p_y": 14.0} if form == "hamiltonian" else {}
     y = values(system, q_x=3.0, q_y=4.0, f_x=1.0, f_y=2.0, **momenta)
-    after, impulse = Impulses(system).after(0.0, y, np.zeros(y.size), np.ones(y.size))
+    after, impulse = Instant(system).flows(0.0, y, np.zeros(y.size), np.ones(y.size))
     along = (-4.0 * 1.0 + 3.0 * 2.0) / 25.0
     assert read(system, after, "q_x", "q_y") == [3.0, 4.0]
     assert read(system, after, "f_x", "f_y") == pytest.approx([-4.0 * along, 3.0 * along], rel=1e-12)
@@ -73,7 +72,7 @@ def test_what_has_no_inertia_takes_no_impulse():
     """A damper between two masses, its flow the difference of theirs, takes all of the jump."""
     system = settled_of("a b d", "f_a**2/2 + 3*f_b**2/2", content="f_d**2/2", psi={"across": "f_a - f_b - f_d"})
     y = values(system, f_a=4.0)
-    after, impulse = Impulses(system).after(0.0, y, np.zeros(y.size), np.ones(y.size))
+    after, impulse = Instant(system).flows(0.0, y, np.zeros(y.size), np.ones(y.size))
     assert read(system, after, "f_a", "f_b", "f_d") == pytest.approx([4.0, 0.0, 4.0], abs=1e-12)
     assert read(system, impulse, "mu_across") == pytest.approx([0.0], abs=1e-12)
 
@@ -83,7 +82,7 @@ def test_a_collision_that_gives_back_a_part():
     system = settled_of("a b", "f_a**2/2 + 3*f_b**2/2", psi={"contact": "f_a - f_b"})
     aims = np.where(system.of_groups("psi"), -0.5 * 4.0, 0.0)
     y = values(system, f_a=4.0)
-    after, impulse = Impulses(system).after(0.0, y, np.zeros(y.size), np.ones(y.size), aims)
+    after, impulse = Instant(system).flows(0.0, y, np.zeros(y.size), np.ones(y.size), aims)
     assert read(system, after, "f_a", "f_b") == pytest.approx([-0.5, 1.5], rel=1e-12)
     assert read(system, impulse, "mu_contact") == pytest.approx([4.5], rel=1e-12)
 
@@ -93,7 +92,7 @@ def test_flows_that_inertia_ties_together_share_by_their_balances(ratio, expecte
     """One coil for a + n b = 3, resistors 1 and 2: the drop across the second is n times that across the first."""
     system = settled_of("a b", f"(f_a + {ratio}*f_b)**2/2", content="f_a**2/2 + 2*f_b**2/2")
     y = values(system, f_a=3.0)
-    found = Impulses(system).balanced(0.0, y, np.zeros(y.size), np.ones(y.size))
+    found, _ = Instant(system).flows(0.0, y, np.zeros(y.size), np.ones(y.size))
     assert read(system, found, "f_a", "f_b") == pytest.approx(expected, rel=1e-12)
 
 
@@ -101,7 +100,7 @@ def test_charge_jumps_at_once_where_no_resistor_stands():
     """5 V across capacitors of 1 F and 2 F in series: 10/3 C pass at once, none through the resistor at the second."""
     system = settled_of("a b", 0, "q_a**2/2 + (q_a - q_b)**2/4", "3*f_b**2/2", work={"a": "5"})
     y = values(system, q_a=0.0, q_b=0.5)
-    found = Displacements(system).after(0.0, y, np.zeros(y.size), np.ones(y.size))
+    found, _ = Instant(system).displacements(0.0, y, np.zeros(y.size), np.ones(y.size))
     # q_a + (q_a - 1/2)/2 = 5
     assert read(system, found, "q_a", "q_b") == pytest.approx([3.5, 0.5], rel=1e-12)
 
@@ -110,7 +109,7 @@ def test_a_mass_takes_no_displacement_at_once():
     """A spring between a point that is pushed and a mass: the point goes where the spring carries the push."""
     system = settled_of("a b", "f_b**2/2", "4*(q_a - q_b)**2/2 + f_a*0", work={"a": "2"})
     y = values(system, q_a=1.0, q_b=1.0)
-    found = Displacements(system).after(0.0, y, np.zeros(y.size), np.ones(y.size))
+    found, _ = Instant(system).displacements(0.0, y, np.zeros(y.size), np.ones(y.size))
     assert read(system, found, "q_a", "q_b") == pytest.approx([1.5, 1.0], rel=1e-12)
 
 
@@ -120,7 +119,7 @@ def test_impulses_of_a_constraint_share_a_displacement():
         "a b", 0, "q_a**2/2 + q_b**2/6", psi={"joint": "f_a + f_b"}, phi={"charge": "q_a + q_b - 4"}
     )
     y = values(system, q_a=4.0)
-    found = Displacements(system).after(0.0, y, np.zeros(y.size), np.ones(y.size))
+    found, _ = Instant(system).displacements(0.0, y, np.zeros(y.size), np.ones(y.size))
     assert read(system, found, "q_a", "q_b") == pytest.approx([1.0, 3.0], rel=1e-12)
 
 
@@ -129,10 +128,24 @@ def test_dampers_share_a_displacement_by_their_resistance():
     constraint = "(q_a + q_b) + (q_a + q_b)**3/10 - 2.8"
     system = settled_of("a b", 0, content="f_a**2/2 + 3*f_b**2/2", phi={"push": constraint})
     y = values(system)
-    found = Displacements(system).after(0.0, y, np.zeros(y.size), np.ones(y.size))
+    found, _ = Instant(system).displacements(0.0, y, np.zeros(y.size), np.ones(y.size))
     a, b = read(system, found, "q_a", "q_b")
     assert a == pytest.approx(3.0 * b, rel=1e-10)
     assert a + b == pytest.approx(2.0, rel=0.01)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_displaced_damper_gives_its_impulse_to_a_mass(form):
+    """One end goes 3 m at once, 2 N.s/m to a mass of 4 kg: c dq = 6 N.s, and 1.5 m/s more."""
+    system = settled_of("a b", "4*f_b**2/2", content="2*(f_a - f_b)**2/2", phi={"drive": "q_a - 3"}, form=form)
+    momenta = {"p_b": 4.0} if form == "hamiltonian" else {}
+    y = values(system, f_b=1.0, **momenta)
+    point = np.zeros(y.size), np.ones(y.size)
+    there, push = Instant(system).displacements(0.0, y, *point)
+    assert read(system, there, "q_a", "q_b", "f_b") == pytest.approx([3.0, 0.0, 1.0], abs=1e-12)
+    assert np.abs(push).max() == pytest.approx(6.0, rel=1e-12)
+    found, _ = Instant(system).flows(0.0, there, *point, push=push)
+    assert read(system, found, "f_b") == pytest.approx([2.5], rel=1e-12)
 
 
 def test_across_a_jump_the_state_stays_and_the_rest_follows():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.equations import pairs
 from sysdyn.runtime.start.settled import inertial_rows, rates_of
 from sysdyn.runtime.start.starter import Starter, problem_of
 from sysdyn.runtime.structure.redundancy import DENSE, Reactions, combination, dependent
@@ -72,7 +72,7 @@ def test_what_carries_inertia_is_state_and_the_tension_follows():
 
 def test_momenta_are_paired_with_their_flows_and_flows_weigh_by_them():
     found = starter(form="hamiltonian")
-    momenta, flows = pairs(found.system)
+    momenta, flows = with_flows(found.system)
     names = found.system.unknown_names
     assert [(names[p], names[f]) for p, f in zip(momenta, flows, strict=True)] == [("p_1", "f_1"), ("p_2", "f_2")]
     x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))

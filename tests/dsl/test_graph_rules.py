@@ -1,0 +1,195 @@
+"""Rules on the network's graph and on laws with their numbers: what each says, where, and not of its neighbour."""
+
+import pytest
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.rewriting import nodes_read
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.rules import checks, graph_checks
+from sysdyn.dsl.text.diagnostics import Report, SourceText
+
+
+@pytest.fixture(autouse=True)
+def fresh():
+    with ex.fresh():
+        yield
+
+
+def elaborated(body, before=""):
+    source = SourceText("m.sd", f"{before}model m {{\n{body}\n}}\n")
+    report = Report()
+    document = load.document(source, report)
+    model, _ = load._elaborated(document, document.models["m"], None, report, (), ())
+    assert not list(report), list(report)
+    return model, source
+
+
+def told(report, source):
+    return [(d.code, d.message, source.text[d.place.span.start : d.place.span.end]) for d in report]
+
+
+def said(body, before=""):
+    """What the rules on the graph say: code, message, the text that they point at."""
+    model, source = elaborated(body, before)
+    report = Report()
+    graph_checks.run(model, Values(model.parts.parameters, []), nodes_read(model.parts), report)
+    return told(report, source)
+
+
+R = "dissipator(e = 5 ohm*f)"
+
+
+def test_a_node_needs_two_elements_where_flows_balance():
+    assert said(f"node a, b: electrical\nR: {R} a -> ground") == [
+        ("E409", "node 'a' touches one element only", "a"),
+        ("E409", "node 'b' touches no element", "b"),
+    ]
+    assert said(f"node a: electrical\nR: {R} a -> ground\nS: {R} a -> ground") == []
+
+
+def test_a_node_needs_one_element_where_efforts_balance():
+    assert said("node x, y: translation\nM: kinetic(p = 1 kg*f) x") == [("E409", "node 'y' touches no element", "y")]
+
+
+def test_a_family_is_touched_as_a_whole():
+    """Three nodes, two chains of one element between neighbours: four ends; one chain over three of five: four too."""
+    body = "param n = {}\nnode a[1..n]: electrical\nfor i in 1..2 {{ R[i]: " + R + " a[i] -> a[i + 1] }}"
+    assert said(body.format(3)) == []
+    assert [message for _, message, _ in said("node a[1..5]: electrical")] == ["node 'a' touches no element"]
+
+
+@pytest.mark.parametrize(
+    ("domain", "kind", "unit"), [("electrical", "effort(e", "V"), ("translation", "flow(f", "m/s")]
+)
+def test_sources_in_a_loop_are_named_and_no_others(domain, kind, unit):
+    """Of five sources three close a loop of a, b and the ground; one hangs on it, one stands apart."""
+    what = kind.partition("(")[0]
+    ends = {"u": "a -> ground", "apart": "d -> c", "v": "b -> a", "beside": "f -> a", "w": "ground -> b"}
+    listed = [f"{name}: {kind} = 1 {unit}) {at}" for name, at in ends.items()]
+    ((_, message, at),) = [
+        found for found in said("\n".join([f"node a, b, c, d, f: {domain}", *listed])) if found[0] == "E411"
+    ]
+    assert message == f"loop of {what} sources: u, v, w fix the {what} between two nodes twice"
+    assert at == listed[-1]
+
+
+def test_sources_side_by_side_are_a_loop_and_in_a_row_none():
+    two = "node a, b: electrical\nu: effort(e = 1 V) a -> ground\nv: effort(e = 2 V) {} -> {}\nR: " + R + " b -> ground"
+    assert [m for c, m, _ in said(two.format("a", "ground")) if c == "E411"] == [
+        "loop of effort sources: u, v fix the effort between two nodes twice"
+    ]
+    assert said(two.format("b", "a")) == []
+
+
+def test_currents_that_nothing_can_take_up():
+    cut = "node a: electrical\nu: flow(f = 1 A) a -> ground\nv: flow(f = 2 A) a -> ground"
+    assert said(cut) == [("E412", "cutset of flow sources: the flows of u, v at node a must vanish in sum", "a")]
+    assert said(f"{cut}\nR: {R} a -> ground") == []
+
+
+@pytest.mark.parametrize(
+    ("law", "code", "message"),
+    [
+        ("kinetic(p = k*(-1 kg)*f)", "E321",
+         "'X': the inertia is negative (-k = -2): the motion is not determined forward in time"),
+        ("kinetic(p = -2 kg*f)", "E321",
+         "'X': the inertia is negative (-2): the motion is not determined forward in time"),
+        ("potential(e = -k*(3 N/m)*q)", "E325", "'X': negative stiffness or capacitance (-3*k = -6)"),
+        ("dissipator(e = -3 N.s/m*f)", "E325", "'X': negative resistance or damping (-3)"),
+        ("dissipator(f = (1 - k)*e*(1 m/s/N))", "E325", "'X': negative resistance or damping (-k + 1 = -1)"),
+    ],
+)  # fmt: skip
+def test_a_modulus_below_zero(law, code, message):
+    assert said(f"param k = 2\nnode x: translation\nX: {law} x") == [(code, message, f"X: {law} x")]
+
+
+@pytest.mark.parametrize(
+    "law",
+    ["kinetic(p = k*(1 kg)*f)", "potential(e = 0 N/m*q)", "dissipator(e = (k - 2)*(1 N.s/m)*f)", "effort(e = -3 N)"],
+)
+def test_a_modulus_from_zero_on_is_no_fault(law):
+    assert said(f"param k = 2\nnode x: translation\nX: {law} x") == []
+
+
+COUPLED = """component machine {{
+  branch coil: electrical
+  branch shaft: rotation
+  g: gyrator(e1 = 2 V.s*f2) on coil.q, on shaft.q
+  {}
+  lossless
+}}
+"""
+INSIDE = """node a: electrical
+node s: rotation
+M: machine() coil = a -> ground, shaft = s -> ground
+J: kinetic(p = 1 kg.m^2*f) s
+R: dissipator(e = 1 ohm*f) a -> ground"""
+
+
+def test_what_loses_power_is_not_lossless():
+    assert said(INSIDE, COUPLED.format("")) == []
+    lossy = COUPLED.format("D: dissipator(e = 1 N.m.s*f) on shaft.q")
+    assert said(INSIDE, lossy) == [("E314", "'lossless' fails: 'M.D' is a dissipator", "lossless")]
+    driven = COUPLED.format("U: effort(e = 1 N.m) on shaft.q")
+    assert said(INSIDE, driven) == [("E314", "'lossless' fails: 'M.U' is an effort source", "lossless")]
+
+
+def test_a_branch_that_stands_in_nothing():
+    idle = "component c {\n  branch one: electrical\n  branch two: electrical\n  energy V = one.q^2/(2*(1 F))\n}\n"
+    body = f"node a: electrical\nX: c() one = a -> ground, two = a -> ground\nR: {R} a -> ground"
+    ((code, message, _),) = said(body, idle)
+    assert (code, message) == (
+        "E306", "branch 'X.two' has no law and occurs in no energy, content, work or constraint",
+    )  # fmt: skip
+
+
+# -- with the numbers -------------------------------------------------------------------------------------------------
+
+
+def judged(body, *, required=True):
+    """What the checks before and after the values are known say."""
+    model, source = elaborated(body)
+    report = Report()
+    checks.run(model, report, required=required)
+    checks.values(model, Values(model.parts.parameters, []), report)
+    return told(report, source)
+
+
+SPRING = "node x: translation\nM: kinetic(p = 1 kg*f) x\nS: potential(e = {}*q) x"
+
+
+def test_a_parameter_without_value_is_asked_for_where_one_is_needed():
+    body = "param k: N/m\n" + SPRING.format("k")
+    assert judged(body) == [("E406", "parameter 'k' has no value", "k")]
+    assert judged(body, required=False) == []
+
+
+def test_a_division_by_a_parameter_that_is_zero():
+    """In laws, ratios and energies; not where a condition keeps it away."""
+    body = "param c = {} m/N\n" + SPRING.format("1/c")
+    assert judged(body.format(2)) == []
+    assert judged(body.format(0)) == [
+        ("E324", "division by zero with the values bound: S.q/c, c = 0 m/N", "S: potential(e = 1/c*q) x")
+    ]
+    energy = "param c = 0 m\nnode x: translation\nM: kinetic(p = 1 kg*f) x\nenergy V = {}"
+    assert [m for _, m, _ in judged(energy.format("1 N*x.q^2/c"))] == [
+        "division by zero with the values bound: x.q^2/c, c = 0 m"
+    ]
+    assert judged(energy.format("if c > 0 m then 1 N*x.q^2/c else 0 J")) == []
+    ratio = "param r = 0\nnode a, b: electrical\nT: transformer(e2 = 1/r*e1) a -> ground, b -> ground"
+    assert [(c, at) for c, _, at in judged(ratio)] == [("E324", "T: transformer(e2 = 1/r*e1) a -> ground, b -> ground")]
+
+
+def test_what_is_required_is_told_with_its_values():
+    body = SPRING.format("k") + "\nparam k = 3 kN/m\nparam limit = 2 N/mm\nrequire k < limit"
+    assert judged(body) == [("E322", "require k < limit fails: k = 3 kN/m, limit = 2 N/mm", "require k < limit")]
+    assert judged(body.replace("3 kN", "1 kN")) == []
+
+
+def test_an_index_outside_its_family():
+    body = "param n = {}\nnode x[1..n]: translation\nfor i in 1..3 {{ M[i]: kinetic(p = 1 kg*f) x[i] }}"
+    assert judged(body.format(3)) == []
+    assert judged(body.format(2)) == [("E805", "index 3 of 'x' is outside 1..2: x[i]", "i")]
+    assert [(c, m) for c, m, _ in judged(body.format(3.5))] == [
+        ("E805", "'n' is a size or an index, so it must be a whole number: 3.5")
+    ]

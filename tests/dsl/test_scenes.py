@@ -1,0 +1,210 @@
+"""What a scene says, in SI units; what its model offers to those who run it; units that instances solve for."""
+
+from fractions import Fraction
+
+import pytest
+from sysdyn.dsl import load
+from sysdyn.dsl.elaborate.listing import Instance, Readable, instances, readable
+from sysdyn.dsl.elaborate.scenes import SceneReader
+from sysdyn.dsl.elaborate.unit_variables import _solved
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.units import NONE, known, multiply, raised
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+
+MODEL = """model m {
+  param k = 3 N/m
+  param n = 2
+  param c[1..2] = [1, 2]
+  input u: V = 1 V
+  node x: translation
+  M: kinetic(p = 1 kg*f) x
+  S: potential(e = k*q) x
+}
+scene s of m {
+"""
+
+
+@pytest.fixture(autouse=True)
+def fresh():
+    with ex.fresh():
+        yield
+
+
+def read(body):
+    """The scene, its reader and what is said of it (code, message, help, text)."""
+    report, source = Report(), SourceText("m.sd", f"{MODEL}{body}\n}}\n")
+    document = load.document(source, report)
+    model, reader = load._elaborated(document, document.models["m"], document.scenes["s"], report, (), ())
+    assert isinstance(reader, SceneReader)
+    scene = reader.read(document.scenes["s"], Place(source, document.scenes["s"].name.span))
+    said = [(d.code, d.message, d.help, source.text[d.place.span.start : d.place.span.end]) for d in report]
+    return scene, (model, reader), said
+
+
+def test_instants_and_steps_are_in_seconds():
+    scene, _, said = read("time 500 ms to 2 min\ntrace x.q every 10 ms\nsolver bdf(order = 3, step = 1 ms)")
+    assert said == []
+    assert [ex.evaluate([n], {}.__getitem__)[0] for n in (scene.start, scene.end, scene.every)] == [0.5, 120.0, 0.01]
+    assert (scene.solver, [(name, n.data) for name, n in scene.solver_options]) == (
+        "bdf", [("order", 3.0), ("step", 1e-3)],
+    )  # fmt: skip
+
+
+def test_what_is_said_of_a_run():
+    body = "formulation kane\nredundancy minimum_norm\nlimit steps 100\nlimit events 5\nsolver radau(keep_flow = true)"
+    scene, _, said = read(f"{body}\ntrace x.q, x.f every 1 s\naccuracy 1e-6 on x.f")
+    assert said == []
+    assert (scene.formulation, scene.redundancy, scene.accuracy_on) == ("kane", "minimum_norm", ("x.f",))
+    assert [(name, n.data) for name, n in scene.limits] == [("steps", 100.0), ("events", 5.0)]
+    assert (scene.accuracy.data, scene.keeps("keep_flow"), scene.keeps("keep_implicit")) == (1e-6, True, False)
+
+
+def test_a_quantity_is_traced_in_its_unit_under_its_name():
+    """At 10 m/s 36 km/h; 6 N times 10 m/s are 0.06 kW."""
+    _, (_, reader), said = read("trace x.q, x.f in km/h as v, S.e*x.f in kW as power every 1 s")
+    assert said == []
+    at = {ex.var("x", "nq"): 2.0, ex.var("x", "nf"): 10.0, ex.var("S", "be"): 6.0}
+    found = {o.name: (o.unit.text, o.expression) for o in reader.observations}
+    assert {name: unit for name, (unit, _) in found.items()} == {"x.q": "m", "v": "km/h", "power": "kW"}
+    shown = ex.evaluate([node for _, node in found.values()], lambda n: at[n])
+    assert shown == pytest.approx([2.0, 36.0, 0.06], rel=1e-15)
+
+
+def test_settings_replace_values_elements_and_inputs():
+    _, (model, reader), said = read("set k = 4 N/cm\nset n = 5\nset c[2] = 7\nset u = 2 V")
+    assert said == []
+    values = Values(model.parts.parameters, reader.elements)
+    assert [values.number(ex.param(name)) for name in ("k", "n", "u")] == [400.0, 5.0, 2.0]
+    assert [values.element("c", k) for k in (1, 2)] == [1.0, 7.0]
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "message", "help_", "at"),
+    [
+        ("time 2 s to 1 s", "E912", "the time ends before it starts: 2 s to 1 s", "time 1 s to 2 s", "time 2 s to 1 s"),
+        ("time 0 m to 1 s", "E208", "the start '0 m' is in m, wants s", "write '0 s'", "0 m"),
+        ("accuracy 2", "E906", "accuracy 2: from 1e-13 to less than 1, what doubles can tell", "accuracy 1e-6", "2"),
+        ("trace x.q every 1 s\naccuracy 1e-6 on x.f", "E906",
+         "the accuracy of 'x.f' is asked for, but it is not traced", "trace x.f", "x.f"),
+        ("formulation lagrange", "E607", "there is no formulation 'lagrange'", "'lagrangian'", "lagrange"),
+        ("solver bfd", "E607", "there is no solver 'bfd'", "'bdf'", "bfd"),
+        ("redundancy none", "E607", "there is no redundancy 'none'", "one of error, drop, minimum_norm", "none"),
+        ("solver bdf(oder = 3)", "E405", "the solver has no option 'oder'",
+         "order = .., index = .., step = .., longest = .., keep_implicit = .., keep_flow = ..", "oder = 3"),
+        ("solver bdf(keep_flow = n > 1)", "E405",
+         "keep_flow changes which unknowns there are: it does not depend on values", "true or false", "n > 1"),
+        ("limit cows 3", "E113", "there is no limit 'cows'", "limit steps, limit events", "cows"),
+        ("set kk = 3", "E910", "'kk' is not a parameter or input of model 'm'", "nearest: 'k'", "kk"),
+        ("set x = 3 m", "E910", "'x' is not a parameter or input of model 'm'", "init sets initial values", "x"),
+        ("set k = 3 s", "E207", "'k' is in kg/s^2 but set to s", "write '3 N/m'", "3 s"),
+        ("trace x.q in s every 1 s", "E208", "'x.q' is in m, not s", "in m", "s"),
+        ("trace x.q as time every 1 s", "E911", "trace name 'time' belongs to the trace itself",
+         "another name with 'as'", "time"),
+        ("trace x.q as a, x.f as a every 1 s", "E106", "'a' is traced twice", "another name with 'as'", "a"),
+        ("time 0 s to 1 s\ntime 0 s to 2 s", "E106", "the scene says 'time' twice",
+         "another name for one of them, or delete it", "time 0 s to 2 s"),
+    ],
+)  # fmt: skip
+def test_what_a_scene_cannot_say(body, code, message, help_, at):
+    assert read(body)[2] == [(code, message, help_, at)]
+
+
+# -- what can be read ---------------------------------------------------------------------------------------------
+
+LISTED = """component cell {
+  param C = 2 F
+  port p: electrical
+  level fine {
+    X: potential(q = C*e) p -> ground
+  }
+  level none {
+    X: effort(e = 0 V) p -> ground
+  }
+}
+model m {
+  param n = 3
+  node a[1..n]: electrical
+  for i in 1..n {
+    c[i]: cell.fine() p = a[i]
+    R[i]: dissipator(e = 1 ohm*f) a[i] -> ground
+  }
+  let total = sum(i in 1..n: R[i].f)
+}
+"""
+
+
+def test_names_that_can_be_read_with_their_units():
+    document = load.document(SourceText("m.sd", LISTED), Report())
+    report = Report()
+    model, _ = load._elaborated(document, document.models["m"], None, report, (), ())
+    assert list(report) == []
+    assert instances(model) == (Instance("c", "cell", ("fine", "none"), "fine"),)
+    found = readable(model, Values(model.parts.parameters, []))
+    by_name = {r.name: r for r in found}
+    assert by_name["c[1..3].X.V"] == Readable("c[1..3].X.V", "c[1..3].X", "element", "J")
+    assert "total" in by_name
+    assert {name: by_name[f"R[1..3].{name}"].unit for name in ("e", "f", "q", "p", "power")} == {
+        "e": "V", "f": "A", "q": "C", "p": "Wb", "power": "W",
+    }  # fmt: skip
+    assert by_name["a[1..3].e"].unit == "V"
+    assert "audit.energy" in by_name
+
+
+# -- units that instances solve for ------------------------------------------------------------------------------
+
+
+class RefusedError(Exception):
+    """What a frame's resolver raises."""
+
+
+class Frame:
+    """What is asked of an elaboration where units contradict each other: to say so."""
+
+    resolver = property(lambda self: self)
+
+    def fail(self, code, message, span, help=None):
+        return RefusedError(code, message)
+
+
+class Statement:
+    span, decl = None, type("Decl", (), {"name": "pid"})
+
+
+def unit(text):
+    """Dimension of a product of units with exponents: "V rad^-1"."""
+    found = NONE
+    for factor in text.split():
+        name, _, power = factor.partition("^")
+        found = multiply(found, known(name)[0], int(power or 1))
+    return found
+
+
+def solved(*equations):
+    """Units of variables from ({variable: exponent}, unit text)."""
+    rows = [
+        ({n: Fraction(e) for n, e in left.items()}, unit(right), f"p{k}") for k, (left, right) in enumerate(equations)
+    ]
+    names = {n for left, _ in equations for n in left}
+    return {n: dim.show(d) for n, d in _solved(Frame(), Statement(), names, rows).items()}
+
+
+def test_units_follow_from_what_an_instance_is_given():
+    """kp: $y/$u in V/rad, r: $u in rad; and where squares and products are given, roots."""
+    assert solved(({"$y": 1, "$u": -1}, "V m^-1"), ({"$u": 1}, "m")) == {"$u": "m", "$y": "V"}
+    assert solved(({"$y": 1, "$u": 1}, "N m"), ({"$y": 1, "$u": -1}, "N m^-1")) == {"$u": "m", "$y": "N"}
+    assert solved(
+        ({"$u": 2}, "m^3"),
+    ) == {"$u": "m^(3/2)"}
+    assert solved(({"$u": 1}, "s"), ({"$u": 3}, "s^3")) == {"$u": "s"}
+    assert raised(unit("m^3"), Fraction(1, 2))[0][1] == Fraction(3, 2)
+
+
+def test_units_that_are_open_or_contradict_each_other():
+    with pytest.raises(RefusedError) as error:
+        solved(({"$y": 1, "$u": -1}, "V m^-1"))
+    assert error.value.args == ("E209", "unit variable $y of 'pid' is not determined")
+    with pytest.raises(RefusedError) as error:
+        solved(({"$u": 1}, "m"), ({"$u": 2}, "m s"))
+    assert error.value.args == ("E209", "the unit variables of 'pid' contradict each other at 'p1' (off by s/m)")
