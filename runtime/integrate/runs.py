@@ -33,7 +33,7 @@ from sysdyn.values import dataclass
 
 LONG = 1000
 """Steps of the bdf after which method auto tries radau."""
-LONG_STEEP = 100_000
+LONG_STEEP = 1_000_000
 """The same of steep laws: where they turn Newton's method holds the steps of any method, and the bdf's are cheap."""
 HELD = 100
 """Steps that a dopri which stability holds may still have to take before method auto tries another."""

@@ -218,13 +218,17 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
             return found, ()
     size = balanced(system, y, jy)[system.pattern.columns_of()]
     undetermined: tuple[str, ...] = ()
-    for at, rates in ((jy, jyd), (jy * size, jyd * size), (_roused(system, state.t, jy * size), jyd * size)):
+    names: tuple[str, ...] = ()
+    looks = (jy, jyd), (jy * size, jyd * size), (_roused(system, state.t, jy * size), jyd * size)
+    for at, rates in looks:
         names = null_place(system, at, rates)[0]
         index = None if names else pencil_index(system.dense(rates), system.dense(at))
         if index is not None:
             return index, ()
         undetermined = undetermined or names
-    return None, undetermined
+    # regular, and entries lie too far apart for ranks
+    index = None if names else _growth_index(system, *looks[-1])
+    return index, () if index is not None else undetermined
 
 
 def _sliding_index(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:

@@ -54,7 +54,7 @@ def integrated(rate, start, time, values, jacobian=None):
     """States [instants, states] by SciPy's Radau at 1e-9; scale: of each state."""
     period = 1.0 / values["f"]
     scale = np.maximum(np.abs(values["scale"]), 1e-300)
-    with np.errstate(over="ignore"):  # it looks beyond a step that it rejects
+    with np.errstate(over="ignore", invalid="ignore"):  # it looks beyond a step that it rejects
         found = solve_ivp(
             rate, (0.0, time[-1]), start, method="Radau", t_eval=time, rtol=1e-9, atol=1e-11 * scale,
             max_step=period / 60, jac=jacobian, first_step=1e-7 * period,
