@@ -21,7 +21,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import ContractError
 from sysdyn.values import dataclass
 
-CONTRACT = 2
+CONTRACT = 3
 _VIEWS = 256
 """Addresses whose views a callback remembers: a few buffers recur for ever, others are passing."""
 

@@ -120,7 +120,7 @@ def binding(n, m=0.1, g=9.81, a=None, angle=0.3):
 class Chain:
     """The NumPy backend."""
 
-    CONTRACT = 2
+    CONTRACT = 3
 
     @staticmethod
     def _split(ix, at, y):
@@ -233,7 +233,7 @@ typedef struct { const double *p; const int32_t *ix, *at, *to; } frame;
 #define X(k) (y + F->at[k])
 #define A(k) (yd + F->at[k])
 #define D(x) (i ? (x)[i] - (x)[i - 1] : (x)[i])
-const int sd_contract = 2;
+const int sd_contract = 3;
 static double *pair(double *v, int i, double value) { *v++ = 2 * value; if (i) *v++ = -2 * value; return v; }
 void sd_dynamics_rows(ARGS) {
     for (int i = 0; i < N; i++) {

@@ -21,7 +21,7 @@ class _Builder:
         self.families = families  # (name, kind, owner)
         self.y = {name: sp.Symbol(name, real=True) for name, _, _ in families}
         self.yd = {name: sp.Symbol(name + "_dot", real=True) for name, _, _ in families}
-        self.rows, self.blocks, self.module = [], {}, types.SimpleNamespace(CONTRACT=2)
+        self.rows, self.blocks, self.module = [], {}, types.SimpleNamespace(CONTRACT=3)
 
     def add_rows(self, block, labels, owners, **extra):
         for k, (label, owner) in enumerate(zip(labels, owners, strict=True)):

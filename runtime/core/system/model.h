@@ -1,4 +1,4 @@
-/* The contract between a compiled model and the runtime, version 2.
+/* The contract between a compiled model and the runtime, version 3.
  *
  * A compiled model (C library or Python module) is a set of BLOCKS.  A block is a group of rows of the
  * descriptor form; the runtime chooses which blocks stand where and so assembles every index form from
@@ -6,7 +6,7 @@
  *
  * Shapes
  *   p   [parameters]        values in SI units: scalar parameters first, then arrays and tables' numbers
- *   ix  [integers]          loop bounds, first indices, strides, offsets of arrays in p
+ *   ix  [integers]          loop bounds, first indices, strides, offsets of arrays in p; tables of indices
  *   y   [unknowns]          the unknowns; family k begins at at[k]
  *   yd  [unknowns]          their time derivatives, same places
  *   r   [rows]              row family k begins at to[k]; a block ADDS to r
@@ -41,7 +41,7 @@
 
 #include <stdint.h>
 
-#define SD_CONTRACT 2
+#define SD_CONTRACT 3
 
 typedef struct sd_frame {
     const double *p;
@@ -56,9 +56,9 @@ typedef struct sd_frame {
 typedef void sd_rows(const sd_frame *frame, double t, const double *y, const double *yd, double *r);
 typedef void sd_entries(const sd_frame *frame, double t, const double *y, const double *yd, double *v);
 
-/* A C library exports `const int sd_contract = 2` and, for each block B of its manifest, functions
+/* A C library exports `const int sd_contract = 3` and, for each block B of its manifest, functions
  *   sd_B_rows, sd_B_dy, sd_B_dyd
- * (dy, dyd only where the manifest lists entries for them).  A Python module defines CONTRACT = 2 and
+ * (dy, dyd only where the manifest lists entries for them).  A Python module defines CONTRACT = 3 and
  *   B_rows(p, ix, at, to, t, y, yd, r), B_dy(p, ix, at, to, t, y, yd, v), B_dyd(...)   on NumPy arrays.
  *
  * The manifest's "structure":
@@ -79,7 +79,8 @@ typedef void sd_entries(const sd_frame *frame, double t, const double *y, const 
  *             fastest), entry by entry.  One place may occur several times: entries add up.  reads, rates: unknowns
  *             and derivatives that enter rows; curved: rows that are more than constants plus constants (parameters) times unknowns.
  *   REF       [family, [INDEX, ...]], INDEX = [loop or -1, offset slot of ix or -1, constant]:
- *             value = (loop variable or 0) + (ix[slot] or 0) + constant.
+ *             value = (loop variable or 0) + (ix[slot] or 0) + constant; INDEX = [loop, slot, constant, table]:
+ *             ix[ix[table] + that value], from a table of indices that stands in ix behind all slots.
  *             Position in the family: row-major over its shape.
  *
  * The binding (made by the compiler for one set of parameter values; plain arrays):
