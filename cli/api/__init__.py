@@ -79,7 +79,7 @@ class Module:
         self.unknowns = elements(formed)
         self.traced = tuple(output.name for output in self._numbers.outputs)
         self.t0, self.y0, self.yd0 = self._numbers.t0, self._numbers.y0, self._numbers.yd0
-        self.parameters: dict[str, Any] = dict(formed.prepared.binding.values)
+        self.parameters = _shown(formed.prepared.binding.values)
         pattern = self._numbers.state or self._numbers.system
         self.indptr, self.indices = pattern.column, pattern.row
         self._systems: dict[tuple[tuple[str, float], ...], System] = {(): formed.system}
@@ -262,7 +262,7 @@ class Model:
     def __init__(self, loaded: Loaded) -> None:
         self._loaded = loaded
         prepared = loaded.first.prepared
-        self.parameters: dict[str, Any] = dict(prepared.binding.values)
+        self.parameters = _shown(prepared.binding.values)
         self.traced = tuple(o.name for o in prepared.network.observations if o.stored)
         self.formulation = prepared.formulation
 
@@ -325,6 +325,11 @@ class Model:
             file = Path(output) if output is not None else Path(folder) / "sweep.h5"
             sweep(request, asked, file, jobs, _silent, timings=True, keep=keep, dask=dask, runner=runner)
             return Sweep.open(file)
+
+
+def _shown(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters of the text: none that the compiler made."""
+    return {name: value for name, value in values.items() if not name.startswith("#")}
 
 
 def _silent(fraction: float, ahead: float | None) -> None:

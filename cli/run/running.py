@@ -405,7 +405,8 @@ def parameters_of(prepared: Prepared) -> Iterator[Parameter]:
     evaluate, values = prepared.binding.evaluate, prepared.binding.values
     units = prepared.layouts.setdefault("units of parameters", {})
     if not units:
-        own = (p for p in prepared.network.parameters if p.name not in prepared.network.discretes)
+        shown = (p for p in prepared.network.parameters if not p.name.startswith("#"))  # none that the compiler made
+        own = (p for p in shown if p.name not in prepared.network.discretes)
         units |= {p.name: (p.shape, si_text(p.unit.dimension)) for p in own}
     for name, (shape, unit) in units.items():
         if not shape:

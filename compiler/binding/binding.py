@@ -256,7 +256,7 @@ def integers(
 def _integer(
     slot: Slot, owners: dict[str, Extents], parameters: Parameters, where: dict[str, int], network: Network
 ) -> int:
-    """The value of a slot (see `integers`)."""
+    """The value of a slot (compiler/model/integers.py), of tables of indices excepted."""
     kind, name = slot[0], slot[1]
     if kind == "value":
         return whole_number(parameters, name)

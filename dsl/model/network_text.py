@@ -42,7 +42,7 @@ def _lines(n: Network) -> Iterator[str]:
         yield f"  work {w.effort} on {w.on}{_loops(w.loops)}"
     for k in n.constraints:
         at = f"[{', '.join(map(str, k.at))}]" if k.at else ""
-        yield f"  {k.kind} {k.name}{at}: {k.expression} = 0{_loops(k.loops)}"
+        yield f"  {k.kind} {k.name}{at}: {k.expression} {'added' if k.adds else '= 0'}{_loops(k.loops)}"
     for d in n.dynamics:
         yield f"  dynamic {d.state}' = {d.expression}{_loops(d.loops)}"
     for i in n.initials:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -103,13 +102,25 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
 
 def _between(tree: list[tuple[_End, _End, str]], start: _End, goal: _End) -> list[str]:
     """Names of the sources of a tree on the way between two of its ends, in the order of the text."""
-    left = list(tree)
-    while True:  # what hangs on one end alone, and is no end of the way, leads nowhere
-        touched = Counter((start, goal, *(end for source in left for end in source[:2])))
-        kept = [source for source in left if touched[source[0]] > 1 and touched[source[1]] > 1]
-        if len(kept) == len(left):
-            return [name for _, _, name in kept]
-        left = kept
+    touching: dict[_End, list[int]] = {}
+    for k, (plus, minus, _) in enumerate(tree):
+        touching.setdefault(plus, []).append(k)
+        touching.setdefault(minus, []).append(k)
+    came: dict[_End, tuple[_End, int] | None] = {start: None}
+    left = [start]
+    while goal not in came:
+        here = left.pop()
+        for k in touching[here]:
+            plus, minus, _ = tree[k]
+            other = minus if plus == here else plus
+            if other not in came:
+                came[other] = here, k
+                left.append(other)
+    way = []
+    while (step := came[goal]) is not None:
+        goal = step[0]
+        way.append(step[1])
+    return [tree[k][2] for k in sorted(way)]
 
 
 def _cutsets(model: Elaborator, report: Report) -> None:

@@ -1,8 +1,7 @@
 """E313: the law of a dissipator with power e f below zero somewhere: an active element.
 
-Judged with the values bound: by the sign of its slope where it goes through the origin, else at both signs over the
-decades; a linear law is judged by its slope (E325), one that reads
-other unknowns not at all.
+Judged with the values bound: by the sign of its slope where it goes through the origin and has no pole or jump, else at
+both signs over the decades; a linear law is judged by its slope (E325), one that reads other unknowns not at all.
 """
 
 from __future__ import annotations
@@ -19,6 +18,8 @@ from sysdyn.dsl.text.diagnostics import Report
 
 DECADES = tuple(s * m * 10.0**k for k in range(-9, 4) for m in (1.0, 3.0) for s in (1.0, -1.0))
 """Where laws are looked at, in SI units: a polynomial beyond any sensible range is the author's."""
+UNBROKEN = ("exp", "sinh", "cosh", "tanh", "asinh", "atan", "abs", "sin", "cos")
+"""Functions without poles and jumps."""
 ROUND_OFF = 1e-9
 """Of the largest value so far: what a difference of exponentials loses next to zero."""
 
@@ -46,7 +47,8 @@ def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
         return
     bound: dict[Node, float] = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
     held = {n: known.number(n, bound) for n in nodes if n.op == "param"} | bound
-    if through and reals(slope, {n: Reals(v, v, v != 0.0) for n, v in held.items()} | {own[0]: ALL}).low >= 0.0:
+    where = {n: Reals(v, v, v != 0.0) for n, v in held.items()} | {own[0]: ALL}
+    if through and _unbroken(law, where) and reals(slope, where).low >= 0.0:
         return  # it rises from the origin
     found = _active(law, own[0], held)
     if found is not None:
@@ -56,6 +58,19 @@ def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
         name = branch.name.partition("#")[0]
         message = f"dissipator '{name}': e*f = {x * value:.3g} W < 0 at {letter} = {x:g} {unit.text}"
         report.error("E313", f"{message} (active element)", branch.place, help="an effort or flow source with that law")
+
+
+def _unbroken(law: Node, where: Mapping[Node, Reals]) -> bool:
+    """Without a pole or a jump, as far as can be told."""
+    for node in ex.topological([law]):
+        if node.op == "call" and node.data not in UNBROKEN:
+            return False
+        if node.op not in ("const", "param", "index", "var", "sum", "mul", "call"):
+            return False
+        below = (a for e, a in zip(node.data, node.args, strict=True) if e < 0) if node.op == "mul" else ()
+        if any(reals(a, where).sign == 0 for a in below):
+            return False
+    return True
 
 
 def _active(law: Node, own: Node, held: Mapping[Node, float]) -> tuple[float, float] | None:

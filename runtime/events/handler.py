@@ -24,7 +24,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.rank import least_squares
+from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.values import dataclass
 
@@ -457,7 +457,10 @@ class Handler:
 
     def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
         assert self.restart is not None
-        return self.restart.instant.flows(t, y, yd, self.restart.magnitude(y.size), aims)
+        try:
+            return self.restart.instant.flows(t, y, yd, self.restart.magnitude(y.size), aims)
+        except NotFiniteError as error:
+            raise SolverFailure("nonfinite", t, 0.0) from error
 
     def _guards(self, t: float, y: Floats, yd: Floats) -> None:
         values = self.observer(t, y, yd)

@@ -148,6 +148,7 @@ class Linear(c.Structure):
         ("rank", _I),
         ("null", _P),
         ("null_room", c.c_size_t),
+        ("nulls", _I),
         ("pivoted", _I),
         ("replayed", _I),
         ("elimination", _P),

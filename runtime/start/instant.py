@@ -146,7 +146,8 @@ class Instant:
         """Y with flows, momenta and implicit efforts behind the impulses at t, as they are where nothing asks for
         others; the impulses [unknowns].
 
-        aims [rows]: what the constraints on flows shall be; push [rows]: what acts on balances besides; None: zero.
+        aims [rows]: what the constraints on flows shall be (NotFiniteError where that comes to no numbers); push
+        [rows]: what acts on balances besides; None: zero.
         """
         push, open_ = np.zeros(self.system.rows) if push is None else push, self._leaves_open(t, y, yd, magnitude)
         if aims is None and not (push.any() or open_ or self.broken(t, y, yd, magnitude)):
@@ -166,7 +167,8 @@ class Instant:
 
         aim = np.stack([np.zeros(self.system.rows) if aims is None else aims, -push], axis=1)
         meant = _Rows(behind, moves, integrals, ease, BALANCED if rated.size else ITERATIONS)
-        return self._jump((t, y, yd), magnitude, meant, self._sloping(t, y, yd, magnitude), aim)
+        begun = self._sloping(t, y, yd, magnitude)
+        return self._jump((t, y, yd), magnitude, meant, begun, aim, asked=aims is not None)
 
     def _leaves_open(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
         """Whether inertia leaves flows open that it has: nodes that stores only tie together."""
@@ -191,11 +193,14 @@ class Instant:
         meant: _Rows,
         begun: Floats | None = None,
         aims: Floats | float = 0.0,
+        *,
+        asked: bool = False,
     ) -> tuple[Floats, Floats]:
         """The least change of y that meets the rows, from where it has begun, without its round-off; impulses of forces
         [unknowns].  Where that comes to no numbers y is as it was, and there are none.
 
-        before: t, y, yd; aims [rows, 2]: what the rows behind the instant shall be, and the integrals.
+        before: t, y, yd; aims [rows, 2]: what the rows behind the instant shall be, and the integrals.  asked: numbers
+        there must be, else NotFiniteError.
         """
         t, start, yd = before
         y, integral = (start if begun is None else begun), np.zeros(start.size)
@@ -211,6 +216,8 @@ class Instant:
             try:
                 step = _least(i, j, np.append(jy[here], v), aim, magnitude * meant.ease)
             except NotFiniteError:
+                if asked:
+                    raise
                 return start, np.zeros(start.size)
             y, integral = y + step[::2], integral + step[1::2]
         return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._force, integral, 0.0)

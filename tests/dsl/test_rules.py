@@ -184,6 +184,20 @@ def test_a_dissipator_that_gives_power_somewhere(parts):
     assert said(passivity, with_law(parts, "R", ex.neg(f)), Values({}, ())) == []  # linear: judged by its slope
 
 
+def test_a_law_that_rises_beside_a_pole_or_a_jump_gives_power_behind_it(parts):
+    """Slopes of at least zero wherever there is one, and yet e f < 0."""
+    f, one = of("R", "bf"), ex.const(1.0)
+    for law in (
+        ex.call("tan", f),
+        ex.sub(ex.div(one, ex.sub(one, f)), one),
+        ex.sub(ex.mul(f, f, f), ex.call("sign", f)),
+    ):
+        (found,) = said(passivity, with_law(parts, "R", law), Values({}, ()))
+        assert found[0] == "E313"
+    for law in (ex.call("tanh", f), ex.sub(ex.call("exp", f), one), ex.div(f, ex.add(one, ex.mul(f, f)))):
+        assert said(passivity, with_law(parts, "R", law), Values({}, ())) == []
+
+
 def test_loops_of_capacitors_and_sources_and_cuts_of_inductors(parts):
     """C between a and b closes a loop with V from a to the ground and W from b; L alone at the cut of a is no note."""
     by = {b.name: b for b in parts.branches}

@@ -84,6 +84,8 @@ def test_what_is_said_is_said_of_the_lines_of_the_text(name):
     assert written.written is None
     assert sorted(said(n)[:2] for n in families.notes) == sorted(said(n)[:2] for n in written.notes)
     short = {said(n)[:2] for n in families.notes if "a displacement of it" in n.message}  # joined by tables
+    assert all(code == "N501" for code, _ in short)
+    assert not short or name not in ("ladder", "chain", "mesh", "stages")
     one, other = (sorted(s for s in map(said, c.notes) if s[:2] not in short) for c in (families, written))
     assert one == other
     one, other = (c.manifest(c.bind()) for c in (families, written))

@@ -129,6 +129,22 @@ def test_of_columns_without_a_pivot_the_shortest_solution_is_taken(beside):
     assert linear.rank == 3 + beside
 
 
+@pytest.mark.parametrize("beside", [0, 70])
+def test_directions_that_share_unknowns_are_all_taken_out(beside):
+    # one row that four unknowns share: of all solutions of a + b + c + d = 4 the shortest, beside others
+    matrix = np.eye(4 + beside)
+    matrix[:4, :4] = [[1.0, 1.0, 1.0, 1.0], [2.0, 2.0, 2.0, 2.0], [-1.0, -1.0, -1.0, -1.0], [3.0, 3.0, 3.0, 3.0]]
+    matrix = csc_array(matrix)
+    solver = Solver(matrix)
+    idle = np.append([1, 1, 1, 1], np.zeros(beside)).astype(np.int32)
+    linear = solver.linear.contents
+    linear.null_pivot, linear.idle = 1e-10, lib.pointer(idle)
+    assert solver.factor(matrix.data) == 0
+    assert linear.rank == 1 + beside
+    x = solver.solve([4.0, 8.0, -4.0, 12.0, *np.ones(beside)])
+    assert x == pytest.approx(np.ones(4 + beside), abs=1e-12)
+
+
 @pytest.mark.parametrize("n", [20, 60, 150])
 def test_least_degree_fills_little_more_than_the_library(n):
     rng = np.random.default_rng(n)

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define REFINE 1e-8 /* pivots smaller than this part of their column: one step of iterative refinement */
+#define NULL_ROOM 20000000 /* numbers: where there would be more, what was left is zero */
 
 void sd_linear_free(sd_linear *linear)
 {
@@ -227,11 +228,42 @@ static void scaled_solve(sd_linear *linear, sd_number *x)
         sd_sparse_solve(linear->sparse, x, linear->work, NULL, NULL);
 }
 
-/* null: for each column that was left the solution in which it is one, of length one */
+/* v := v without its part along u, which has length one */
+static void without(int32_t n, const sd_number *u, sd_number *v)
+{
+    sd_number along = 0.0;
+    for (int32_t i = 0; i < n; i++)
+        along += sd_conjugate(u[i]) * v[i];
+    for (int32_t i = 0; i < n; i++)
+        v[i] -= along * u[i];
+}
+
+/* v := v / |v|, or zero where that is no number */
+static void to_length_one(int32_t n, sd_number *v)
+{
+    double most = 0.0, square = 0.0;
+    for (int32_t i = 0; i < n; i++)
+        most = sd_size(v[i]) <= most ? most : sd_size(v[i]);
+    if (!(most > 0.0) || !isfinite(most)) {
+        memset(v, 0, (size_t)n * sizeof *v);
+        return;
+    }
+    for (int32_t i = 0; i < n; i++) {
+        v[i] /= most;
+        square += sd_square(v[i]);
+    }
+    for (int32_t i = 0; i < n; i++)
+        v[i] /= sqrt(square);
+}
+
+/* null: orthonormal, by the solutions in which one column that was left is one and the others are zero */
 static int null_vectors(sd_linear *linear)
 {
     int32_t n = linear->n, found = 0;
     size_t room = (size_t)(n - linear->rank) * (size_t)n;
+    linear->nulls = 0;
+    if (room > NULL_ROOM)
+        return 0;
     if (room > linear->null_room) {
         sd_number *null = realloc(linear->null, room * sizeof *null);
         if (!null)
@@ -243,34 +275,27 @@ static int null_vectors(sd_linear *linear)
         if (linear->sparse && linear->sparse->source[k] >= 0)
             continue;
         int32_t c = linear->dense ? linear->place[k] : linear->sparse->order[k];
-        sd_number *v = linear->null + (size_t)found++ * (size_t)n;
+        sd_number *v = linear->null + (size_t)found * (size_t)n;
         memset(v, 0, (size_t)n * sizeof *v);
         for (int32_t e = linear->column[c]; e < linear->column[c + 1]; e++)
             v[linear->row[e]] -= linear->scaled[e];
         scaled_solve(linear, v);
         v[c] = 1.0;
-        double square = 0.0;
-        for (int32_t i = 0; i < n; i++)
-            square += sd_square(v[i]);
-        for (int32_t i = 0; i < n; i++)
-            v[i] /= sqrt(square);
+        to_length_one(n, v);
+        for (int32_t j = 0; j < found; j++)
+            without(n, linear->null + (size_t)j * (size_t)n, v);
+        to_length_one(n, v);
+        found++;
     }
+    linear->nulls = found;
     return 0;
 }
 
-/* takes from x what lies in the directions that the matrix maps to zero; no pass makes x longer, one will do where these
- * share no unknowns */
+/* takes from x what lies in the directions that the matrix maps to zero */
 static void shorten(const sd_linear *linear, sd_number *x)
 {
-    int32_t n = linear->n;
-    for (int32_t k = 0; k < n - linear->rank; k++) {
-        const sd_number *v = linear->null + (size_t)k * (size_t)n;
-        sd_number along = 0.0;
-        for (int32_t i = 0; i < n; i++)
-            along += sd_conjugate(v[i]) * x[i];
-        for (int32_t i = 0; i < n; i++)
-            x[i] -= along * v[i];
-    }
+    for (int32_t k = 0; k < linear->nulls; k++)
+        without(linear->n, linear->null + (size_t)k * (size_t)linear->n, x);
 }
 
 /* all that was learnt of matrices before */

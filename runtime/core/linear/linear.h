@@ -27,7 +27,6 @@ typedef struct sd_order {
     int32_t paired;
 } sd_order;
 
-#define SD_LEAST_PIVOT 1e-290 /* part of its column below which a pivot is none, where every one but zero counts */
 
 typedef struct sd_linear {
     int32_t n, entries;
@@ -47,8 +46,9 @@ typedef struct sd_linear {
     const int32_t *idle;         /* [n] 1: the column may be left; of the caller */
     int32_t *place;              /* [n] column that is eliminated k-th */
     int32_t rank;                /* of the last factors: n where no column was left */
-    sd_number *null;             /* [n - rank][n] what the matrix maps to zero, of the last factors */
+    sd_number *null;             /* [nulls][n] orthonormal, what the last factors map to zero */
     size_t null_room;
+    int32_t nulls;               /* n - rank, or 0 where those would be too many */
     int32_t pivoted;             /* 0: pivots are chosen anew */
     int32_t replayed;            /* the last factors are those of `elimination` */
     sd_elimination *elimination; /* NULL: every matrix is pivoted */

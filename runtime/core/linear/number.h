@@ -7,6 +7,8 @@
 
 #include <math.h>
 
+#define SD_LEAST_PIVOT 1e-290 /* part of its column below which a pivot is none, where every one but zero counts */
+
 #ifdef SD_COMPLEX
 #include <complex.h>
 

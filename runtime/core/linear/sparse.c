@@ -109,7 +109,8 @@ static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *large
     for (int32_t i = top; i < lu->rows; i++)
         if (lu->place[lu->stack[i]] < 0 && sd_size(lu->x[lu->stack[i]]) > *largest)
             *largest = sd_size(lu->x[lu->stack[i]]);
-    double threshold = lu->null_pivot > 0.0 ? 1.0 : THRESHOLD; /* what is left below it must be what the matrix lacks */
+    /* what is left below a part of its column must be what the matrix lacks */
+    double threshold = lu->idle && lu->null_pivot > SD_LEAST_PIVOT ? 1.0 : THRESHOLD;
     int32_t own = lu->own ? lu->own[c] : c;
     if (lu->paired && lu->place[own] < 0 && *largest > 0.0 && sd_size(lu->x[own]) >= threshold * *largest)
         return own;

@@ -74,8 +74,8 @@ void sd_slopes(const sd_system *system, double t, const double *y, const double 
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
                        const double *g, const double *scale, int all, double *s);
 /* The first steep row whose residual r at (t, y) is more than `limit` of the magnitudes of its terms and what is open of the
- * unknowns [n], and of their changes in a step h, makes of it, the entries jy and jyd being those of the point; -1 where
- * there is none.  rate, s, all: as above. */
+ * unknowns [n], and of their changes in a step h, makes of it, the entries jy and jyd being those of the point, or of one
+ * nearby; -1 where there is none.  rate, s, all: as above. */
 int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
                         const double *jy, const double *jyd, double h, const double *open, int all, double *s);
 /* position of the first number that is not finite, -1 where all are */
