@@ -56,7 +56,7 @@ class Parameters:
     def _check(self, overrides: Mapping[Override, Any]) -> None:
         for name in overrides:
             plain = name if isinstance(name, str) else name[0]
-            if plain not in self._known or plain.startswith("#"):
+            if plain not in self._known:
                 raise ModelError([Diagnostic("E405", f"there is no parameter '{plain}'", None)])
 
     def _ordered(self, overrides: Mapping[Override, Any]) -> list[Parameter]:

@@ -27,7 +27,6 @@ typedef struct sd_order {
     int32_t paired;
 } sd_order;
 
-
 typedef struct sd_linear {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */

@@ -251,12 +251,12 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
     double tolerance = newton_tolerance(radau);
     for (int s = 0; s < radau->method->stages; s++)
         memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
-    int cause = SD_FINE;
     for (int m = 1; m <= WALK; m++) {
         double part = 0.0;
         *used = m;
         keep(radau);
         for (size_t k = 0; k < sizeof null_pivots / sizeof *null_pivots && part == 0.0; k++) {
+            int cause;
             if (k > 0)
                 take_back(radau);
             part = walk(radau, null_pivots[k], tolerance, m > 1 && k == 0, &cause);
@@ -266,7 +266,7 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
                 return cause;
         }
         if (part == 0.0 || (m >= DAMPED && part < 1.0))
-            return *radau->system->stop ? SD_STOPPED : cause ? cause : SD_NEWTON;
+            return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
     }
     return SD_NEWTON;
 }

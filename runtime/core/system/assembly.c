@@ -127,7 +127,7 @@ int32_t sd_first_astray(sd_system *system, double t, const double *y, const doub
             if (s[system->row[e]] <= 0.0)
                 s[system->row[e]] -= fabs(jy[e] * y[j]);
     for (int32_t i = 0; i < system->rows; i++)
-        s[i] = all || !(s[i] <= 0.0) ? fabs(r[i]) - limit * fabs(s[i]) : 0.0;
+        s[i] = all || s[i] > 0.0 ? fabs(r[i]) - limit * fabs(s[i]) : 0.0;
     for (int32_t j = 0; j < system->unknowns; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
             s[system->row[e]] -= (fabs(jy[e]) + fabs(jyd[e]) / h) * open[j];
