@@ -99,15 +99,16 @@ def said(note):
     return note.code, note.place.start, sorted(re.findall(r"[\w.]+", note.message))
 
 
+def compiled(text):
+    """A text through the compiler, gathered, with nothing left of what was compiled before."""
+    with fresh():
+        return compile_network(network(text), gather=True)
+
+
 def test_one_text_of_c_for_any_number_of_lines(effort):
     """Families and equations do not grow with a chain; what a line costs does not either (counted, not timed)."""
-
-    def made(n):
-        with fresh():
-            return compile_network(network(ladder(n)), gather=True)
-
-    short, few = effort(lambda: made(100))
-    long, many = effort(lambda: made(200))
+    short, few = effort(lambda: compiled(ladder(100)))
+    long, many = effort(lambda: compiled(ladder(200)))
     assert len(long.form.families) == len(short.form.families)
     assert len(long.program.routines) == len(short.program.routines)
     one, other = (re.sub(r"[\d.e]+", "0", made.text) for made in (short, long))
@@ -129,13 +130,8 @@ def test_a_grid_without_order_keeps_its_names(tmp_path):
 @pytest.mark.parametrize("of", [power_grid, mixed, lambda n: mesh(n // 8, 8)], ids=["power_grid", "mixed", "mesh"])
 def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
     """Tables of indices tell what is joined to what: as many statements for any number of lines, each at equal cost."""
-
-    def made(n):
-        with fresh():
-            return compile_network(network(of(n)), gather=True)
-
-    short, few = effort(lambda: made(160))
-    long, many = effort(lambda: made(320))
+    short, few = effort(lambda: compiled(of(160)))
+    long, many = effort(lambda: compiled(of(320)))
     assert len(long.family.branches) == len(short.family.branches)
     assert len(long.form.families) == len(short.form.families)
     assert len(long.text) < 1.05 * len(short.text)

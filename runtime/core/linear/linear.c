@@ -185,6 +185,13 @@ static int replay(sd_linear *linear, const sd_number *values, const double *scal
     return 1;
 }
 
+/* which columns the sparse factors may leave */
+static void allow(sd_linear *linear)
+{
+    linear->sparse->idle = linear->idle;
+    linear->sparse->null_pivot = linear->idle ? linear->null_pivot : 0.0;
+}
+
 /* rows that would not pivot where they belong have filled too much: any row may from now on */
 static int without_pairs(sd_linear *linear)
 {
@@ -194,16 +201,14 @@ static int without_pairs(sd_linear *linear)
     sd_sparse_free(linear->sparse);
     linear->sparse = lu;
     linear->otherwise = NULL;
-    lu->idle = linear->idle;
-    lu->null_pivot = linear->idle ? linear->null_pivot : 0.0;
+    allow(linear);
     return sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
 }
 
 static int sparse_factor(sd_linear *linear)
 {
     int failed = 1;
-    linear->sparse->idle = linear->idle;
-    linear->sparse->null_pivot = linear->idle ? linear->null_pivot : 0.0;
+    allow(linear);
     if (linear->sparse->pivoted && linear->sparse->rank == linear->n) /* a column that was left may have a pivot now */
         failed = sd_sparse_refactor(linear->sparse, linear->column, linear->row, linear->scaled);
     if (failed) {
