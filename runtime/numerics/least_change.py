@@ -171,14 +171,41 @@ class _Linear:
         rows, columns, values = self._taken()
         values *= self.unit[columns]
         values *= self.row_scale[rows]
+        return *self._numbered(rows, columns), values
+
+    def _numbered(self, rows: Any, columns: Any) -> tuple[Any, Any]:
+        """Rows and columns by their numbers among those in use."""
         numbers = (np.cumsum(mask, dtype=np.int32) - 1 for mask in (self.problem.use, self.problem.free))
-        return next(numbers)[rows], next(numbers)[columns], values
+        return next(numbers)[rows], next(numbers)[columns]
+
+    def determined(self, u: Floats, r: Floats, held: Mask, *, beside: bool) -> Floats | None:
+        """The same with those held where they are guessed (beside: where they are), where the rows as they are then
+        determine the others (core/linear/graded.h); None where they do not.
+        """
+        rows, columns, values = self._taken()
+        rows, columns = self._numbered(rows, columns)
+        step = np.where(held & ~beside, -u, 0.0) * self.unit[self.problem.free]
+        aim = -r / self.row_scale[self.problem.use]
+        np.add.at(aim, rows, -values * step[columns])
+        a, moved, stands = np.zeros(self.shape), np.zeros(u.size), held.copy()
+        np.add.at(a, (rows, columns), np.where(held[columns], 0.0, values))
+        stands[columns] = True
+        failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(aim), lib.pointer(moved))
+        if failed < 0:
+            raise MemoryError
+        if failed:
+            return None
+        return np.where(stands | beside, u + (step + moved) / self.unit[self.problem.free], 0.0)
 
     def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
         """The least u with A u = A u_now - r; beside it, the least step: its round-off is its own."""
-        i, j, v = self.entries
         levels = [level[self.problem.free] for level in self.problem.levels]
         ordered = any(level.any() for level in levels) and max(self.shape) <= DENSE
+        if max(self.shape) <= SINGULAR_VALUES:
+            only = self.determined(u, r, np.any(levels, axis=0) if ordered else np.zeros_like(u, bool), beside=beside)
+            if only is not None:
+                return only
+        i, j, v = self.entries
         # what costs nothing stays where it is as far as it may
         stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else np.zeros_like(u)
         aim = -r
@@ -412,6 +439,20 @@ def stepped(problem: Problem, x: Floats) -> Floats:
     r = (problem.residual(x) * linear.row_scale)[problem.use]
     found = x.copy()
     found[free] = problem.guess[free] + linear.nearest(u, r, beside=False) * linear.unit[free]
+    return found
+
+
+def corrected(problem: Problem, x: Floats) -> Floats | None:
+    """The point one step from x where the rows determine it; None where they do not, or the problem is no small one."""
+    linear, free = _Linear(problem, x), problem.free
+    if max(linear.shape) > SINGULAR_VALUES:
+        return None
+    still = np.zeros(linear.shape[1])
+    step = linear.determined(still, (problem.residual(x) * linear.row_scale)[problem.use], still > 0.0, beside=True)
+    found = x.copy()
+    if step is None or not np.isfinite(step).all():
+        return None
+    found[free] += step * linear.unit[free]
     return found
 
 

@@ -20,9 +20,11 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
     FOLDS,
+    SINGULAR_VALUES,
     OutOfTimeError,
     Solution,
     Work,
+    corrected,
     least_residual,
     solve,
     stepped,
@@ -45,6 +47,8 @@ WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
 LEAST_PART = 1e-6
 """Of misses: less is not faded out at once."""
+SHARPER = 60
+"""Corrections in which what follows from the state is found, or left as it was."""
 FOLLOWED, NEARLY = 12, 1e-4
 """Iterations in which Newton's method follows what fades, and the scaled residual at which it has."""
 EXPLAINED = 0.1
@@ -106,14 +110,14 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
 
 
 def _rescaled(
-    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True
+    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True, sized: Floats | None = None
 ) -> tuple[Solution, bool]:
-    """Everything at once, and whether it holds.
+    """Everything at once from x, and whether it holds; magnitudes are those of `sized` at first (None: x).
 
     Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
     in the magnitudes of the solution too.
     """
-    at, best = x, Solution(x, np.inf, np.zeros(0))
+    at, best = x if sized is None else sized, Solution(x, np.inf, np.zeros(0))
     for k in range(_RESCALINGS):
         if k and starter.work.done:
             break
@@ -167,6 +171,22 @@ def _anew(
     return best, False
 
 
+def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
+    """The solution with what follows from its state by corrections that vanish, where rows determine them: what only
+    leakage ties moves by volts under rows that hold to round-off of the largest current.
+    """
+    x, follows = best.x, free & starter.following(t, best.x)
+    for k in range(SHARPER if x.size <= SINGULAR_VALUES else 0):
+        problem = problem_of(starter, t, x, x, rows=starter.every, free=follows)
+        near = corrected(problem, x)
+        if near is None or starter.work.done:
+            break
+        if (np.abs(near - x) <= EXACT * np.maximum(problem.scale, np.abs(x))).all():
+            return solve(problem, x, 1) if k else best
+        x = near
+    return best
+
+
 Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool]]
 """From t, a point x to begin at, the guess and the free unknowns: the best solution, and whether all rows hold."""
 
@@ -193,22 +213,73 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     return (best, also) if also >= holds else (found, holds)
 
 
-def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """Down steep laws on the rows as written and such derivatives as are linear, with a share of work of its own; then
-    everything at once.  Far from a solution the derivative of an exponential hides what itself is after.
+def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
+    """Rows as written and such derivatives as are linear: far from a solution the derivative of an exponential hides
+    what itself is after.
     """
+    return starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
+
+
+def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """From a point at which rows as written hold: rates, which follow from the rest by linear rows; where that is not
+    all, everything at once.
+    """
+    sized = starter.without_noise(x, starter.scale(t, x))  # what round-off left is no magnitude
+    x[starter.n :] = sized[starter.n :] = guess[starter.n :]
+    if (x == guess)[free & ~starter.following(t, x)].all():
+        rates = free & (np.arange(x.size) >= starter.n)
+        found, holds = _rescaled(starter, t, x, x, rates, least=False, sized=sized)
+        if holds:
+            return found, holds
+        x = found.x
+    return _rescaled(starter, t, x, guess, free, sized=sized)
+
+
+def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Down steep laws on the rows as written, with a share of work of its own; then everything."""
     own, starter.work = starter.work, Work(WALKED, starter.work.until)
-    rows = starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
+    rows = _as_written(starter, t, x)
     for _ in range(_RESCALINGS):
         found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
         if not np.isfinite(found.residual) or (found.x == x).all():
             break
         x = found.x
-    # what round-off left is no magnitude; rates follow from the rest by linear rows
-    x = starter.without_noise(x, starter.scale(t, x))
-    x[starter.n :] = guess[starter.n :]
     starter.work = own
-    return _rescaled(starter, t, x, guess, free)
+    return _completed(starter, t, x, guess, free)
+
+
+def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Floats]:
+    """Rows that hold where those of the start are missed by so much."""
+    return lambda x: starter.residual(t, x) - miss
+
+
+def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """Along what fades of the misses of rows as written, as fast as Newton's method follows, the state held if that
+    will do; then everything (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of
+    its own.
+    """
+    own, best, holds = starter.work, Solution(x, np.inf, np.zeros(0)), False
+    follows = free & starter.following(t, x)
+    for may in (follows, free) if (follows != free).any() else (free,):
+        starter.work = Work(until=own.until)
+        found, holds = _completed(starter, t, _at_the_end(starter, t, x, may), guess, may)
+        best = found if holds or found.residual < best.residual else best
+        if holds:
+            break
+    starter.work = own
+    return best, holds
+
+
+def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
+    """Where the homotopy leads; as far as it got where work is over."""
+    every, miss, done, part = _as_written(starter, t, x), starter.residual(t, x), 0.0, 0.5
+    while done < 1.0 and part > LEAST_PART and not starter.work.done:
+        rows = problem_of(starter, t, x, x, rows=every, free=free)
+        left = _faded(starter, t, max(1.0 - done - part, 0.0) * miss)
+        found = solve(replace(rows, residual=left, core=None), x, FOLLOWED)
+        follows = found.residual < NEARLY
+        x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
+    return solve(problem_of(starter, t, x, x, rows=every, free=free), x).x
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -236,29 +307,11 @@ def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, fre
 STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("newton", _newton),
     ("rows_as_written", _walked),
+    ("homotopy", _led),
     ("perturbed_guess", _perturbed),
     ("largest_scales", _in_largest_scales),
 )
 """Globalisation: what is tried, in this order, until all rows hold."""
-
-
-def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Floats]:
-    """Rows that hold where those of the start are missed by so much."""
-    return lambda x: starter.residual(t, x) - miss
-
-
-def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """Along what fades of the rows' misses at x, as fast as Newton's method follows; then everything at once (Newton's
-    homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.
-    """
-    miss, done, part = starter.residual(t, x), 0.0, 0.5
-    while done < 1.0 and part > LEAST_PART and not starter.work.done:
-        rows = problem_of(starter, t, x, x, rows=starter.every, free=free)
-        left = _faded(starter, t, max(1.0 - done - part, 0.0) * miss)
-        found = solve(replace(rows, residual=left, core=None), x, FOLLOWED)
-        follows = found.residual < NEARLY
-        x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
-    return _rescaled(starter, t, x, guess, free)
 
 
 def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
@@ -277,10 +330,11 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     x = _begun(starter, t, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
+        starter.work.clocked()
         found, holds = strategy(starter, t, x, guess, free)
         again, sure = _anew(starter, t, found, x, guess, free)
         if holds or sure:
-            return again, name
+            return _sharp(starter, t, again, free), name
         best = found if found.residual < best.residual else best
     return best, ""
 

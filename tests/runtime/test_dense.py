@@ -32,6 +32,63 @@ def test_rank_and_nearest_solution(shape, spread):
         assert np.abs(matrix.T @ (matrix @ x - aim)).max() < 1e-13 * np.abs(x).max() + 1e-14
 
 
+def graded(a, b):
+    """x, or None where the core says that a x = b does not determine it."""
+    a, b, x = np.array(a, dtype=float), np.array(b, dtype=float), np.zeros(np.shape(a)[1])
+    failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(b), lib.pointer(x))
+    assert failed in (0, 1)
+    return None if failed else x
+
+
+@pytest.mark.parametrize("leak", [1e-3, 1e-12, 1e-25, 1e-170, 1e-300])
+def test_a_node_that_leakage_alone_holds(leak):
+    """Nodes 1, 2 by 3 S with each other, by a leak and thrice a leak with ground; currents as rows of their own.  One
+    leak's current into node 1: 1/4 V at both, 1e-17 V apart.
+    """
+    # unknowns: v1, v2, i12, i1, i2
+    rows = [
+        [0, 0, 1, 1, 0],
+        [0, 0, -1, 0, 1],
+        [-3, 3, 1, 0, 0],
+        [-leak, 0, 0, 1, 0],
+        [0, -3 * leak, 0, 0, 1],
+    ]
+    x = graded(rows, [leak, 0, 0, 0, 0])
+    assert x[:2] == pytest.approx([0.25, 0.25], rel=max(1e-14, leak))
+    assert x[2:] == pytest.approx([0.75 * leak, 0.25 * leak, 0.75 * leak], rel=max(1e-14, leak))
+
+
+def test_graded_elimination_beside_fractions():
+    """Random matrices, lines scaled by up to 1e60: relative errors of every unknown by its condition."""
+    from fractions import Fraction
+
+    random = np.random.default_rng(8)
+    for n in (1, 2, 5, 9):
+        core = random.integers(-4, 5, (n, n)) + 9 * np.eye(n)
+        rows, columns = (10.0 ** random.uniform(-60, 60, n) for _ in range(2))
+        a = rows[:, None] * core * columns
+        b = rows * random.standard_normal(n)
+        exact = [[Fraction(v) for v in [*line, right]] for line, right in zip(a.tolist(), b.tolist(), strict=True)]
+        for k in range(n):
+            for i in range(n):
+                if i != k:
+                    factor = exact[i][k] / exact[k][k]
+                    exact[i] = [u - factor * v for u, v in zip(exact[i], exact[k], strict=True)]
+        wanted = np.array([float(exact[k][n] / exact[k][k]) for k in range(n)])
+        found = graded(a, b)
+        assert np.abs(found - wanted).max(initial=0.0, where=wanted == 0.0) == 0.0
+        assert np.abs(found / wanted - 1.0).max() < 1e-12
+
+
+def test_what_graded_rows_leave_open():
+    assert graded([[1.0, 1.0], [0.1 + 0.2, 0.3]], [1.0, 0.3]) is None  # round-off of a dependent row
+    assert graded([[1.0, -1.0], [-1.0, 1.0]], [0.0, 0.0]) is None
+    assert graded([[1.0, 1.0]], [1.0]) is None
+    assert graded([[2.0, 0.0], [0.0, 0.0]], [1.0, 0.0]).tolist() == [0.5, 0.0]  # an unknown that stands nowhere
+    assert graded([[1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], [1.0, 4.0, 3.0]).tolist() == [1.0, 2.0]
+    assert graded([[1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], [1.0, 4.0, 3.1]) is None  # rows in excess that do not agree
+
+
 def test_what_is_no_number_is_said():
     with pytest.raises(rank.NotFiniteError):
         rank.rank(np.array([[1.0, np.nan], [0.0, 1.0]]))

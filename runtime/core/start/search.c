@@ -1,6 +1,7 @@
 #include "start/search.h"
 
 #include "linear/dense.h"
+#include "linear/graded.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -60,7 +61,8 @@ typedef struct {
     int32_t *row_at, *column_at;                  /* [all rows], [all unknowns] number among these, or -1 */
     double *values, *unit, *row_scale;            /* [entries], [all unknowns], [all rows] */
     double *a, *work, *aim, *size;                /* [rows, unknowns] twice, [all rows] twice */
-    double *u, *target, *tried, *r, *scaled;      /* [all unknowns] thrice, [all rows] twice */
+    double *u, *target, *tried, *stands;          /* [all unknowns] each; stands: 1 where a row has the unknown */
+    double *r, *scaled;                           /* [all rows] */
 } room;
 
 static int32_t numbers(int32_t count, const int32_t *use, int32_t *at)
@@ -109,10 +111,38 @@ static double measure(sd_search *s, const double *x, room *w, double *norm)
     return isfinite(largest) ? largest : INFINITY;
 }
 
+/* target [unknowns]: that of `nearest` where the rows as they are determine the step; else 1 */
+static int determined(const sd_search *s, room *w, int beside)
+{
+    const sd_balance *m = &s->start->balance;
+    int32_t n = w->unknowns;
+    memset(w->work, 0, (size_t)w->rows * (size_t)n * sizeof *w->work);
+    memset(w->stands, 0, (size_t)m->unknowns * sizeof *w->stands);
+    for (int32_t e = 0; e < m->entries; e++)
+        if (w->values[e] != 0.0) {
+            int32_t j = w->column_at[m->column[e]];
+            w->work[(size_t)w->row_at[m->row[e]] * n + j] += w->values[e];
+            w->stands[j] = 1.0;
+        }
+    for (int32_t r = 0; r < m->rows; r++)
+        if (w->row_at[r] >= 0)
+            w->aim[w->row_at[r]] = -w->r[r];
+    int failed = sd_graded(w->rows, n, w->work, w->aim, w->target);
+    for (int32_t c = 0; c < m->unknowns && !failed; c++) {
+        int32_t j = w->column_at[c];
+        if (j >= 0)
+            w->target[j] = beside || w->stands[j] != 0.0 ? w->u[j] + w->target[j] / w->unit[c] : 0.0;
+    }
+    return failed;
+}
+
 /* target [unknowns]: the u of least norm with a u = a u_now - rows; beside: the step of least norm, added to u_now */
 static int nearest(const sd_search *s, room *w, int beside)
 {
     int32_t m = w->rows, n = w->unknowns, all = s->start->balance.rows;
+    int open = determined(s, w, beside);
+    if (open <= 0)
+        return open;
     for (int32_t r = 0; r < all; r++) {
         int32_t i = w->row_at[r];
         if (i < 0)
@@ -227,7 +257,7 @@ int sd_search_solve(sd_search *s)
     w.rows = numbers(m->rows, s->use, w.row_at);
     w.unknowns = numbers(m->unknowns, s->free, w.column_at);
     size_t full = (size_t)w.rows * (size_t)w.unknowns;
-    double *memory = malloc((entries + 5 * all + 5 * rows + 2 * full + 1) * sizeof *memory);
+    double *memory = malloc((entries + 6 * all + 5 * rows + 2 * full + 1) * sizeof *memory);
     if (!memory) {
         free(at);
         return -2;
@@ -242,7 +272,8 @@ int sd_search_solve(sd_search *s)
     w.u = w.size + rows;
     w.target = w.u + all;
     w.tried = w.target + all;
-    w.r = w.tried + all;
+    w.stands = w.tried + all;
+    w.r = w.stands + all;
     w.scaled = w.r + rows;
     double *x = w.scaled + rows;
     for (size_t c = 0; c < all; c++)

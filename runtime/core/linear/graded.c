@@ -1,0 +1,254 @@
+#include "linear/graded.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define NONE (1 << 28)   /* the cost of an entry that is zero: no sum of others reaches it */
+#define AGREES 1e-10     /* of the largest aim: what a row in excess may be missed by */
+#define CERTAIN 1e4      /* bounds of its round-off that a pivot is above */
+#define LARGE 0.25       /* of the largest entries at first: an exact pivot */
+
+/* Powers of two [m], [n] for the rows and columns, and the cost of each entry: of the entries of its row the largest has
+ * none. */
+typedef struct {
+    int32_t m, n;
+    int32_t *cost;                 /* [m, n] */
+    int32_t *row, *column;         /* exponents */
+    int32_t *holder;               /* [m + 1] the column, from 1, that a row, from 1, is assigned to; 0: none */
+    int32_t *way, *least;          /* [m + 1] of the search for one column: the row before, the cost of getting there */
+    char *seen;                    /* [m + 1] */
+} scales;
+
+static void cost(scales *s, const double *a)
+{
+    for (int32_t i = 0; i < s->m; i++) {
+        const double *line = a + (size_t)i * s->n;
+        int32_t *c = s->cost + (size_t)i * s->n, most = -NONE;
+        for (int32_t j = 0; j < s->n; j++) {
+            c[j] = NONE;
+            if (line[j] != 0.0) {
+                frexp(line[j], &c[j]);
+                most = c[j] > most ? c[j] : most;
+            }
+        }
+        s->row[i] = most > -NONE ? -most : 0;
+        for (int32_t j = 0; j < s->n; j++)
+            c[j] = c[j] == NONE ? NONE : most - c[j];
+    }
+}
+
+/* Rows for all columns at least cost, by shortest augmenting paths (Jonker and Volgenant 1987); 0: there are none.  Adds the
+ * dual solution to the exponents: cost - column - row is nowhere negative, and zero where assigned. */
+static int assign(scales *s)
+{
+    int32_t m = s->m, n = s->n;
+    int32_t *u = s->column - 1, *v = s->way + m + 1;
+    memset(s->holder, 0, ((size_t)m + 1) * sizeof *s->holder);
+    memset(v, 0, ((size_t)m + 1) * sizeof *v);
+    memset(s->column, 0, (size_t)n * sizeof *s->column);
+    for (int32_t j = 1; j <= n; j++) {
+        int32_t at = 0;
+        s->holder[0] = j;
+        for (int32_t i = 0; i <= m; i++) {
+            s->least[i] = NONE;
+            s->seen[i] = 0;
+        }
+        do {
+            int32_t next = 0, step = NONE, column = s->holder[at];
+            s->seen[at] = 1;
+            for (int32_t i = 1; i <= m; i++) {
+                if (s->seen[i])
+                    continue;
+                int32_t c = s->cost[(size_t)(i - 1) * n + column - 1];
+                int32_t there = c == NONE ? NONE : c - u[column] - v[i];
+                if (there < s->least[i]) {
+                    s->least[i] = there;
+                    s->way[i] = at;
+                }
+                if (s->least[i] < step) {
+                    step = s->least[i];
+                    next = i;
+                }
+            }
+            if (step == NONE)
+                return 0;
+            for (int32_t i = 0; i <= m; i++)
+                if (s->seen[i]) {
+                    u[s->holder[i]] += step;
+                    v[i] -= step;
+                } else if (s->least[i] != NONE)
+                    s->least[i] -= step;
+            at = next;
+        } while (s->holder[at]);
+        for (; at; at = s->way[at])
+            s->holder[at] = s->holder[s->way[at]];
+    }
+    for (int32_t i = 0; i < m; i++)
+        s->row[i] += v[i + 1];
+    return 1;
+}
+
+/* a, b scaled; 1: done, 0: some columns have no row of their own, -2: no memory */
+static int scaled(int32_t m, int32_t n, double *a, double *b, int32_t *column)
+{
+    size_t rows = (size_t)m + 1, full = (size_t)m * (size_t)n;
+    int32_t *memory = malloc((full + 5 * rows) * sizeof *memory + rows);
+    if (!memory)
+        return -2;
+    scales s = {m, n, memory, memory + full, column, memory + full + rows, memory + full + 2 * rows,
+                memory + full + 4 * rows, (char *)(memory + full + 5 * rows)};
+    cost(&s, a);
+    int done = assign(&s);
+    for (int32_t i = 0; i < m && done; i++) {
+        for (int32_t j = 0; j < n; j++)
+            a[(size_t)i * n + j] = ldexp(a[(size_t)i * n + j], s.row[i] + column[j]);
+        b[i] = ldexp(b[i], s.row[i]);
+    }
+    free(memory);
+    return done;
+}
+
+static void swap(double *a, double *b)
+{
+    double kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+static int power_of_two(double value)
+{
+    int exponent;
+    return fabs(frexp(value, &exponent)) == 0.5;
+}
+
+static void swap_lines(int32_t m, int32_t n, double *a, int32_t row, int32_t column, int32_t k)
+{
+    for (int32_t j = 0; j < n && row != k; j++)
+        swap(a + (size_t)row * n + j, a + (size_t)k * n + j);
+    for (int32_t i = 0; i < m && column != k; i++)
+        swap(a + (size_t)i * n + column, a + (size_t)i * n + k);
+}
+
+/* line -= factor pivot from k on; of [n] each, with the bounds of their round-off, `open` that of the factor */
+static void subtract(int32_t k, int32_t n, double factor, double open, const double *pivot, const double *pivot_open,
+                     double *line, double *line_open)
+{
+    int exact = power_of_two(factor);
+    for (int32_t j = k; j < n; j++) {
+        double product = factor * pivot[j];
+        line_open[j] += fabs(factor) * pivot_open[j] + open * fabs(pivot[j]);
+        if (product == 0.0)
+            continue;
+        int summed = line[j] != 0.0;
+        line[j] -= product;
+        if (!exact && !power_of_two(pivot[j]))
+            line_open[j] += DBL_EPSILON * fabs(product);
+        if (summed && !power_of_two(line[j]))
+            line_open[j] += DBL_EPSILON * fabs(line[j]);
+    }
+}
+
+/* a := its factors, lines moved so that pivots stand on the diagonal, b := L^-1 b; place [n]: the column that was there;
+ * open [m, n]: bounds of round-off.  Returns 1 where a pivot may be no more than that. */
+static int eliminate(int32_t m, int32_t n, double *a, double *open, double *b, int32_t *place)
+{
+    for (int32_t j = 0; j < n; j++)
+        place[j] = j;
+    for (size_t e = 0; e < (size_t)m * (size_t)n; e++)
+        open[e] = power_of_two(a[e]) ? 0.0 : DBL_EPSILON * fabs(a[e]);
+    for (int32_t k = 0; k < n; k++) {
+        int32_t row = k, column = k;
+        double most = -1.0;
+        for (int32_t i = k; i < m; i++)
+            for (int32_t j = k; j < n; j++) {
+                size_t e = (size_t)i * n + j;
+                double size = fabs(a[e]);
+                size += open[e] == 0.0 && size >= LARGE ? 2.0 : 0.0;
+                if (size > most) {
+                    most = size;
+                    row = i;
+                    column = j;
+                }
+            }
+        swap_lines(m, n, a, row, column, k);
+        swap_lines(m, n, open, row, column, k);
+        swap(b + row, b + k);
+        int32_t kept = place[k];
+        place[k] = place[column];
+        place[column] = kept;
+        const double *pivot = a + (size_t)k * n, *pivot_open = open + (size_t)k * n;
+        if (!(fabs(pivot[k]) > CERTAIN * pivot_open[k]))
+            return 1;
+        for (int32_t i = k + 1; i < m; i++) {
+            double *line = a + (size_t)i * n, *line_open = open + (size_t)i * n, factor = line[k] / pivot[k];
+            if (factor == 0.0)
+                continue;
+            double unsure = (line_open[k] + fabs(factor) * pivot_open[k]) / fabs(pivot[k]);
+            if (!power_of_two(pivot[k]) && !power_of_two(factor))
+                unsure += DBL_EPSILON * fabs(factor);
+            subtract(k + 1, n, factor, unsure, pivot, pivot_open, line, line_open);
+            b[i] -= factor * b[k];
+        }
+    }
+    return 0;
+}
+
+/* the columns that have entries, moved together in a: their number; place [n] */
+static int32_t used(int32_t m, int32_t n, double *a, int32_t *place)
+{
+    int32_t found = 0;
+    for (int32_t j = 0; j < n; j++) {
+        int any = 0;
+        for (int32_t i = 0; i < m && !any; i++)
+            any = a[(size_t)i * n + j] != 0.0;
+        if (any)
+            place[found++] = j;
+    }
+    for (int32_t i = 0; i < m && found < n; i++)
+        for (int32_t j = 0; j < found; j++)
+            a[(size_t)i * found + j] = a[(size_t)i * n + place[j]];
+    return found;
+}
+
+static double largest(int32_t number, const double *b)
+{
+    double most = 0.0;
+    for (int32_t k = 0; k < number; k++)
+        most = fabs(b[k]) > most || isnan(b[k]) ? fabs(b[k]) : most;
+    return most;
+}
+
+int sd_graded(int32_t m, int32_t n, double *a, double *b, double *x)
+{
+    int32_t *own = malloc((3 * (size_t)n + 1) * sizeof *own);
+    double *open = malloc(((size_t)m * (size_t)n + 1) * sizeof *open);
+    if (!own || !open) {
+        free(own);
+        free(open);
+        return -2;
+    }
+    int32_t *column = own + n, *place = own + 2 * (size_t)n, k = used(m, n, a, own);
+    memset(x, 0, (size_t)n * sizeof *x);
+    int failed = 1;
+    if (k <= m) {
+        failed = scaled(m, k, a, b, column);
+        failed = failed < 0 ? failed : !failed;
+    }
+    if (!failed) {
+        double most = largest(m, b);
+        failed = eliminate(m, k, a, open, b, place) || !(largest(m - k, b + k) <= AGREES * most);
+    }
+    if (!failed)
+        for (int32_t i = k - 1; i >= 0; i--) {
+            const double *line = a + (size_t)i * k;
+            for (int32_t j = i + 1; j < k; j++)
+                b[i] -= line[j] * b[j];
+            b[i] /= line[i];
+            x[own[place[i]]] = ldexp(b[i], column[place[i]]);
+        }
+    free(open);
+    free(own);
+    return failed;
+}
