@@ -178,31 +178,25 @@ class _Linear:
         numbers = (np.cumsum(mask, dtype=np.int32) - 1 for mask in (self.problem.use, self.problem.free))
         return next(numbers)[rows], next(numbers)[columns]
 
-    def determined(self, u: Floats, r: Floats, held: Mask, *, beside: bool) -> Floats | None:
-        """The same with those held where they are guessed (beside: where they are), where the rows as they are then
-        determine the others (core/linear/graded.h); None where they do not.
-        """
+    def determined(self, u: Floats, r: Floats, *, beside: bool) -> Floats | None:
+        """The same where the rows, as they are, determine the step (core/linear/graded.h); None where they do not."""
         rows, columns, values = self._taken()
         rows, columns = self._numbered(rows, columns)
-        step = np.where(held & ~beside, -u, 0.0) * self.unit[self.problem.free]
-        aim = -r / self.row_scale[self.problem.use]
-        np.add.at(aim, rows, -values * step[columns])
-        a, moved, stands = np.zeros(self.shape), np.zeros(u.size), held.copy()
-        np.add.at(a, (rows, columns), np.where(held[columns], 0.0, values))
+        a, step = np.zeros(self.shape), np.zeros(u.size)
+        np.add.at(a, (rows, columns), values)
+        aim, stands = -r / self.row_scale[self.problem.use], np.zeros(u.size, dtype=bool)
         stands[columns] = True
-        failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(aim), lib.pointer(moved))
+        failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(aim), lib.pointer(step))
         if failed < 0:
             raise MemoryError
-        if failed:
-            return None
-        return np.where(stands | beside, u + (step + moved) / self.unit[self.problem.free], 0.0)
+        return None if failed else np.where(stands | beside, u + step / self.unit[self.problem.free], 0.0)
 
     def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
         """The least u with A u = A u_now - r; beside it, the least step: its round-off is its own."""
         levels = [level[self.problem.free] for level in self.problem.levels]
         ordered = any(level.any() for level in levels) and max(self.shape) <= DENSE
-        if max(self.shape) <= SINGULAR_VALUES:
-            only = self.determined(u, r, np.any(levels, axis=0) if ordered else np.zeros_like(u, bool), beside=beside)
+        if not ordered and max(self.shape) <= SINGULAR_VALUES:
+            only = self.determined(u, r, beside=beside)
             if only is not None:
                 return only
         i, j, v = self.entries
@@ -447,8 +441,8 @@ def corrected(problem: Problem, x: Floats) -> Floats | None:
     linear, free = _Linear(problem, x), problem.free
     if max(linear.shape) > SINGULAR_VALUES:
         return None
-    still = np.zeros(linear.shape[1])
-    step = linear.determined(still, (problem.residual(x) * linear.row_scale)[problem.use], still > 0.0, beside=True)
+    r = (problem.residual(x) * linear.row_scale)[problem.use]
+    step = linear.determined(np.zeros(linear.shape[1]), r, beside=True)
     found = x.copy()
     if step is None or not np.isfinite(step).all():
         return None

@@ -7,7 +7,7 @@
 
 #define NONE (1 << 28)   /* the cost of an entry that is zero: no sum of others reaches it */
 #define AGREES 1e-10     /* of the largest aim: what a row in excess may be missed by */
-#define CERTAIN 1e4      /* bounds of its round-off that a pivot is above */
+#define CERTAIN 1e8      /* bounds of its round-off that a pivot is above: half of its digits are known */
 #define LARGE 0.25       /* of the largest entries at first: an exact pivot */
 
 /* Powers of two [m], [n] for the rows and columns, and the cost of each entry: of the entries of its row the largest has
