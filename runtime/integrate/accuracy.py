@@ -86,7 +86,7 @@ class Law:
     that a draft took (over FEW_STEPS) with which the gain grows: what has much happen adds up more of its errors;
     ratio: of the tolerances of the first two runs; loosest: tolerance of a draft; most: steps with which the gain
     grows; far: of the tolerance of the run before, beyond which nothing more is credited; little: the most that is left
-    of a tolerance that missed where no power is measured yet, for another miss costs a run.
+    of a tolerance that missed where no power is measured yet, for another miss costs a run; safety: of its estimates.
     """
 
     gain: float
@@ -99,6 +99,7 @@ class Law:
     most: int = MANY_STEPS
     far: float = FAR
     little: float = 0.1
+    safety: float = SAFETY
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
@@ -111,11 +112,13 @@ LAWS = {
     "bdf": Law(30.0, 1.0, 0.7, 2e-14),
     # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3: a
     # hundredth of the draft's tolerance spares some third runs, and left every third one below a hundredth of what was
-    # asked; a tenth lets no draft of the dearest models do
-    "radau": Law(21.0, 0.95, 0.6, 1e-17, ratio=0.03, little=0.2),
+    # asked; a tenth lets no draft of the dearest models do.  Error of the finer run over its difference from a draft
+    # (239 pairs): 0.02 in the median, 95 % below 0.27, all below 0.74; the estimate says 0.25
+    "radau": Law(21.0, 0.95, 0.6, 1e-17, ratio=0.03, little=0.2, safety=1.8),
     # the tolerance that would do falls with the power 1.9 of the draft's steps: where the longest step holds them, any
-    # would; one model in eleven takes a third run
-    "dopri": Law(50.0, 1.0, 0.9, 2e-14, growth=1.75, ratio=0.15, little=0.3),
+    # would; one model in eleven takes a third run.  Error over difference of 317 pairs: 0.01 in the median, 95 % below
+    # 0.25, 99.7 % below 1; the estimate says 0.4
+    "dopri": Law(50.0, 1.0, 0.9, 2e-14, growth=1.75, ratio=0.15, little=0.3, safety=1.6),
     # its tolerance is the error over one shortest period: of many periods the error is what it adds up to
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
 }
@@ -161,12 +164,12 @@ Run = Callable[[float, float], Sampled]
 """Integrates with a tolerance and a longest step as part of the span."""
 
 
-def _shrink(power: float, step: float, far: float) -> float:
-    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger; beyond `far`
-    nothing more is credited.
+def _shrink(law: Law, power: float, step: float) -> float:
+    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger; beyond
+    law.far nothing more is credited.
     """
-    ratio = max(10.0 ** (-power * step), far**power)
-    return float(SAFETY * ratio / (1.0 - ratio))
+    ratio = max(10.0 ** (-power * step), law.far**power)
+    return float(law.safety * ratio / (1.0 - ratio))
 
 
 def _achieved(estimate: float, met: bool, runs: int, tolerance: float) -> Achieved:
@@ -228,7 +231,7 @@ class _Estimate:
         shrink = None
         if shorter is not None:
             part = shorter**BY_STEPS
-            shrink = SAFETY * part / (1.0 - part)
+            shrink = self.law.safety * part / (1.0 - part)
         elif self._before is not None:
             over_before, step_before = self._before
             if over > over_before:
@@ -237,7 +240,7 @@ class _Estimate:
                 self._power = float(np.clip(np.log10(over_before / over) / step_before, 0.3, 1.0))
         if shrink is None:
             credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, SHORT_CREDIT)
-            shrink = _shrink(credit if self._power is None else min(self._power, credit), step, self.law.far)
+            shrink = _shrink(self.law, credit if self._power is None else min(self._power, credit), step)
         self._before = (over, step) if shorter is None else None
         self.over, self.apart = over * shrink, apart * shrink
         return apart

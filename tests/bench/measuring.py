@@ -18,7 +18,7 @@ from sysdyn.cli.run.starting import start
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
-from sysdyn.runtime.simulate import simulate
+from sysdyn.runtime.simulate import Outcome, simulate
 from sysdyn.runtime.trace.trace import Trace
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
@@ -30,10 +30,11 @@ TIMING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One command's integration.  cpu: cpu_integrate_s, the least of all repetitions; estimate: None where none; steps:
-    of all its runs; last, rtol: steps and tolerance of the last one.
+    """One command's integration.  options: as it was asked for; cpu: cpu_integrate_s, the least of all repetitions;
+    estimate: None where none; steps: of all its runs; last, rtol: steps and tolerance of the last one.
     """
 
+    options: dict[str, object]
     cpu: float
     estimate: float | None
     met: bool
@@ -77,21 +78,11 @@ class Bench:
 
     def run(self, repetitions: int = 1, **options: object) -> Measured | None:
         """None where the run failed."""
-        cpu = np.inf
-        asked = replace(self.options, **options)  # type: ignore[arg-type]
-        for _ in range(repetitions):
-            try:
-                outcome = simulate(
-                    self.prepared.structure,
-                    self.prepared.arrays,
-                    self.prepared.carrier,
-                    asked,
-                    start=self.started.state,
-                    facts=self.started.facts,
-                )
-            except (SolverFailure, NoSuchForm):
-                return None
-            cpu = min(cpu, outcome.timings["cpu_integrate_s"])
+        try:
+            outcomes = [self._once(options) for _ in range(repetitions)]
+        except (SolverFailure, NoSuchForm):
+            return None
+        outcome, cpu = outcomes[-1], min(map(_cpu, outcomes))
         trace = Trace.open(self.trace)
         instants = np.array(trace.time)
         # an instant stands twice where the text jumps: the row before is left out
@@ -100,7 +91,28 @@ class Bench:
         nominal = {name: float(trace[name].nominal) for name in trace.names}
         steps, rtol = outcome.statistics["steps"], float(trace.attributes["rtol"])
         told = outcome.error_estimate, outcome.met, steps, outcome.steps, outcome.method, rtol
-        return Measured(cpu, *told, instants[keep], columns, nominal)
+        return Measured(options, cpu, *told, instants[keep], columns, nominal)
+
+    def timed(self, runs: list[Measured], seconds: float) -> list[float]:
+        """CPU time (s) of each run's integration: the least of as many repetitions by turns as take so long (s).  Of
+        runs of a millisecond the least of three is off by a fifth, and one beside another by what the machine does
+        meanwhile.
+        """
+        found = [run.cpu for run in runs]
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            found = [min(cpu, _cpu(self._once(run.options))) for cpu, run in zip(found, runs, strict=True)]
+        return found
+
+    def _once(self, options: dict[str, object]) -> Outcome:
+        asked = replace(self.options, **options)  # type: ignore[arg-type]
+        prepared, started = self.prepared, self.started
+        parts = prepared.structure, prepared.arrays, prepared.carrier
+        return simulate(*parts, asked, start=started.state, facts=started.facts)
+
+
+def _cpu(outcome: Outcome) -> float:
+    return float(outcome.timings["cpu_integrate_s"])
 
 
 class Reference:

