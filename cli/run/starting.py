@@ -58,7 +58,7 @@ def start(
         with np.errstate(all="ignore"):  # what overflows is seen as no number
             state = eventful_start(system, t0, plan(prepared, system), until)
             facts = structure(system, state)
-            implicit = undetermined(system, state)
+            implicit = undetermined(system, state, facts)
     except InconsistentStart as error:
         _refused(prepared, t0, error, report)
         return None

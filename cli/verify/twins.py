@@ -85,11 +85,6 @@ def free_multipliers(started: Started) -> frozenset[str]:
     system = started.system
     y, yd = started.state.for_form(system)
     found = reactions(system, system.jacobian(started.state.t, y, yd)[0])
-    left = dependent(found)
-    free: set[int] = set()
-    for k in range(left.size):
-        weights = combination(found, left[k : k + 1])
-        # too large to be combined: none is trusted
-        free |= set(np.flatnonzero(np.abs(weights) > 1e-8)) if weights.size else set(range(found.multipliers.size))
-    families = {int(system.family_of[found.multipliers[k]]) for k in free}
+    free = found.multipliers[np.abs(combination(found, dependent(found))) > 1e-8]
+    families = {int(k) for k in system.family_of[free]}
     return frozenset(system.description.families[k].owner for k in families)

@@ -518,8 +518,9 @@ class Members(Names):
         at = tuple(ex.substitute(a, base.change) for a in at)
         _, residual = self.constraint(symbol, at, e.span)
         target = self.scalar(e.args[0].value)
-        if target.dimension is None:
-            raise self.fail("E203", "a constant has no displacement", e.args[0].span)
+        if target.dimension is None or not any(n.op == "var" for n in ex.variables(target.node)):
+            help_ = "a coordinate, or an expression of some, that it acts along"
+            raise self.fail("E203", "a constant has no displacement", e.args[0].span, help=help_)
         node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
         return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
 

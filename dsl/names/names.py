@@ -144,6 +144,8 @@ class Names(Context):
             case ParameterSymbol() | UnknownSymbol():
                 return self._expanded(symbol, span) if symbol.shape else self.element(symbol, ())
             case Definition():
+                if symbol.at and not symbol.implied:
+                    raise self._unnamed(symbol.name, span)
                 return self.definition(symbol, self._implied(symbol, span) if symbol.implied else None)
             case Unsupported():
                 raise Failed  # its declaration has been reported as N608
@@ -175,11 +177,14 @@ class Names(Context):
     def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
         """A whole array as a value: only where its bounds are written as numbers."""
         if len(symbol.shape) != 1 or not all(ex.is_const(b) for b in symbol.shape[0]):
-            help_ = f"{symbol.name}[i] in a sum or a 'for'"
-            raise self.fail("E806", f"'{symbol.name}' is an array: name the element", span, help=help_)
+            raise self._unnamed(symbol.name, span)
         first, last = (int(b.data) for b in symbol.shape[0])
         budget.charge(budget.NODE * max(last - first, 0), f"the elements of '{symbol.name}' one by one")
         return Vector(tuple(self.element(symbol, (ex.const(i),)) for i in range(first, last + 1)), first)
+
+    def _unnamed(self, name: str, span: syntax.Span) -> Failed:
+        """Report E806: an array where one of its elements is wanted."""
+        return self.fail("E806", f"'{name}' is an array: name the element", span, help=f"{name}[i] in a sum or a 'for'")
 
     def element(self, symbol: ParameterSymbol | UnknownSymbol, at: tuple[Node, ...]) -> Typed:
         """One element of a parameter or unknown."""

@@ -207,7 +207,6 @@ def _load() -> Any:
         "sd_confirmed": (c.c_int, [_P, _P, _D, _P, _P, _P]),
         "sd_unresolved": (c.c_int, [*[_P] * 5]),
         "sd_noise": (c.c_int, [*[_P] * 7, _D, _I, _D, _P]),
-        "sd_independent": (c.c_int, [_I, _I, _I, _P, _P, _P, _D, _D]),
         "sd_scale": (c.c_int, [_P, _P, _I, _P, _P, _I, _P, _P, _P, _I, _P]),
         "sd_sparse_factors": (None, [_I, _I, _I, *[_P] * 5]),
         "sd_factors": (None, [_I, _I, _P, _P, _P, _P]),

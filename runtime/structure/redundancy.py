@@ -1,6 +1,7 @@
 """Redundant constraints: found at several consistent points, left out, or given the least multipliers.
 
-The rows of J = [Phi_q; Psi_f] are looked at in the order written: one that depends on those kept before it is left out.
+The rows of J = [Phi_q; Psi_f] are looked at in the order written: one that depends on those kept before it is left out:
+J^T, eliminated in that order, has no pivot in its column (J of any size: core/linear/tall.h).
 A row is redundant where it depends on them at the start and at three seeded consistent points nearby; where the rank is
 smaller at the start alone, the configuration is singular (language, section 5).
 In a system a left-out row reads "its multiplier = 0": the motion is that of the others.
@@ -14,20 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.least_change import solve
-from sysdyn.runtime.numerics.points import normal
-from sysdyn.runtime.numerics.rank import TOLERANCE, least_squares
+from sysdyn.runtime.numerics.points import normal, uniform
+from sysdyn.runtime.numerics.rank import TOLERANCE
 from sysdyn.runtime.start.start import EXACT, ConsistentState
 from sysdyn.runtime.start.starter import Starter, problem_of
 from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
 NONE = np.zeros(0, dtype=np.int32)
-DENSE = 300
-"""Constraints up to which matrices are full."""
 NOISE = 1e-11
 """Entries below this part of the largest of their row are what is left of a zero."""
 POINTS = 3
@@ -37,35 +37,22 @@ BESIDE = 1e-3
 """Amplitude of the displacements to points beside the start, off phi."""
 NEAR = 10.0
 """Amplitudes: what the way back onto phi leads farther than this may be another singular point."""
-_EPS = 1e-13
 PIVOT = 1e-3
 """Of rows scaled to one: an entry that makes a row independent beyond doubt."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reactions:
-    """J of the form as written by its entries: which constraint (place in `multipliers`), which row of dynamics
-    (place in `rows`), value; rows and columns scaled to one, the rows with `scale` [multipliers].  multipliers: places
-    in y.
+    """J of the form as written by its entries: which constraint (place in `multipliers`), which of the model's `rows`
+    it acts on, value; lines scaled to one, those of constraints with `scale` [multipliers].  multipliers: places in y.
     """
 
     which: Ints
-    place: Longs
+    row: Ints
     value: Floats
     multipliers: Longs
-    rows: Ints
+    rows: int
     scale: Floats
-
-    @property
-    def large(self) -> bool:
-        """Whether J is too large to be looked at as a full matrix."""
-        return self.multipliers.size > DENSE or self.rows.size > 4 * DENSE
-
-    def full(self) -> Floats:
-        """J [multipliers, rows]."""
-        found = np.zeros((self.multipliers.size, self.rows.size))
-        np.add.at(found, (self.which, self.place), self.value)
-        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +65,9 @@ class _Places:
     row: Ints
 
 
-def _reacting(system: System, idle: Ints = NONE) -> _Places:
-    """The multipliers of constraints, but for the idle ones, and the reactions of each."""
+def _reacting(system: System) -> _Places:
+    """The multipliers of constraints that hold now, and the reactions of each."""
+    idle = system.idle_multipliers()
 
     def find() -> _Places:
         pattern, mine = system.pattern, system.are("kappa", "mu").copy()
@@ -94,67 +82,40 @@ def _reacting(system: System, idle: Ints = NONE) -> _Places:
 
 def reactions(system: System, jy: Floats) -> Reactions:
     """J from the reactions of the multipliers (virtual displacements)."""
-    all_ = _reacting(system, system.idle_multipliers())
+    all_ = _reacting(system)
     value, largest = jy[all_.entry], np.zeros(all_.multipliers.size)
     np.maximum.at(largest, all_.which, np.abs(value))
     real = np.abs(value) > NOISE * largest[all_.which]
     which, value = all_.which[real], value[real]
-    rows, place = np.unique(all_.row[real], return_inverse=True)
-    scale, other = sparse_factors(which, place, np.abs(value), (all_.multipliers.size, rows.size))
-    return Reactions(which, place, scale[which] * value * other[place], all_.multipliers, rows, scale)
-
-
-def independent(system: System, jy: Floats) -> bool:
-    """Whether the constraints that hold now are few, and independent beyond doubt."""
-    found = _reacting(system, system.idle_multipliers())
-    number, value = found.multipliers.size, jy[found.entry]
-    if not number or number > DENSE or system.rows > 4 * DENSE:
-        return not number
-    arrays = lib.pointer(found.which), lib.pointer(found.row), lib.pointer(value)
-    sure = lib.core.sd_independent(number, system.rows, value.size, *arrays, NOISE, TOLERANCE)
-    if sure < 0:
-        raise MemoryError
-    return bool(sure)
+    row = all_.row[real]
+    scale, other = sparse_factors(which, row, np.abs(value), (all_.multipliers.size, system.rows))
+    return Reactions(which, row, scale[which] * value * other[row], all_.multipliers, system.rows, scale)
 
 
 def dependent(found: Reactions) -> Ints:
-    """Constraints (places in `multipliers`) that depend on those before them."""
-    if found.large:
-        return _sparse_dependent(found)
-    basis, left = np.zeros((0, found.rows.size)), []
-    for k, row in enumerate(found.full()):
-        outside = row - basis.T @ (basis @ row)
-        outside -= basis.T @ (basis @ outside)  # twice is enough (Kahan)
-        size = float(np.linalg.norm(outside))
-        if size <= TOLERANCE * float(np.linalg.norm(row)):  # next to nothing lies outside those kept before it
-            left.append(k)
-        else:
-            basis = np.vstack([basis, outside / size])
-    return np.asarray(left, dtype=np.int32)
-
-
-def _sparse_dependent(found: Reactions) -> Ints:
-    """The same from the pivots of [I J^T; J -eps]: those of the order of eps.  In any order they count the dependent
-    rows; eliminated in the order written they name them.  Not asked where every row in its turn alone stands in some
-    column: those are independent.
+    """Constraints (places in `multipliers`) that depend on those before them.  Not asked where every row in its turn
+    alone stands in some column: those are independent.
     """
-    m, n = found.multipliers.size, found.rows.size
-    entries = found.which.astype(np.int32), found.place.astype(np.int32), found.value
-    arrays, peeled = [lib.pointer(item) for item in entries], np.zeros(m, dtype=np.int32)
-    left = lib.core.sd_peel(m, n, found.which.size, *arrays, PIVOT, lib.pointer(peeled))
+    m, peeled = found.multipliers.size, np.zeros(found.multipliers.size, dtype=np.int32)
+    entries, own = (lib.pointer(item) for item in (found.which, found.row, found.value)), 1.0 + uniform(m)
+    left = lib.core.sd_peel(m, found.rows, found.value.size, *entries, PIVOT, lib.pointer(peeled))
     if left < 0:
         raise MemoryError
-    if not left:
-        return NONE
-    from scipy.sparse import block_array, csc_array, eye_array
-    from scipy.sparse.linalg import splu
+    return np.flatnonzero(_combined(found, own) == own).astype(np.int32) if left else NONE
 
-    j = csc_array((found.value, (found.which, found.place)), shape=(m, n))
-    matrix = block_array([[eye_array(n), j.T], [j, -_EPS * eye_array(m)]], format="csc")
-    if not (np.abs(splu(matrix, permc_spec="COLAMD").U.diagonal()) < 1e3 * _EPS).any():
-        return NONE
-    lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.flatnonzero(np.abs(lu.U.diagonal())[n:] < 1e3 * _EPS).astype(np.int32)
+
+def _combined(found: Reactions, weights: Floats) -> Floats:
+    """Coefficients [multipliers] with which rows of J vanish: of rows that depend on those before them as given, of the
+    others such that these make up for them.  J^T is eliminated in the order written: there they have no pivot.
+    """
+    m = weights.size
+    pattern, (slot,) = compress(max(m, found.rows), m, [Places(found.row, found.which)])
+    values, weights = np.bincount(slot, found.value, pattern.entries), weights.copy()
+    order = np.arange(m, dtype=np.int32)
+    arrays = (lib.pointer(item) for item in (pattern.column, pattern.row, values, order))
+    if lib.core.sd_left_open(pattern.rows, m, *arrays, TOLERANCE, 0, lib.pointer(weights)):
+        raise MemoryError
+    return weights
 
 
 def _moves(system: System, state: ConsistentState) -> tuple[Floats, Floats]:
@@ -201,11 +162,10 @@ def vanished(system: System, state: ConsistentState) -> Ints:
 
 
 def combination(found: Reactions, left: Ints) -> Floats:
-    """Coefficients [multipliers] of a vanishing combination of rows as written: the first left-out one and those before
-    it; () where there is none.
+    """Coefficients [multipliers], the largest 1, of a combination of rows as written that vanishes: of those of `left`,
+    which depend on those before them, and of the independent ones.
     """
-    if not left.size or found.large:
-        return np.zeros(0)
-    rows, last = found.full(), int(left[0])
-    weights = np.append(-least_squares(rows[:last].T, rows[last]), np.eye(1, len(rows) - last)) * found.scale
+    weights = np.zeros(found.multipliers.size)
+    weights[left] = 1.0 + uniform(left.size)
+    weights = _combined(found, weights) * found.scale
     return np.asarray(weights / weights[np.argmax(np.abs(weights))])

@@ -23,7 +23,7 @@ from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.redundancy import combination, dependent, independent, nearby, reactions, vanished
+from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
 from sysdyn.values import dataclass
 
 DENSE = 300
@@ -44,7 +44,6 @@ RESOLVED = 1e-9
 """Least pivot, as part of its column, of factors that tell: where cj is too large, sums of rows in which the rates
 cancel are round-off."""
 SIDES = 2
-NONE = np.zeros(0, dtype=np.int32)
 SLIDES = 2.0
 """Of a branch (events/kinks.py)."""
 
@@ -269,12 +268,11 @@ def structure(system: System, state: ConsistentState) -> Structure:
     y, yd = state.for_form(system)
     jy, _ = system.jacobian(state.t, y, yd)
     index, undetermined = _highest_index(system, state)
-    sure = independent(system, jy)
-    found = None if sure else reactions(system, jy)
-    left = NONE if found is None else dependent(found)
+    found = reactions(system, jy)
+    left = dependent(found)
     zero = vanished(system, state)
     lowest = np.union1d(left, zero).size if zero.size else left.size
-    if left.size and found is not None:
+    if left.size:
         # a rank that is smaller here alone is the configuration's, not the constraints'
         for point in nearby(system, state):
             there = reactions(system, system.jacobian(state.t, point, yd)[0])
@@ -282,20 +280,18 @@ def structure(system: System, state: ConsistentState) -> Structure:
             if fewer.size < left.size:
                 found, left = there, fewer
     # a row that is zero wherever phi holds, but not beside it, is no combination of others
-    if left.size and zero.size and found is not None:
+    if left.size and zero.size:
         left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
     lost = lowest - int(left.size)
     n = int(system.are("f").sum())
     idle = system.idle_multipliers()
     m1, m2 = (int(system.are(kind).sum() - system.are(kind)[idle].sum()) for kind in ("kappa", "mu"))
-    places = NONE if found is None else found.multipliers
+    places = found.multipliers
     rank, rank_q = m1 + m2 - int(left.size), m1 - int(system.are("kappa")[places[left]].sum())
-    weights = combination(found, left) if left.size and found is not None else np.zeros(0)
+    weights = combination(found, left[:1]) if left.size else np.zeros(0)
     group = tuple((_label(system, int(places[k])), float(weights[k])) for k in np.flatnonzero(np.abs(weights) > 1e-8))
     names = tuple(_place(system, int(places[k])) for k in left)
     if system.unknowns > LARGE:
         system.spare()
         system.trim()
-    return Structure(
-        index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names
-    )
+    return Structure(index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names)

@@ -1,10 +1,8 @@
-"""Sums of sums against the matrices they are; what the core says of independent rows against their rank."""
+"""Sums of sums against the matrices they are."""
 
 import numpy as np
 import pytest
 from sysdyn.runtime.condense.composition import composed
-from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.numerics.rank import TOLERANCE
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -35,22 +33,3 @@ def test_no_sums_at_all():
     found = composed(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     assert found.start.tolist() == [0]
     assert not found.values(np.zeros(0)).size
-
-
-def independent(matrix):
-    """What the core says of the rows of a matrix, by its entries."""
-    rows, columns = (np.ascontiguousarray(item, dtype=np.int32) for item in np.nonzero(matrix))
-    arrays = lib.pointer(rows), lib.pointer(columns), lib.pointer(np.ascontiguousarray(matrix[rows, columns]))
-    return lib.core.sd_independent(*matrix.shape, rows.size, *arrays, 1e-11, TOLERANCE)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_rows_are_independent_or_not(seed):
-    """Whatever the sizes of rows and columns; one that is a sum of the others is not."""
-    random = np.random.default_rng(seed)
-    matrix = random.normal(size=(4, 7)) * 10.0 ** random.uniform(-8, 8, (4, 1)) * 10.0 ** random.uniform(-3, 3, (1, 7))
-    assert independent(matrix) == 1
-    matrix[3] = matrix[0] / np.abs(matrix[0]).max() - matrix[2] / np.abs(matrix[2]).max()
-    assert independent(matrix) == 0
-    matrix[3] = 0.0
-    assert independent(matrix) == 0

@@ -117,6 +117,21 @@ def test_a_singular_configuration_is_not_redundant():
     assert (facts.redundant, facts.singular) == (0, 0)
 
 
+def test_what_does_not_hold_now_counts_for_no_rank():
+    """An open contact stands before a row whose gradient vanishes at the start alone: one rank is lost, not two."""
+    made = models.small(
+        "1 2",
+        "(f_1**2 + f_2**2)/2",
+        psi={"contact": "f_1 - f_2", "crossing": "q_1*f_1 - q_2*f_2"},
+        initial=dict.fromkeys(("q_1", "q_2", "f_1", "f_2"), (0.0, True)),
+    )
+    made[0]["structure"]["switches"] = [{"owner": "contact", "at": []}]
+    system = System(made[0], made[1], load(made[2]))
+    system.description.switches.set(np.array([False]))
+    facts = structure(system, consistent_start(system, 0.0))
+    assert (facts.m2, facts.redundant, facts.singular) == (1, 0, 1)
+
+
 def test_what_is_no_policy(tmp_path):
     with pytest.raises(WrongOption, match="redundancy"):
         run(pendulum(), tmp_path / "t.h5", "maybe")

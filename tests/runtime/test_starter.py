@@ -6,9 +6,10 @@ import small_models as models
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.start.settled import inertial_rows, rates_of
 from sysdyn.runtime.start.starter import Starter, problem_of
-from sysdyn.runtime.structure.redundancy import DENSE, Reactions, combination, dependent
+from sysdyn.runtime.structure.redundancy import Reactions, combination, dependent
 
 PENDULUM = {"q_1": (3.0, True), "q_2": (-4.0, False), "f_1": (0.0, False), "f_2": (0.0, False)}
 
@@ -107,27 +108,63 @@ def test_the_written_state_moves_before_what_is_unsaid():
     assert not any(idle.values())
 
 
-def reactions(matrix, multipliers=None):
-    """J as the equations give it, with some more empty columns where it shall be large."""
+def reactions(matrix):
+    """J as the equations give it."""
     j = np.asarray(matrix, dtype=float)
-    which, place = np.nonzero(j)
-    columns = max(j.shape[1], multipliers or 0)
-    return Reactions(which, place, j[which, place], np.arange(len(j)), np.arange(columns), np.ones(len(j)))
+    which, row = (np.ascontiguousarray(item, dtype=np.int32) for item in np.nonzero(j))
+    scale, other = sparse_factors(which, row, np.abs(j[which, row]), j.shape)
+    return Reactions(which, row, scale[which] * j[which, row] * other[row], np.arange(len(j)), j.shape[1], scale)
 
 
 ROWS = [[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [1.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]
 """The third is the first less the second; the fourth is empty."""
 
 
-@pytest.mark.parametrize("columns", [None, 4 * DENSE + 1])
-def test_rows_that_depend_on_those_before_them_are_named(columns):
-    found = reactions(ROWS, columns)
-    assert found.large == (columns is not None)
-    assert dependent(found).tolist() == [2, 3]
-    assert dependent(reactions(ROWS[:2] + ROWS[4:], columns)).tolist() == []
+def test_rows_that_depend_on_those_before_them_are_named():
+    assert dependent(reactions(ROWS)).tolist() == [2, 3]
+    assert dependent(reactions(ROWS[:2] + ROWS[4:])).tolist() == []
+    assert dependent(reactions(np.zeros((0, 3)))).tolist() == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_dependent_rows_are_those_of_any_size(seed):
+    """Whatever the sizes of rows and columns; one that is a sum of the others is not independent."""
+    random = np.random.default_rng(seed)
+    matrix = random.normal(size=(4, 7)) * 10.0 ** random.uniform(-8, 8, (4, 1)) * 10.0 ** random.uniform(-3, 3, (1, 7))
+    assert dependent(reactions(matrix)).tolist() == []
+    matrix[3] = matrix[0] / np.abs(matrix[0]).max() - matrix[2] / np.abs(matrix[2]).max()
+    assert dependent(reactions(matrix)).tolist() == [3]
+    matrix[1] = 0.0
+    assert dependent(reactions(matrix)).tolist() == [1, 3]
+
+
+def test_dependent_rows_of_a_large_matrix_are_as_many_as_its_rank_lacks():
+    """Three random entries a row: no row in its turn alone stands in some column, and the rank is that of the SVD."""
+    random, m, n = np.random.default_rng(0), 900, 910
+    matrix = np.zeros((m, n))
+    matrix[np.repeat(np.arange(m), 3), random.integers(0, n, 3 * m)] = random.normal(size=3 * m)
+    found = reactions(matrix)
+    left = dependent(found)
+    assert left.size == m - np.linalg.matrix_rank(matrix, 1e-10) > 0
+    assert np.linalg.matrix_rank(np.delete(matrix, left, axis=0), 1e-10) == m - left.size
+    weights = combination(found, left)
+    assert np.abs(weights @ matrix).max() < 1e-9 * np.abs(weights).max()
+    assert (weights[left] != 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rows_fill_behind_many_that_are_left_out(seed):
+    """Those that take no pivot leave all others their places: what comes behind them may fill more."""
+    random = np.random.default_rng(seed)
+    matrix = np.zeros((300, 300))
+    matrix[:200, 0] = 1.0 + random.random(200)
+    matrix[200] = random.normal(size=300)
+    matrix[np.repeat(np.arange(201, 300), 4 + 2 * seed), random.integers(0, 300, 99 * (4 + 2 * seed))] = 1.0
+    matrix[201:] *= random.normal(size=(99, 300))
+    assert dependent(reactions(matrix)).tolist() == list(range(1, 200))
 
 
 def test_the_combination_that_vanishes():
-    weights = combination(reactions(ROWS), np.array([2, 3]))
+    weights = combination(reactions(ROWS), np.array([2]))
     assert weights / weights[0] == pytest.approx([1.0, -1.0, -1.0, 0.0, 0.0])
-    assert combination(reactions(ROWS, 4 * DENSE + 1), np.array([2])).size == 0
+    assert combination(reactions(ROWS), np.array([3])).tolist() == [0.0, 0.0, 0.0, 1.0, 0.0]

@@ -35,10 +35,4 @@ int sd_regular(int32_t n, const int32_t *column, const int32_t *row, const doubl
  * none below `most`, or is not regular at the point asked; -2: memory */
 int sd_pencil_index(int32_t n, const int32_t *column, const int32_t *row, const double *e, const double *b, int32_t most);
 
-/* 1: the rows [m] of a matrix by its entries (row_of, column_of, value [entries]), lines scaled to one, are independent
- * beyond doubt: of each next to those before it more than MARGIN `least` of its length is left; 0: they may not be; -1: no
- * memory.  Entries below `noise` of the largest of their row are none (structure/redundancy.py). */
-int sd_independent(int32_t m, int32_t n, int32_t entries, const int32_t *row_of, const int32_t *column_of,
-                   const double *value, double noise, double least);
-
 #endif

@@ -172,7 +172,8 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
             leave(lu);
             return 3;
         }
-        if (grow(nl + rows - k, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
+        int32_t pivots = k - (n - lu->rank); /* columns that were left out have taken no row */
+        if (grow(nl + rows - pivots, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
             return 2;
         lu->l_start[k] = (int32_t)nl;
         lu->u_start[k] = (int32_t)nu;
