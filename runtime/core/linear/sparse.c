@@ -1,5 +1,6 @@
 /* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
 #include "linear/sparse.h"
+#include "linear/blocks.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -33,7 +34,7 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order)
     size_t m = (size_t)n, all = (size_t)rows;
     lu->n = n;
     lu->rows = rows;
-    lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
+    lu->order = calloc(3 * m + all + 2, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
     lu->inverse = calloc(m + (m > all ? m : all) + 1, sizeof(sd_number));
     if (!lu->order || !lu->l_start || !lu->inverse) {
@@ -41,14 +42,21 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order)
         return NULL;
     }
     lu->source = lu->order + m;
-    lu->place = lu->source + m;
+    lu->first = lu->source + m;
+    lu->place = lu->first + m + 1;
     lu->u_start = lu->l_start + m + 1;
     lu->x = lu->inverse + m;
     memcpy(lu->order, order, m * sizeof *order);
     return lu;
 }
 
-/* rows reached from column c through the columns of L found so far: stack[top..n) in the order of elimination */
+/* where the rows that a position leads to end: in a block the first leads to all others */
+static inline int32_t last_ahead(const sd_sparse *lu, int32_t k)
+{
+    return lu->first[k + 1] == lu->first[k] ? lu->l_start[k] + 1 : lu->l_start[k + 1];
+}
+
+/* rows reached from column c through the columns of L found so far: stack[top..n) */
 static int32_t reach(sd_sparse *lu, const int32_t *column, const int32_t *row, int32_t c, int32_t stamp)
 {
     int32_t top = lu->rows;
@@ -61,7 +69,7 @@ static int32_t reach(sd_sparse *lu, const int32_t *column, const int32_t *row, i
         lu->head[0] = lu->place[row[e]] < 0 ? 0 : lu->l_start[lu->place[row[e]]];
         while (depth >= 0) {
             int32_t here = lu->stack[depth], k = lu->place[here], down = -1;
-            int32_t last = k < 0 ? 0 : lu->l_start[k + 1];
+            int32_t last = k < 0 ? 0 : last_ahead(lu, k);
             for (int32_t p = lu->head[depth]; k >= 0 && p < last; p++) {
                 if (lu->mark[lu->l_row[p]] != stamp) {
                     down = lu->l_row[p];
@@ -166,6 +174,8 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         lu->mark[i] = -1;
         lu->x[i] = 0.0;
     }
+    for (int32_t k = 0; k <= n; k++)
+        lu->first[k] = -1;
     for (int32_t k = 0; k < n; k++) {
         int32_t c = lu->order[k];
         if (lu->most > 0 && nl + nu > lu->most) {
@@ -183,16 +193,15 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
             size = fmax(size, sd_size(value[e]));
         }
         /* eliminate with the finished columns, in order */
+        int32_t reached = 0;
         for (int32_t i = top; i < rows; i++) {
-            int32_t r = lu->stack[i], j = lu->place[r];
-            if (j < 0)
-                continue;
-            sd_number u = lu->x[r];
-            lu->u_row[nu] = j;
-            lu->u_value[nu++] = u;
-            for (int32_t p = lu->l_start[j]; p < lu->l_start[j + 1]; p++)
-                lu->x[lu->l_row[p]] -= lu->l_value[p] * u;
+            int32_t j = lu->place[lu->stack[i]];
+            if (j >= 0)
+                lu->u_row[nu + reached++] = j;
         }
+        ascend(reached, lu->u_row + nu, lu->among);
+        apply_columns(lu, reached, lu->u_row + nu, lu->source, lu->u_value + nu, lu->x, lu->block);
+        nu += reached;
         double largest;
         int32_t pivot = choose(lu, c, top, &largest);
         double relative = size > 0.0 ? largest / size : 0.0;
@@ -202,6 +211,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
                 lu->x[lu->stack[i]] = 0.0;
             nu = lu->u_start[k];
             lu->source[k] = -1;
+            lu->first[k] = k;
             lu->inverse[k] = 0.0;
             lu->l_start[k + 1] = (int32_t)nl;
             lu->u_start[k + 1] = (int32_t)nu;
@@ -223,9 +233,17 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         lu->inverse[k] = inverse;
         lu->place[pivot] = k;
         lu->source[k] = pivot;
+        int32_t block = lu->first[k] = block_of(lu, k, rows - top - reached - 1);
+        if (block < k) {
+            align(lu, block, k, pivot);
+            for (int32_t l = lu->l_start[k - 1] + 1; l < lu->l_start[k]; l++) {
+                lu->l_row[nl] = lu->l_row[l];
+                lu->l_value[nl++] = lu->x[lu->l_row[l]] * inverse;
+            }
+        }
         for (int32_t i = top; i < rows; i++) {
             int32_t r = lu->stack[i];
-            if (lu->place[r] < 0 && (lu->dropped == 0.0 || sd_size(lu->x[r] * inverse) > lu->dropped)) {
+            if (block == k && lu->place[r] < 0 && (lu->dropped == 0.0 || sd_size(lu->x[r] * inverse) > lu->dropped)) {
                 lu->l_row[nl] = r;
                 lu->l_value[nl++] = lu->x[r] * inverse;
             }
@@ -250,12 +268,25 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
     return 0;
 }
 
+/* lets go of what pivoting alone needs */
+static void leave_search(sd_sparse *lu)
+{
+    free(lu->stack), free(lu->block), free(lu->among);
+    lu->stack = lu->head = lu->mark = lu->count = NULL;
+    lu->block = NULL;
+    lu->among = NULL;
+}
+
 int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
     size_t rows = (size_t)lu->rows;
     lu->stack = calloc(4 * rows + 1, sizeof(int32_t)); /* of a large one the room counts: it is not kept */
-    if (!lu->stack)
+    lu->block = malloc((rows + 1) * sizeof(sd_number));
+    lu->among = calloc((size_t)lu->n / 64 + 1, sizeof(uint64_t));
+    if (!lu->stack || !lu->block || !lu->among) {
+        leave_search(lu);
         return 2;
+    }
     lu->head = lu->stack + rows;
     lu->mark = lu->head + rows;
     lu->count = lu->mark + rows;
@@ -266,8 +297,8 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         fit(lu->l_start[lu->n], &lu->l_room, &lu->l_row, &lu->l_value);
         fit(lu->u_start[lu->n], &lu->u_room, &lu->u_row, &lu->u_value);
     }
-    free(lu->stack);
-    lu->stack = lu->head = lu->mark = lu->count = NULL;
+    lu->widest = failed ? 0 : widest_block(lu);
+    leave_search(lu);
     return failed;
 }
 
@@ -281,7 +312,9 @@ static double column_size(const int32_t *column, const sd_number *value, int32_t
 
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
-    sd_number *x = lu->x;
+    sd_number *x = lu->x, *block = lu->widest ? malloc((size_t)lu->widest * sizeof *block) : NULL;
+    if (lu->widest && !block)
+        return 1;
     lu->smallest = 1.0;
     for (int32_t k = 0; k < lu->n; k++) {
         int32_t c = lu->order[k];
@@ -289,14 +322,8 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
             continue;
         for (int32_t e = column[c]; e < column[c + 1]; e++)
             x[lu->place[row[e]]] += value[e];
-        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++) {
-            int32_t j = lu->u_row[p];
-            sd_number u = x[j];
-            x[j] = 0.0;
-            lu->u_value[p] = u;
-            for (int32_t l = lu->l_start[j]; l < lu->l_start[j + 1]; l++)
-                x[lu->l_row[l]] -= lu->l_value[l] * u;
-        }
+        int32_t from = lu->u_start[k];
+        apply_columns(lu, lu->u_start[k + 1] - from, lu->u_row + from, NULL, lu->u_value + from, x, block);
         sd_number diagonal = x[k], inverse = 1.0 / diagonal;
         double largest = sd_size(diagonal);
         x[k] = 0.0;
@@ -314,10 +341,12 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
         if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
             memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);
             lu->pivoted = 0;
+            free(block);
             return 1;
         }
     }
     x[lu->n] = 0.0;
+    free(block);
     return 0;
 }
 
