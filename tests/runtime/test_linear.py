@@ -6,7 +6,7 @@ from scipy.sparse import csc_array, diags_array, eye_array, kron, random_array
 from scipy.sparse.linalg import splu
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.patterns import Pattern
-from sysdyn.runtime.numerics.ordering import DENSE, Order, any_order, column_order, least_degree, with_pairs
+from sysdyn.runtime.numerics.ordering import DENSE, NET, Order, any_order, column_order, least_degree, with_pairs
 
 
 class Solver:
@@ -175,11 +175,12 @@ def expander(n, seed, kind):
 @pytest.mark.parametrize("kind", [float, complex])
 @pytest.mark.parametrize("paired", [False, True])
 def test_columns_that_fill_alike_are_applied_together(kind, paired):
-    n = 700
+    n = NET + 300 if paired else 700
     matrix = expander(n, 3, kind)
     rng = np.random.default_rng(0)
     pattern = Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
-    order = with_pairs(pattern, any_order(pattern), np.arange(n, dtype=np.int32)) if paired else any_order(pattern)
+    order = with_pairs(pattern, any_order(pattern), np.arange(n, dtype=np.int32))
+    assert order.paired == paired
     linear = order.complex_linear(pattern) if kind is complex else order.linear(pattern)
     letter = "z_" if kind is complex else ""
     factor, solve, free = (getattr(lib.core, f"sd_linear_{letter}{name}") for name in ("factor", "solve", "free"))
@@ -194,6 +195,19 @@ def test_columns_that_fill_alike_are_applied_together(kind, paired):
             assert np.abs(there - side).max() < 1e-13 * np.abs(values).max() * n
     finally:
         free(linear)
+
+
+@pytest.mark.parametrize("equal", [3, 300])
+def test_a_dense_rest_without_a_pivot_names_its_place(equal):
+    n = 700
+    matrix = expander(n, 3, float).tolil()
+    matrix[equal] = matrix[equal + 1]
+    solver = Solver(matrix.tocsc())
+    if solver.factor(csc_array(matrix).data) == 0:  # round-off
+        assert solver.linear.contents.smallest < 1e-12
+    else:
+        assert 0 <= solver.linear.contents.bad_row < n
+        assert 0 <= solver.linear.contents.bad_column < n
 
 
 def replayed(matrix, *, machine=True):

@@ -50,15 +50,10 @@ static SD_WIDE void lessen_four(int32_t n, const sd_number *restrict a, const sd
 }
 #endif
 
-/* x less `many` columns of one block from the j-th on; u: what stood in x where they pivot, `at` the first; w: room */
-static void apply_block(const sd_sparse *lu, int32_t j, int32_t many, int32_t at, sd_number *u, sd_number *x, sd_number *w)
+/* w less `many` columns of one block from the j-th on; w[0] is where the first pivots, `wide` numbers are behind it */
+static void lessen_block(const sd_sparse *lu, int32_t j, int32_t many, int32_t wide, sd_number *w)
 {
-    const int32_t *row = lu->l_row + lu->l_start[j];
-    int32_t wide = lu->l_start[j + 1] - lu->l_start[j], k = 0;
-    w[0] = x[at];
-    x[at] = 0.0;
-    for (int32_t p = 0; p < wide; p++)
-        w[p + 1] = x[row[p]];
+    int32_t k = 0;
     for (; k + SD_COLUMNS <= many; k += SD_COLUMNS) {
         const sd_number *a = lu->l_value + lu->l_start[j + k], *b = lu->l_value + lu->l_start[j + k + 1];
         const sd_number *c = lu->l_value + lu->l_start[j + k + 2], *d = lu->l_value + lu->l_start[j + k + 3];
@@ -73,6 +68,18 @@ static void apply_block(const sd_sparse *lu, int32_t j, int32_t many, int32_t at
         for (int32_t p = 0; p < wide - k; p++)
             w[k + 1 + p] -= l[p] * w[k];
     }
+}
+
+/* x less `many` columns of one block from the j-th on; u: what stood in x where they pivot, `at` the first; w: room */
+static void apply_block(const sd_sparse *lu, int32_t j, int32_t many, int32_t at, sd_number *u, sd_number *x, sd_number *w)
+{
+    const int32_t *row = lu->l_row + lu->l_start[j];
+    int32_t wide = lu->l_start[j + 1] - lu->l_start[j];
+    w[0] = x[at];
+    x[at] = 0.0;
+    for (int32_t p = 0; p < wide; p++)
+        w[p + 1] = x[row[p]];
+    lessen_block(lu, j, many, wide, w);
     for (int32_t i = 0; i < many; i++)
         u[i] = w[i];
     for (int32_t p = 0; p < wide; p++)

@@ -161,6 +161,52 @@ static void fit(int64_t taken, int64_t *room, int32_t **rows, sd_number **values
     *room = (int64_t)kept;
 }
 
+static double column_size(const int32_t *column, const sd_number *value, int32_t c)
+{
+    double size = 0.0;
+    for (int32_t e = column[c]; e < column[c + 1]; e++)
+        size = fmax(size, sd_size(value[e]));
+    return size;
+}
+
+/* x := column c, eliminated with the finished columns behind nu entries of U; how many these are, the rows are stack[top..) */
+static int32_t reduce(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t c,
+                      int32_t stamp, int64_t nu, int32_t *top)
+{
+    int32_t reached = 0;
+    *top = reach(lu, column, row, c, stamp);
+    for (int32_t e = column[c]; e < column[c + 1]; e++)
+        lu->x[row[e]] += value[e];
+    for (int32_t i = *top; i < lu->rows; i++) {
+        int32_t j = lu->place[lu->stack[i]];
+        if (j >= 0)
+            lu->u_row[nu + reached++] = j;
+    }
+    ascend(reached, lu->u_row + nu, lu->among);
+    apply_columns(lu, reached, lu->u_row + nu, lu->source, lu->u_value + nu, lu->x, lu->block);
+    return reached;
+}
+
+#include "linear/dense_rest.h"
+
+/* in the numbers of the pivots, without rows that have none */
+static void number_rows(sd_sparse *lu)
+{
+    int64_t kept = 0, p = 0;
+    for (int32_t r = 0; r < lu->rows && lu->rows > lu->rank; r++)
+        if (lu->place[r] < 0)
+            lu->place[r] = lu->n;
+    for (int32_t k = 0; k < lu->n; k++) {
+        for (; p < lu->l_start[k + 1]; p++) {
+            lu->l_row[kept] = lu->place[lu->l_row[p]];
+            lu->l_value[kept] = lu->l_value[p];
+            kept += lu->l_row[kept] < lu->n;
+        }
+        lu->l_start[k + 1] = (int32_t)kept;
+    }
+    lu->pivoted = 1;
+}
+
 /* with room for the search */
 static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
@@ -182,25 +228,18 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
             leave(lu);
             return 3;
         }
+        if (dense_from(lu, k, nl + nu)) {
+            int failed = eliminate_rest(lu, column, row, value, k, nl, nu, THRESHOLD);
+            if (!failed)
+                number_rows(lu);
+            return failed;
+        }
         if (grow(nl + rows - k, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
             return 2;
         lu->l_start[k] = (int32_t)nl;
         lu->u_start[k] = (int32_t)nu;
-        int32_t top = reach(lu, column, row, c, k);
-        double size = 0.0;
-        for (int32_t e = column[c]; e < column[c + 1]; e++) {
-            lu->x[row[e]] += value[e];
-            size = fmax(size, sd_size(value[e]));
-        }
-        /* eliminate with the finished columns, in order */
-        int32_t reached = 0;
-        for (int32_t i = top; i < rows; i++) {
-            int32_t j = lu->place[lu->stack[i]];
-            if (j >= 0)
-                lu->u_row[nu + reached++] = j;
-        }
-        ascend(reached, lu->u_row + nu, lu->among);
-        apply_columns(lu, reached, lu->u_row + nu, lu->source, lu->u_value + nu, lu->x, lu->block);
+        int32_t top = 0, reached = reduce(lu, column, row, value, c, k, nu, &top);
+        double size = column_size(column, value, c);
         nu += reached;
         double largest;
         int32_t pivot = choose(lu, c, top, &largest);
@@ -252,19 +291,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         lu->l_start[k + 1] = (int32_t)nl;
         lu->u_start[k + 1] = (int32_t)nu;
     }
-    for (int32_t r = 0; r < rows && rows > lu->rank; r++)
-        if (lu->place[r] < 0)
-            lu->place[r] = n;
-    int64_t kept = 0, p = 0;
-    for (int32_t k = 0; k < n; k++) { /* in the numbers of the pivots, without rows that have none */
-        for (; p < lu->l_start[k + 1]; p++) {
-            lu->l_row[kept] = lu->place[lu->l_row[p]];
-            lu->l_value[kept] = lu->l_value[p];
-            kept += lu->l_row[kept] < n;
-        }
-        lu->l_start[k + 1] = (int32_t)kept;
-    }
-    lu->pivoted = 1;
+    number_rows(lu);
     return 0;
 }
 
@@ -300,14 +327,6 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     lu->widest = failed ? 0 : widest_block(lu);
     leave_search(lu);
     return failed;
-}
-
-static double column_size(const int32_t *column, const sd_number *value, int32_t c)
-{
-    double size = 0.0;
-    for (int32_t e = column[c]; e < column[c + 1]; e++)
-        size = fmax(size, sd_size(value[e]));
-    return size;
 }
 
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
