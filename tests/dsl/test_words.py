@@ -226,6 +226,5 @@ def test_what_a_long_text_becomes_is_old_at_once(monkeypatch):
     assert {id(item) for item in made} <= {id(item) for item in gc.get_objects(generation=2)}
 
 
-
 def test_remedies_are_of_codes_that_there_are():
     assert set(REMEDIES) <= set(codes())
