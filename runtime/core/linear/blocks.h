@@ -9,6 +9,7 @@
 #include "linear/lanes.h"
 #include "linear/sparse.h"
 
+#include <math.h>
 #include <stdint.h>
 
 #define SD_COLUMNS 4   /* of a block at a time; fewer are applied one by one */
@@ -136,6 +137,15 @@ static void ascend(int32_t number, int32_t *position, uint64_t *among)
             position[q] = position[q - 1];
         position[q] = here;
     }
+}
+
+/* the largest entry of a column of the matrix */
+static double column_size(const int32_t *column, const sd_number *value, int32_t c)
+{
+    double size = 0.0;
+    for (int32_t e = column[c]; e < column[c + 1]; e++)
+        size = sd_size(value[e]) > size ? sd_size(value[e]) : size;
+    return size;
 }
 
 /* whether a k-th column of `number` rows, the marked ones, is one of the block before it, and of which: its first; else k */

@@ -1,11 +1,12 @@
 /* The rest of an elimination once it is dense: by columns in panels, so that a panel stays near while all behind it take it.
  *
- * What stands before it has been applied to all its columns; they become one block of L (blocks.h).  Included by
- * sparse.c, of which it is a part. */
+ * What stands before it has been applied to all its columns; they become one block of L (blocks.h). */
 #ifndef SYSDYN_DENSE_REST_H
 #define SYSDYN_DENSE_REST_H
 
 #include "linear/blocks.h"
+
+#include <math.h>
 
 #define PANEL 32        /* columns that are applied to all behind them together */
 #define REST_LEAST 64   /* columns of a rest that is worth it */
@@ -96,53 +97,6 @@ static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *va
             lessen_block(lu, k + from, to - from, m - from - 1, rest + (size_t)j * m + from);
     }
     return 0;
-}
-
-/* all from the k-th column on, behind nl and nu entries of the factors: 0 done, 1 singular, 2 memory */
-static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
-                          int64_t nl, int64_t nu, double threshold)
-{
-    int32_t n = lu->n, m = n - k, failed = 0;
-    sd_number *rest = calloc((size_t)m * (size_t)m, sizeof *rest);
-    int32_t *own = malloc(((size_t)m + (size_t)n) * sizeof *own), *at = own ? own + m : NULL;
-    if (!rest || !own || grow(nl + (int64_t)m * (m - 1) / 2, &lu->l_room, &lu->l_row, &lu->l_value))
-        failed = 2;
-    for (int32_t r = 0, i = 0; r < n && !failed; r++)
-        if (lu->place[r] < 0) {
-            own[i] = r;
-            at[r] = i++;
-        }
-    lu->l_start[k] = (int32_t)nl;
-    for (int32_t i = 0; i < m && !failed; i++) {
-        int32_t c = lu->order[k + i];
-        lu->u_start[k + i] = (int32_t)nu;
-        if (grow(nu + k + i, &lu->u_room, &lu->u_row, &lu->u_value)) {
-            failed = 2;
-            break;
-        }
-        int32_t top = 0, reached = reduce(lu, column, row, value, c, k + i, nu, &top);
-        for (int32_t p = top; p < n; p++) {
-            int32_t r = lu->stack[p];
-            if (lu->place[r] < 0)
-                rest[(size_t)i * m + at[r]] = lu->x[r];
-            lu->x[r] = 0.0;
-        }
-        nu += reached;
-        for (int32_t p = 0; p < i; p++)
-            lu->u_row[nu++] = k + p;
-        nl += m - i - 1;
-        lu->l_start[k + i + 1] = (int32_t)nl;
-        lu->u_start[k + i + 1] = (int32_t)nu;
-    }
-    if (!failed)
-        failed = factor_rest(lu, column, value, k, m, rest, own, at, threshold);
-    for (int32_t i = 0; i < m && !failed; i++) {
-        lu->first[k + i] = k;
-        memcpy(lu->l_row + lu->l_start[k + i], own + i + 1, (size_t)(m - i - 1) * sizeof *own);
-    }
-    free(rest);
-    free(own);
-    return failed;
 }
 
 #endif
