@@ -226,7 +226,8 @@ def listing(
 
 def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:
     """Whether a statement of the model, of a component in it, of the scene, or one that it needs could not be read."""
-    bodies = [statement for _, body in elaborator.bodies for statement, _ in body]
+    once = {id(body): body for _, body in elaborator.bodies}.values()
+    bodies = [statement for body in once for statement, _ in body]
     said = [*bodies, *(scene.body if scene else ())]
     within = (action for s in said if isinstance(s, (syntax.When, syntax.Every)) for action in s.actions)
     return elaborator.files.scope.missed or any(isinstance(s, syntax.Broken) for s in (*said, *within))
@@ -234,7 +235,7 @@ def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:
 
 def _unused_levels(elaborator: Elaborator, report: Report) -> None:
     """A level for a path that is no component is a mistake, not a wish."""
-    known = {space.path for space, _ in elaborator.bodies}
+    known = {space.path for space, _ in elaborator.bodies} if elaborator.levels else set[str]()
     for path, (name, place) in elaborator.levels.items():
         if path not in known and not report.failed:
             near = nearest(path, known)

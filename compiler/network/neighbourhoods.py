@@ -52,23 +52,23 @@ def side_by_side(network: Network, shapes: dict[str, Shaped]) -> Found:
 def _sites(network: Network, shapes: dict[str, Shaped]) -> dict[str, Site]:
     """Where each node stands: among those of its connected part that ends of the same branches touch."""
     parts = Joined[str]()
-    touched: dict[str, list[tuple[object, ...]]] = {}
+    touched: dict[str, list[int]] = {}
+    laws: dict[tuple[object, ...], int] = {}
     for b in network.branches:
         names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
         if len(names) == 2:
             parts.join(*names)
         key = shapes[b.name].key if b.name in shapes else ("", b.name)
+        law = laws.setdefault((b.kind, b.side or "", len(names), key), 2 * len(laws))
         for k, end in enumerate((b.plus, b.minus)):
             if end is not None and end.node is not None:
-                touched.setdefault(end.node, []).append((b.kind, b.side or "", k, len(names), key))
+                touched.setdefault(end.node, []).append(law + k)
     found: dict[str, Site] = {}
     size: dict[str, int] = {}
-    numbers: dict[tuple[object, ...], int] = {}
     for node in network.nodes:
         if node.shape or node.name in network.read or MARK in node.name or node.name not in touched:
             continue
-        own = sorted(numbers.setdefault(t, len(numbers)) for t in touched[node.name])
-        family = f"{parts.first(node.name)} {node.domain.name} {own}"
+        family = f"{parts.first(node.name)} {node.domain.name} {sorted(touched[node.name])}"
         found[node.name] = family, size.get(family, 0)
         size[family] = size.get(family, 0) + 1
     return {name: site for name, site in found.items() if size[site[0]] >= RUN}

@@ -67,11 +67,12 @@ class _Graph:
             known = b.name in shapes and b.name not in taken and len(set(names)) == len(names)
             if known and any(n in self.free for n in names) and not any(n in taken for n in names):
                 self.loose[b.name] = b
-
-    def joint(self, name: str | None) -> bool:
-        """Whether two loose branches meet there, and nothing else does."""
-        here = self.at.get(name, ()) if name in self.free else ()
-        return len(here) == 2 and all(b.name in self.loose for b in here)
+        self.joints: dict[str | None, list[Branch]] = {
+            name: here
+            for name, here in self.at.items()
+            if len(here) == 2 and name in self.free and here[0].name in self.loose and here[1].name in self.loose
+        }
+        """Nodes where two loose branches meet, and nothing else does."""
 
     def strands(self) -> Iterator[Strand]:
         """All, in the order of their first branches; circles of joints alone are none."""
@@ -79,19 +80,22 @@ class _Graph:
         for b in self.loose.values():
             if b.name in seen:
                 continue
+            one, two = _end(b, False), _end(b, True)
+            if one not in self.joints and two not in self.joints:
+                yield Strand(((b, True),), (one, two))
+                continue
             ahead, behind = self._way(b, sense=True), self._way(b, sense=False)
             seen |= {c.name for c, _ in (*ahead[0], *behind[0])}
-            if not self.joint(ahead[1][-1]):
+            if ahead[1][-1] not in self.joints:
                 back = Strand(*behind).reversed()
                 yield Strand((*back.branches[:-1], *ahead[0]), (*back.nodes[:-2], *ahead[1]))
 
     def _way(self, b: Branch, *, sense: bool) -> tuple[tuple[tuple[Branch, bool], ...], tuple[str | None, ...]]:
         """From a branch on, in one sense, until a node that is no joint or the branch itself."""
         branches, nodes = [(b, sense)], [_end(b, not sense), _end(b, sense)]
-        while self.joint(nodes[-1]):
+        while nodes[-1] in self.joints:
             last, here = branches[-1][0], nodes[-1]
-            assert here is not None
-            after = next(c for c in self.at[here] if c is not last)
+            after = next(c for c in self.joints[here] if c is not last)
             if after is b:
                 break
             onward = _end(after, False) == here
@@ -129,30 +133,31 @@ def strands(network: Network, shapes: Mapping[str, Shaped], taken: Collection[st
     """Classes of at least RUN strands; taken: names of nodes and branches that stand in families already."""
     graph = _Graph(network, shapes, taken)
     ways = list(graph.strands())
+    linked = _linked(ways, shapes)
     of = _buses(network, graph, ways)
     while True:
         size = Counter(of.values())
         of = {name: key for name, key in of.items() if size[key] >= RUN}
-        classes = _classes(ways, shapes, of)
+        classes = _classes(linked, of)
         ends = Counter(of[n] for same in classes for s in same for n in (s.nodes[0], s.nodes[-1]) if n in of)
-        every = Counter(of[name] for name in of for _ in graph.at[name])
+        every = Counter(key for name, key in of.items() for _ in graph.at[name or ""])
         lost = {key for key, number in every.items() if (1 + MANY) * (number - ends[key]) > number}
         if not lost:
             break
         of = {name: key for name, key in of.items() if key not in lost}
     buses: dict[str, list[str]] = {}
     for name, key in of.items():
-        buses.setdefault(key, []).append(name)
+        buses.setdefault(key, []).append(name or "")
     return Strands(classes, {key: tuple(names) for key, names in buses.items()})
 
 
-def _buses(network: Network, graph: _Graph, ways: Sequence[Strand]) -> dict[str, str]:
+def _buses(network: Network, graph: _Graph, ways: Sequence[Strand]) -> dict[str | None, str]:
     """The family of each free node that is no joint of a strand: those of a connected part whose balances are alike in
     whether potential stores, and branches that are no strands, touch them.
     """
     inner = {name for way in ways for name in way.nodes[1:-1]}
     storing = {n for way in ways if any(b.kind == "potential" for b, _ in way.branches) for n in way.nodes}
-    found = {}
+    found: dict[str | None, str] = {}
     for node in network.nodes:
         if node.name in graph.free and node.name in graph.at and node.name not in inner:
             others = any(b.name not in graph.loose for b in graph.at[node.name])
@@ -161,23 +166,33 @@ def _buses(network: Network, graph: _Graph, ways: Sequence[Strand]) -> dict[str,
     return found
 
 
-def _classes(
-    ways: Sequence[Strand], shapes: Mapping[str, Shaped], of: Mapping[str, str]
-) -> tuple[tuple[Strand, ...], ...]:
+Links = tuple[tuple[bool, int], ...]
+"""Of the branches of a strand: whether each is passed against its sense, and the number of its law."""
+
+
+def _linked(ways: Sequence[Strand], shapes: Mapping[str, Shaped]) -> list[tuple[Strand, Links]]:
+    """Each with what it is made of."""
+    numbers: dict[object, int] = {}
+
+    def law(b: Branch) -> int:
+        return numbers.setdefault((b.domain.name, b.kind, b.side, shapes[b.name].key), len(numbers))
+
+    return [(way, tuple([(not sense, law(b)) for b, sense in way.branches])) for way in ways]
+
+
+def _classes(ways: Sequence[tuple[Strand, Links]], of: Mapping[str | None, str]) -> tuple[tuple[Strand, ...], ...]:
     """Strands of the same laws in the same senses between the same families (or the same nodes), one way round."""
     numbers: dict[object, int] = {}
     found: dict[object, list[Strand]] = {}
-
-    def key(way: Strand) -> tuple[tuple[tuple[bool, int], ...], tuple[int, ...]]:
-        links = []
-        for b, sense in way.branches:
-            law = b.domain.name, b.kind, b.side, shapes[b.name].key
-            links.append((not sense, numbers.setdefault(law, len(numbers))))
-        ends = (numbers.setdefault(("end", of.get(n or "", n)), len(numbers)) for n in (way.nodes[0], way.nodes[-1]))
-        return tuple(links), tuple(ends)
-
-    for way in ways:
-        one = min((way, way.reversed()), key=key)
-        if any(n in of for n in (one.nodes[0], one.nodes[-1])):
-            found.setdefault(key(one), []).append(one)
+    for way, links in ways:
+        if way.nodes[0] not in of and way.nodes[-1] not in of:
+            continue
+        one, two = (
+            numbers.setdefault(("end", of.get(n, n)), len(numbers)) for n in (way.nodes[0], way.nodes[-1])
+        )
+        key: object = (links, (one, two))
+        back = tuple((not sense, law) for sense, law in reversed(links)), (two, one)
+        if back < (links, (one, two)):
+            key, way = back, way.reversed()
+        found.setdefault(key, []).append(way)
     return tuple(tuple(same) for same in found.values() if len(same) >= RUN)

@@ -7,6 +7,7 @@ it.  What a later issue builds is reported as N608 with its place, and the rest 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from itertools import groupby
 
@@ -15,6 +16,7 @@ from sysdyn.dsl.elaborate.elements import Pending
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.head import Body
 from sysdyn.dsl.elaborate.instances import Instances
+from sysdyn.dsl.elaborate.moulds import Likeness, law_of_cast, required_of
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
@@ -75,22 +77,22 @@ class Elaborator(Instances):
         self._said(syntax.Law, self.law)
         for _, group in groupby(self.pending, key=lambda pending: id(pending.space)):
             own = list(group)
-            with self.entering(own[0].space):
+            with nullcontext() if isinstance(own[0].space, Likeness) else self.entering(own[0].space):
                 for pending in own:
-                    self._resolve(pending)
+                    self.settle_law(pending)
         for space, _ in self.bodies:
             if space.ends.keys() - space.laws.keys():
                 with self.entering(space):
                     self.lawless(space)
 
-    def _resolve(self, pending: Pending) -> None:
+    def settle_law(self, pending: Pending) -> None:
         """A law; one that reads a constraint waits for it."""
         try:
             pending.resolve()
         except SeveralError as several:
             self.resolver.spread(several, pending.span)
         except NotYetError as early:
-            self.postpone(early, partial(self._resolve, pending))
+            self.postpone(early, partial(self.settle_law, pending))
         except Failed:
             return
 
@@ -100,6 +102,9 @@ class Elaborator(Instances):
         self._said(syntax.Constraint, self.constraint)
         self.postponed()
         for space, body in self.bodies:
+            if isinstance(space, Likeness):
+                required_of(self, space, body)
+                continue
             kinds = {type(s) for s, _ in body.of(_STATED)}
             if not kinds and all(type(s) is not Definition for s in space.scope.symbols.values()):
                 continue
@@ -112,7 +117,10 @@ class Elaborator(Instances):
     def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
         """Carry out all statements of a kind, in the bodies where they stand."""
         for space, body in self.bodies:
-            if chosen := body.of(kind):
+            chosen = body.of(kind)
+            if chosen and isinstance(space, Likeness):
+                self.pending.append(Pending(space, space.mould.law.span, partial(law_of_cast, self, space)))
+            elif chosen:
                 with self.entering(space):
                     self.each(chosen, do)
 

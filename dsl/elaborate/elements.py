@@ -132,12 +132,12 @@ class Elements(Connections):
                 law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             self.parts.branches.append(
-                self._branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))
+                self.branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))
             )
 
         self.pending.append(Pending(self.current, span, resolve))
 
-    def _branch(
+    def branch(
         self,
         symbol: BranchSymbol,
         at: tuple[Node, ...],
@@ -146,7 +146,7 @@ class Elements(Connections):
         ends: Ends,
         place: Place,
     ) -> Branch:
-        """The branch as the compiler receives it."""
+        """A branch as the compiler receives it; law: its kind, its side, the law."""
         kind, side, node = law
         name = symbol.family.name
         if ends.on is not None:
@@ -176,7 +176,7 @@ class Elements(Connections):
                 ratio = ratio_of(self.resolver, branches, whole, kind, side, value, span)
             place = self.place(s.span)
             for symbol, end in zip(branches, ends, strict=True):
-                self.parts.branches.append(self._branch(symbol, whole, loops, ("port", None, None), end, place))
+                self.parts.branches.append(self.branch(symbol, whole, loops, ("port", None, None), end, place))
             first, second = (b.family.name for b in branches)
             self.parts.couplings.append(
                 Coupling(ratio.kind, first, second, whole, loops, ratio.side, ratio.ratio, place)
@@ -221,7 +221,7 @@ class Elements(Connections):
                 continue
             where = self.place(symbol.place.span)
             self.parts.branches.append(
-                self._branch(symbol, space.prefix, space.loops, ("field", None, None), ends, where)
+                self.branch(symbol, space.prefix, space.loops, ("field", None, None), ends, where)
             )
 
 

@@ -15,6 +15,7 @@ from sysdyn.dsl.elaborate.elements import Elements
 from sysdyn.dsl.elaborate.files import FileScope, exported
 from sysdyn.dsl.elaborate.head import Body, Interface
 from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
+from sysdyn.dsl.elaborate.moulds import Moulds
 from sysdyn.dsl.elaborate.parameters import Argument
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
@@ -62,6 +63,7 @@ class Instances(Elements):
         self.choices: dict[str, LevelChoice] = {}
         self.levels: dict[str, tuple[str, Place]] = {}  # by path: a scene's and the command line's
         self._waiting: dict[int, list[Callable[[], None]]] = {}  # instances not yet elaborated, by their symbol
+        self._moulds = Moulds()
         self._insides: dict[tuple[int, str | None], tuple[ComponentSymbol, Body]] = {}  # by component and level
         self.resolver.awaken = self._awaken
 
@@ -117,8 +119,14 @@ class Instances(Elements):
             if done:
                 return
             done.append(True)
+            body = None if loops else self._moulds.body(self, component, s)
+            if body is not None and here is self.current and self._moulds.cast(self, symbol, s, component, body):
+                return
+            said = len(self.report)
             with self.entering(here):
                 self.each([(s, loops)], lambda statement: self._component(symbol, statement, component))
+            if body is not None and said == len(self.report):
+                self._moulds.keep(self, symbol, s, body, here)
 
         self._waiting.setdefault(id(symbol), []).append(elaborate)
         return elaborate
@@ -152,9 +160,9 @@ class Instances(Elements):
         )
         level, body = choose_level(self, component, s, path)
         space.level, space.elsewhere = level, elsewhere(component, level)
-        self._fill(symbol, s, component, space, self._inside(component, level, body))
+        self._fill(symbol, s, component, space, self.inside_of(component, level, body))
 
-    def _inside(self, component: ComponentSymbol, level: str | None, body: tuple[syntax.Statement, ...]) -> Body:
+    def inside_of(self, component: ComponentSymbol, level: str | None, body: tuple[syntax.Statement, ...]) -> Body:
         """The statements of a component at a level: one value for all instances."""
         key = id(component), level
         if key not in self._insides:

@@ -142,6 +142,11 @@ class ElaborationContext:
         """To be carried out in the present space, once the constraint that it reads is there."""
         self._postponed.append((self.current, early, do))
 
+    @property
+    def waiting(self) -> int:
+        """Statements that were postponed."""
+        return len(self._postponed)
+
     def postponed(self) -> None:
         """Carry out what had to wait; E105 where one waits for itself."""
         waiting = 0

@@ -183,7 +183,8 @@ class Statements(Declarations):
                 return syntax.Item(target, tuple(names), target.span)
         return target
 
-    def _require(self, s: syntax.Require) -> None:
+    def require(self, s: syntax.Require) -> None:
+        """`require condition`."""
         node = self.resolver.condition(s.condition)
         self.parts.requirements.append(Requirement(node, self.resolver.loops, self.place(s.span), s.condition))
 
@@ -223,7 +224,7 @@ STATEMENTS: dict[type, Callable[..., None]] = {
     syntax.Work: Statements._work,
     syntax.Dynamic: Statements._dynamic,
     syntax.Init: Statements.initial,
-    syntax.Require: Statements._require,
+    syntax.Require: Statements.require,
     syntax.Expect: Statements.expect,
     syntax.Golden: Statements.golden,
     syntax.When: events.when,

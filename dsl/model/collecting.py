@@ -27,9 +27,18 @@ def at_rest() -> Iterator[None]:
     try:
         yield
     finally:
-        if _keeping and gc.get_count()[0] > MANY:
-            gc.freeze()
+        if gc.get_count()[0] > MANY:
+            _grown_old()
         gc.enable()
+
+
+def _grown_old() -> None:
+    """What was made is looked through with the oldest alone, or never: not with what is young, a fifth of a check."""
+    if _keeping:
+        gc.freeze()
+    elif not gc.get_freeze_count():  # what others keep stays so
+        gc.freeze()
+        gc.unfreeze()
 
 
 def kept() -> bool:

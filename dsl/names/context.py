@@ -179,6 +179,11 @@ class Context:
         finally:
             self._bound = before
 
+    @property
+    def free(self) -> bool:
+        """Whether nothing is in sight but the scope's names."""
+        return not self._bound and not self._loops
+
     def sight(self) -> dict[str, Typed]:
         """What is bound here: to be brought into sight again later."""
         return dict(self._bound)

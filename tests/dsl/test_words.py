@@ -217,5 +217,14 @@ def test_no_garbage_is_sought_inside_and_it_is_again_behind():
     assert not collecting.kept()
 
 
+def test_what_a_long_text_becomes_is_old_at_once(monkeypatch):
+    monkeypatch.setattr(collecting, "MANY", 1000)
+    with collecting.at_rest():
+        made = [[k] for k in range(3000)]
+    assert gc.isenabled()
+    assert gc.get_freeze_count() == 0
+    assert {id(item) for item in made} <= {id(item) for item in gc.get_objects(generation=2)}
+
+
 def test_remedies_are_of_codes_that_there_are():
     assert set(REMEDIES) <= set(codes())

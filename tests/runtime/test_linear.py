@@ -6,7 +6,7 @@ from scipy.sparse import csc_array, diags_array, eye_array, kron, random_array
 from scipy.sparse.linalg import splu
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.patterns import Pattern
-from sysdyn.runtime.numerics.ordering import DENSE, Order, any_order, column_order, least_degree, with_pairs
+from sysdyn.runtime.numerics.ordering import DENSE, NET, Order, any_order, column_order, least_degree, with_pairs
 
 
 class Solver:
@@ -155,6 +155,59 @@ def test_least_degree_fills_little_more_than_the_library(n):
     own = splu(csc_array(band[:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.1)
     other = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1)
     assert own.L.nnz + own.U.nnz <= 1.1 * (other.L.nnz + other.U.nnz)
+
+
+def expander(n, seed, kind):
+    """A net with branches drawn at random: behind a sparse beginning its factors are dense; rows of no symmetry."""
+    rng = np.random.default_rng(seed)
+    ends = rng.integers(0, n, (2, 2 * n))
+    ends = ends[:, ends[0] != ends[1]]
+    values = rng.uniform(0.5, 1.0, (2, ends.shape[1]))
+    if kind is complex:
+        values = values + 0.3j * rng.normal(size=values.shape)
+    rows, columns = np.hstack([ends, ends[::-1]])
+    matrix = csc_array((-values.ravel(), (rows, columns)), shape=(n, n))
+    matrix = csc_array(matrix + diags_array(6.0 + rng.random(n)))
+    matrix.sort_indices()
+    return matrix
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+@pytest.mark.parametrize("paired", [False, True])
+def test_columns_that_fill_alike_are_applied_together(kind, paired):
+    n = NET + 300 if paired else 700
+    matrix = expander(n, 3, kind)
+    rng = np.random.default_rng(0)
+    pattern = Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
+    order = with_pairs(pattern, any_order(pattern), np.arange(n, dtype=np.int32))
+    assert order.paired == paired
+    linear = order.complex_linear(pattern) if kind is complex else order.linear(pattern)
+    letter = "z_" if kind is complex else ""
+    factor, solve, free = (getattr(lib.core, f"sd_linear_{letter}{name}") for name in ("factor", "solve", "free"))
+    try:
+        for change in (0.0, 0.2, 0.0):
+            values = np.ascontiguousarray(matrix.data * (1.0 + change * rng.random(matrix.data.size)))
+            assert factor(linear, lib.pointer(values), lib.pointer(np.ones(n))) == 0
+            side = rng.normal(size=n).astype(kind)
+            found = side.copy()
+            solve(linear, lib.pointer(found))
+            there = csc_array((values, matrix.indices, matrix.indptr), shape=(n, n)) @ found
+            assert np.abs(there - side).max() < 1e-13 * np.abs(values).max() * n
+    finally:
+        free(linear)
+
+
+@pytest.mark.parametrize("equal", [3, 300])
+def test_a_dense_rest_without_a_pivot_names_its_place(equal):
+    n = 700
+    matrix = expander(n, 3, float).tolil()
+    matrix[equal] = matrix[equal + 1]
+    solver = Solver(matrix.tocsc())
+    if solver.factor(csc_array(matrix).data) == 0:  # round-off
+        assert solver.linear.contents.smallest < 1e-12
+    else:
+        assert 0 <= solver.linear.contents.bad_row < n
+        assert 0 <= solver.linear.contents.bad_column < n
 
 
 def replayed(matrix, *, machine=True):

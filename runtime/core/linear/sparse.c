@@ -1,5 +1,7 @@
 /* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
 #include "linear/sparse.h"
+#include "linear/blocks.h"
+#include "linear/dense_rest.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -33,7 +35,7 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order)
     size_t m = (size_t)n, all = (size_t)rows;
     lu->n = n;
     lu->rows = rows;
-    lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
+    lu->order = calloc(3 * m + all + 2, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
     lu->inverse = calloc(m + (m > all ? m : all) + 1, sizeof(sd_number));
     if (!lu->order || !lu->l_start || !lu->inverse) {
@@ -41,14 +43,21 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order)
         return NULL;
     }
     lu->source = lu->order + m;
-    lu->place = lu->source + m;
+    lu->first = lu->source + m;
+    lu->place = lu->first + m + 1;
     lu->u_start = lu->l_start + m + 1;
     lu->x = lu->inverse + m;
     memcpy(lu->order, order, m * sizeof *order);
     return lu;
 }
 
-/* rows reached from column c through the columns of L found so far: stack[top..n) in the order of elimination */
+/* where the rows that a position leads to end: in a block the first leads to all others */
+static inline int32_t last_ahead(const sd_sparse *lu, int32_t k)
+{
+    return lu->first[k + 1] == lu->first[k] ? lu->l_start[k] + 1 : lu->l_start[k + 1];
+}
+
+/* rows reached from column c through the columns of L found so far: stack[top..n) */
 static int32_t reach(sd_sparse *lu, const int32_t *column, const int32_t *row, int32_t c, int32_t stamp)
 {
     int32_t top = lu->rows;
@@ -61,7 +70,7 @@ static int32_t reach(sd_sparse *lu, const int32_t *column, const int32_t *row, i
         lu->head[0] = lu->place[row[e]] < 0 ? 0 : lu->l_start[lu->place[row[e]]];
         while (depth >= 0) {
             int32_t here = lu->stack[depth], k = lu->place[here], down = -1;
-            int32_t last = k < 0 ? 0 : lu->l_start[k + 1];
+            int32_t last = k < 0 ? 0 : last_ahead(lu, k);
             for (int32_t p = lu->head[depth]; k >= 0 && p < last; p++) {
                 if (lu->mark[lu->l_row[p]] != stamp) {
                     down = lu->l_row[p];
@@ -153,6 +162,89 @@ static void fit(int64_t taken, int64_t *room, int32_t **rows, sd_number **values
     *room = (int64_t)kept;
 }
 
+/* x := column c, eliminated with the finished columns behind nu entries of U; how many these are, the rows are stack[top..) */
+static int32_t reduce(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t c,
+                      int32_t stamp, int64_t nu, int32_t *top)
+{
+    int32_t reached = 0;
+    *top = reach(lu, column, row, c, stamp);
+    for (int32_t e = column[c]; e < column[c + 1]; e++)
+        lu->x[row[e]] += value[e];
+    for (int32_t i = *top; i < lu->rows; i++) {
+        int32_t j = lu->place[lu->stack[i]];
+        if (j >= 0)
+            lu->u_row[nu + reached++] = j;
+    }
+    ascend(reached, lu->u_row + nu, lu->among);
+    apply_columns(lu, reached, lu->u_row + nu, lu->source, lu->u_value + nu, lu->x, lu->block);
+    return reached;
+}
+
+/* all from the k-th column on, behind nl and nu entries of the factors: 0 done, 1 singular, 2 memory */
+static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
+                          int64_t nl, int64_t nu, double threshold)
+{
+    int32_t n = lu->n, m = n - k, failed = 0;
+    sd_number *rest = calloc((size_t)m * (size_t)m, sizeof *rest);
+    int32_t *own = malloc(((size_t)m + (size_t)n) * sizeof *own), *at = own ? own + m : NULL;
+    if (!rest || !own || grow(nl + (int64_t)m * (m - 1) / 2, &lu->l_room, &lu->l_row, &lu->l_value))
+        failed = 2;
+    for (int32_t r = 0, i = 0; r < n && !failed; r++)
+        if (lu->place[r] < 0) {
+            own[i] = r;
+            at[r] = i++;
+        }
+    lu->l_start[k] = (int32_t)nl;
+    for (int32_t i = 0; i < m && !failed; i++) {
+        int32_t c = lu->order[k + i];
+        lu->u_start[k + i] = (int32_t)nu;
+        if (grow(nu + k + i, &lu->u_room, &lu->u_row, &lu->u_value)) {
+            failed = 2;
+            break;
+        }
+        int32_t top = 0, reached = reduce(lu, column, row, value, c, k + i, nu, &top);
+        for (int32_t p = top; p < n; p++) {
+            int32_t r = lu->stack[p];
+            if (lu->place[r] < 0)
+                rest[(size_t)i * m + at[r]] = lu->x[r];
+            lu->x[r] = 0.0;
+        }
+        nu += reached;
+        for (int32_t p = 0; p < i; p++)
+            lu->u_row[nu++] = k + p;
+        nl += m - i - 1;
+        lu->l_start[k + i + 1] = (int32_t)nl;
+        lu->u_start[k + i + 1] = (int32_t)nu;
+    }
+    if (!failed)
+        failed = factor_rest(lu, column, value, k, m, rest, own, at, threshold);
+    for (int32_t i = 0; i < m && !failed; i++) {
+        lu->first[k + i] = k;
+        memcpy(lu->l_row + lu->l_start[k + i], own + i + 1, (size_t)(m - i - 1) * sizeof *own);
+    }
+    free(rest);
+    free(own);
+    return failed;
+}
+
+/* in the numbers of the pivots, without rows that have none */
+static void number_rows(sd_sparse *lu)
+{
+    int64_t kept = 0, p = 0;
+    for (int32_t r = 0; r < lu->rows && lu->rows > lu->rank; r++)
+        if (lu->place[r] < 0)
+            lu->place[r] = lu->n;
+    for (int32_t k = 0; k < lu->n; k++) {
+        for (; p < lu->l_start[k + 1]; p++) {
+            lu->l_row[kept] = lu->place[lu->l_row[p]];
+            lu->l_value[kept] = lu->l_value[p];
+            kept += lu->l_row[kept] < lu->n;
+        }
+        lu->l_start[k + 1] = (int32_t)kept;
+    }
+    lu->pivoted = 1;
+}
+
 /* with room for the search */
 static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
@@ -166,34 +258,28 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         lu->mark[i] = -1;
         lu->x[i] = 0.0;
     }
+    for (int32_t k = 0; k <= n; k++)
+        lu->first[k] = -1;
     for (int32_t k = 0; k < n; k++) {
         int32_t c = lu->order[k];
         if (lu->most > 0 && nl + nu > lu->most) {
             leave(lu);
             return 3;
         }
+        if (dense_from(lu, k, nl + nu)) {
+            int failed = eliminate_rest(lu, column, row, value, k, nl, nu, THRESHOLD);
+            if (!failed)
+                number_rows(lu);
+            return failed;
+        }
         int32_t pivots = k - (n - lu->rank); /* columns that were left out have taken no row */
         if (grow(nl + rows - pivots, &lu->l_room, &lu->l_row, &lu->l_value) || grow(nu + k, &lu->u_room, &lu->u_row, &lu->u_value))
             return 2;
         lu->l_start[k] = (int32_t)nl;
         lu->u_start[k] = (int32_t)nu;
-        int32_t top = reach(lu, column, row, c, k);
-        double size = 0.0;
-        for (int32_t e = column[c]; e < column[c + 1]; e++) {
-            lu->x[row[e]] += value[e];
-            size = fmax(size, sd_size(value[e]));
-        }
-        /* eliminate with the finished columns, in order */
-        for (int32_t i = top; i < rows; i++) {
-            int32_t r = lu->stack[i], j = lu->place[r];
-            if (j < 0)
-                continue;
-            sd_number u = lu->x[r];
-            lu->u_row[nu] = j;
-            lu->u_value[nu++] = u;
-            for (int32_t p = lu->l_start[j]; p < lu->l_start[j + 1]; p++)
-                lu->x[lu->l_row[p]] -= lu->l_value[p] * u;
-        }
+        int32_t top = 0, reached = reduce(lu, column, row, value, c, k, nu, &top);
+        double size = column_size(column, value, c);
+        nu += reached;
         double largest;
         int32_t pivot = choose(lu, c, top, &largest);
         double relative = size > 0.0 ? largest / size : 0.0;
@@ -203,6 +289,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
                 lu->x[lu->stack[i]] = 0.0;
             nu = lu->u_start[k];
             lu->source[k] = -1;
+            lu->first[k] = k;
             lu->inverse[k] = 0.0;
             lu->l_start[k + 1] = (int32_t)nl;
             lu->u_start[k + 1] = (int32_t)nu;
@@ -224,9 +311,17 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         lu->inverse[k] = inverse;
         lu->place[pivot] = k;
         lu->source[k] = pivot;
+        int32_t block = lu->first[k] = block_of(lu, k, rows - top - reached - 1);
+        if (block < k) {
+            align(lu, block, k, pivot);
+            for (int32_t l = lu->l_start[k - 1] + 1; l < lu->l_start[k]; l++) {
+                lu->l_row[nl] = lu->l_row[l];
+                lu->l_value[nl++] = lu->x[lu->l_row[l]] * inverse;
+            }
+        }
         for (int32_t i = top; i < rows; i++) {
             int32_t r = lu->stack[i];
-            if (lu->place[r] < 0 && (lu->dropped == 0.0 || sd_size(lu->x[r] * inverse) > lu->dropped)) {
+            if (block == k && lu->place[r] < 0 && (lu->dropped == 0.0 || sd_size(lu->x[r] * inverse) > lu->dropped)) {
                 lu->l_row[nl] = r;
                 lu->l_value[nl++] = lu->x[r] * inverse;
             }
@@ -235,28 +330,29 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
         lu->l_start[k + 1] = (int32_t)nl;
         lu->u_start[k + 1] = (int32_t)nu;
     }
-    for (int32_t r = 0; r < rows && rows > lu->rank; r++)
-        if (lu->place[r] < 0)
-            lu->place[r] = n;
-    int64_t kept = 0, p = 0;
-    for (int32_t k = 0; k < n; k++) { /* in the numbers of the pivots, without rows that have none */
-        for (; p < lu->l_start[k + 1]; p++) {
-            lu->l_row[kept] = lu->place[lu->l_row[p]];
-            lu->l_value[kept] = lu->l_value[p];
-            kept += lu->l_row[kept] < n;
-        }
-        lu->l_start[k + 1] = (int32_t)kept;
-    }
-    lu->pivoted = 1;
+    number_rows(lu);
     return 0;
+}
+
+/* lets go of what pivoting alone needs */
+static void leave_search(sd_sparse *lu)
+{
+    free(lu->stack), free(lu->block), free(lu->among);
+    lu->stack = lu->head = lu->mark = lu->count = NULL;
+    lu->block = NULL;
+    lu->among = NULL;
 }
 
 int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
     size_t rows = (size_t)lu->rows;
     lu->stack = calloc(4 * rows + 1, sizeof(int32_t)); /* of a large one the room counts: it is not kept */
-    if (!lu->stack)
+    lu->block = malloc((rows + 1) * sizeof(sd_number));
+    lu->among = calloc((size_t)lu->n / 64 + 1, sizeof(uint64_t));
+    if (!lu->stack || !lu->block || !lu->among) {
+        leave_search(lu);
         return 2;
+    }
     lu->head = lu->stack + rows;
     lu->mark = lu->head + rows;
     lu->count = lu->mark + rows;
@@ -267,22 +363,16 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
         fit(lu->l_start[lu->n], &lu->l_room, &lu->l_row, &lu->l_value);
         fit(lu->u_start[lu->n], &lu->u_room, &lu->u_row, &lu->u_value);
     }
-    free(lu->stack);
-    lu->stack = lu->head = lu->mark = lu->count = NULL;
+    lu->widest = failed ? 0 : widest_block(lu);
+    leave_search(lu);
     return failed;
-}
-
-static double column_size(const int32_t *column, const sd_number *value, int32_t c)
-{
-    double size = 0.0;
-    for (int32_t e = column[c]; e < column[c + 1]; e++)
-        size = fmax(size, sd_size(value[e]));
-    return size;
 }
 
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
-    sd_number *x = lu->x;
+    sd_number *x = lu->x, *block = lu->widest ? malloc((size_t)lu->widest * sizeof *block) : NULL;
+    if (lu->widest && !block)
+        return 1;
     lu->smallest = 1.0;
     for (int32_t k = 0; k < lu->n; k++) {
         int32_t c = lu->order[k];
@@ -290,14 +380,8 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
             continue;
         for (int32_t e = column[c]; e < column[c + 1]; e++)
             x[lu->place[row[e]]] += value[e];
-        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++) {
-            int32_t j = lu->u_row[p];
-            sd_number u = x[j];
-            x[j] = 0.0;
-            lu->u_value[p] = u;
-            for (int32_t l = lu->l_start[j]; l < lu->l_start[j + 1]; l++)
-                x[lu->l_row[l]] -= lu->l_value[l] * u;
-        }
+        int32_t from = lu->u_start[k];
+        apply_columns(lu, lu->u_start[k + 1] - from, lu->u_row + from, NULL, lu->u_value + from, x, block);
         sd_number diagonal = x[k], inverse = 1.0 / diagonal;
         double largest = sd_size(diagonal);
         x[k] = 0.0;
@@ -315,10 +399,12 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
         if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
             memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);
             lu->pivoted = 0;
+            free(block);
             return 1;
         }
     }
     x[lu->n] = 0.0;
+    free(block);
     return 0;
 }
 

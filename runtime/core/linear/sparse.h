@@ -14,11 +14,15 @@ typedef struct sd_sparse {
     int32_t *order;              /* [n] column of the matrix that is eliminated k-th */
     int32_t *place, *source;     /* [rows] row -> pivot position, n where it has none; [n] pivot position -> row,
                                     -1 of a column that was left out */
+    int32_t *first;              /* [n + 1] of the columns of L that fill alike (blocks.h): the first one */
     int32_t *l_start, *u_start;  /* [n + 1] */
     int32_t *l_row, *u_row;      /* pivot positions; u in the order of elimination, diagonal apart */
     sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
     int64_t l_room, u_room;
     int32_t *stack, *head, *mark, *count; /* [rows] search, while pivots are chosen */
+    sd_number *block;            /* [rows + 1] what a block touches, while pivots are chosen */
+    uint64_t *among;             /* bits of n positions, likewise */
+    int32_t widest;              /* numbers that the widest block touches; 0: there is none */
     sd_number *x;                /* [the larger of n and rows, + 1] */
     int pivoted;                 /* a valid pattern exists */
     int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T */

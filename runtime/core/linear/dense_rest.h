@@ -1,0 +1,102 @@
+/* The rest of an elimination once it is dense: by columns in panels, so that a panel stays near while all behind it take it.
+ *
+ * What stands before it has been applied to all its columns; they become one block of L (blocks.h). */
+#ifndef SYSDYN_DENSE_REST_H
+#define SYSDYN_DENSE_REST_H
+
+#include "linear/blocks.h"
+
+#include <math.h>
+
+#define PANEL 32        /* columns that are applied to all behind them together */
+#define REST_LEAST 64   /* columns of a rest that is worth it */
+#define REST_MOST 4096  /* and those whose numbers have room */
+#define REST_FILLED 0.8 /* of the rest that the last column before it reaches: so dense it is */
+
+/* whether all from the k-th column on may be taken as dense, with so many entries of factors before */
+static int dense_from(const sd_sparse *lu, int32_t k, int64_t entries)
+{
+    int64_t m = lu->n - k;
+    if (k == 0 || m < REST_LEAST || m > REST_MOST || lu->rows != lu->n || lu->rank != lu->n)
+        return 0;
+    if (lu->idle || lu->null_pivot != 0.0 || lu->dropped != 0.0 || (lu->most > 0 && entries + m * m > lu->most))
+        return 0;
+    return lu->l_start[k] - lu->l_start[k - 1] >= REST_FILLED * (double)m;
+}
+
+/* where a column pivots: i itself if its own row will do, which stands at `own`, else where its entry is largest; -1: nowhere */
+static int32_t rest_pivot(const sd_number *w, int32_t i, int32_t m, int32_t own, double threshold, double *largest)
+{
+    int32_t best = -1;
+    *largest = 0.0;
+    for (int32_t p = i; p < m; p++)
+        if (sd_size(w[p]) > *largest) {
+            *largest = sd_size(w[p]);
+            best = p;
+        }
+    return best >= 0 && own >= i && sd_size(w[own]) >= threshold * *largest ? own : best;
+}
+
+static void swap(sd_number *one, sd_number *other)
+{
+    sd_number value = *one;
+    *one = *other;
+    *other = value;
+}
+
+/* the rows at i and at `best` change places in the columns of L before, from the k-th on, and in those from i on in `rest` */
+static void exchange(sd_sparse *lu, int32_t k, int32_t i, int32_t best, int32_t m, sd_number *rest, int32_t *row, int32_t *at)
+{
+    if (best == i)
+        return;
+    for (int32_t j = 0; j < i; j++)
+        swap(lu->l_value + lu->l_start[k + j] + i - j - 1, lu->l_value + lu->l_start[k + j] + best - j - 1);
+    for (int32_t j = i; j < m; j++)
+        swap(rest + (size_t)j * m + i, rest + (size_t)j * m + best);
+    int32_t r = row[i];
+    row[i] = row[best];
+    row[best] = r;
+    at[row[i]] = i;
+    at[r] = best;
+}
+
+/* the columns of the rest [m, m], the first of them the k-th, as factors; row [m], at [rows]: which row stands where */
+static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, int32_t m, sd_number *rest,
+                       int32_t *row, int32_t *at, double threshold)
+{
+    for (int32_t from = 0; from < m; from += PANEL) {
+        int32_t to = from + PANEL < m ? from + PANEL : m;
+        for (int32_t i = from; i < to; i++) {
+            sd_number *w = rest + (size_t)i * m;
+            int32_t c = lu->order[k + i], own = lu->own ? lu->own[c] : c;
+            lessen_block(lu, k + from, i - from, m - from - 1, w + from);
+            double size = column_size(column, value, c), largest;
+            int32_t best = rest_pivot(w, i, m, lu->paired && lu->place[own] < 0 ? at[own] : -1, threshold, &largest);
+            double relative = size > 0.0 ? largest / size : 0.0;
+            if (relative < lu->smallest) {
+                lu->smallest = relative;
+                lu->bad_column = c;
+                lu->bad_row = row[best < 0 ? i : best];
+            }
+            if (best < 0 || !isfinite(largest)) {
+                lu->bad_column = c;
+                lu->bad_row = row[best < 0 ? i : best];
+                return 1;
+            }
+            exchange(lu, k, i, best, m, rest, row, at);
+            sd_number inverse = lu->inverse[k + i] = 1.0 / w[i], *l = lu->l_value + lu->l_start[k + i];
+            lu->place[row[i]] = k + i;
+            lu->source[k + i] = row[i];
+            for (int32_t p = i + 1; p < m; p++)
+                l[p - i - 1] = w[p] * inverse;
+            sd_number *u = lu->u_value + lu->u_start[k + i + 1] - i;
+            for (int32_t p = 0; p < i; p++)
+                u[p] = w[p];
+        }
+        for (int32_t j = to; j < m; j++)
+            lessen_block(lu, k + from, to - from, m - from - 1, rest + (size_t)j * m + from);
+    }
+    return 0;
+}
+
+#endif
