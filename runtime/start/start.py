@@ -207,7 +207,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     found, holds = Solution(x, np.inf, np.zeros(0)), False
     if not _beyond(starter, t, x, follows):
         found, holds = _rescaled(starter, t, x, guess, follows, least=False)
-    if holds and found.residual <= CLOSED:
+    if holds and min(found.residual, _own(starter, t, found.x, found.x)) <= CLOSED:
         return found, holds
     best, also = _rescaled(starter, t, x, guess, free)
     return (best, also) if also >= holds else (found, holds)
