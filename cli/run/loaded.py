@@ -23,7 +23,7 @@ from sysdyn.compiler.binding.again import Way, again
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.many.batch import ROWS, NotApplicableError
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
@@ -128,7 +128,8 @@ class Loaded:
         self.target: Target = target
         self._compiled: dict[tuple[tuple[str, str], ...], Compiled] = {}
         self.first = self._text(())
-        self.parameters = {p.name: p for p in self.first.prepared.network.parameters}
+        made = self.first.prepared.network.parameters
+        self.parameters = {p.name: p for p in made if not p.name.startswith("#")}  # those are the compiler's own
         report.raise_if_failed()
 
     def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
@@ -154,6 +155,8 @@ class Loaded:
             plain = element[1] if element else name
             parameter = known.get(plain)
             number = value
+            if parameter is None and np.ndim(value):
+                raise ModelError([Diagnostic("E405", f"there is no parameter '{plain}'", None)])
             if isinstance(value, str) and parameter is not None:
                 silent = Report()
                 with ex.fresh():

@@ -102,6 +102,8 @@ def test_what_cannot_be_run_says_why(masses):
     model = load(masses)
     for settings, said in (
         ({"zz": 1.0}, "not a parameter"),
+        ({"zz": [1.0, 2.0]}, "no parameter 'zz'"),
+        ({"#branch 0": [1.0, 2.0]}, "no parameter '#branch 0'"),  # the compiler's own tables
         ({"k": "3 kg"}, "kg"),
         ({"m": [1.0, 2.0]}, "shape"),
     ):
