@@ -224,7 +224,7 @@ def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
     """From a point at which rows as written hold: rates, which follow from the rest by linear rows; where that is not
     all, everything at once.
     """
-    sized = starter.without_noise(x, starter.scale(t, x))  # what round-off left is no magnitude
+    x, sized = x.copy(), starter.without_noise(x, starter.scale(t, x))  # what round-off left is no magnitude
     x[starter.n :] = sized[starter.n :] = guess[starter.n :]
     if (x == guess)[free & ~starter.following(t, x)].all():
         rates = free & (np.arange(x.size) >= starter.n)
