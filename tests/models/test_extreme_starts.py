@@ -178,7 +178,7 @@ def test_guesses_that_hold_to_round_off_of_large_voltages_stay(formulation):
 
 
 def test_the_wall_time_binds_the_start():
-    begun = started(STAGES, "lagrangian")
+    begun = started(SERIES, "lagrangian")
     with pytest.raises(SolverFailure) as caught:
         consistent_start(begun.system, 0.0, until=time.monotonic() - 1.0)
     assert caught.value.cause == "max_wall"
