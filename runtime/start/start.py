@@ -175,8 +175,10 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
     """The solution with what follows from its state by corrections that vanish, where rows determine them: what only
     leakage ties moves by volts under rows that hold to round-off of the largest current.
     """
+    if best.x.size > SINGULAR_VALUES:
+        return best
     x, follows = best.x, free & starter.following(t, best.x)
-    for k in range(SHARPER if x.size <= SINGULAR_VALUES else 0):
+    for k in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=starter.every, free=follows)
         near = corrected(problem, x)
         if near is None or starter.work.done:
@@ -207,7 +209,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     found, holds = Solution(x, np.inf, np.zeros(0)), False
     if not _beyond(starter, t, x, follows):
         found, holds = _rescaled(starter, t, x, guess, follows, least=False)
-    if holds and min(found.residual, _own(starter, t, found.x, found.x)) <= CLOSED:
+    if holds and (found.residual <= CLOSED or _own(starter, t, found.x, found.x) <= CLOSED):
         return found, holds
     best, also = _rescaled(starter, t, x, guess, free)
     return (best, also) if also >= holds else (found, holds)

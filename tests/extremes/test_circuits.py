@@ -105,7 +105,7 @@ def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
     made = rectifiers.rectifier(seed)
     potentials = rectifiers.at_the_start(made)
     if potentials is None:
-        pytest.skip("the reference finds no potentials either")
+        pytest.skip("no reference: its iteration does not end (8 of 60)")
     for formulation in FORMULATIONS[:2]:
         run = ran(tmp_path, made.text(1e-4, 1e-4 / made.frequency), formulation=formulation)
         assert not run.refused

@@ -182,7 +182,7 @@ static int32_t reduce(sd_sparse *lu, const int32_t *column, const int32_t *row, 
 
 /* all from the k-th column on, behind nl and nu entries of the factors: 0 done, 1 singular, 2 memory */
 static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
-                          int64_t nl, int64_t nu, double threshold)
+                          int64_t nl, int64_t nu)
 {
     int32_t n = lu->n, m = n - k, failed = 0;
     sd_number *rest = calloc((size_t)m * (size_t)m, sizeof *rest);
@@ -217,7 +217,7 @@ static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *r
         lu->u_start[k + i + 1] = (int32_t)nu;
     }
     if (!failed)
-        failed = factor_rest(lu, column, value, k, m, rest, own, at, threshold);
+        failed = factor_rest(lu, column, value, k, m, rest, own, at, THRESHOLD);
     for (int32_t i = 0; i < m && !failed; i++) {
         lu->first[k + i] = k;
         memcpy(lu->l_row + lu->l_start[k + i], own + i + 1, (size_t)(m - i - 1) * sizeof *own);
@@ -267,7 +267,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
             return 3;
         }
         if (dense_from(lu, k, nl + nu)) {
-            int failed = eliminate_rest(lu, column, row, value, k, nl, nu, THRESHOLD);
+            int failed = eliminate_rest(lu, column, row, value, k, nl, nu);
             if (!failed)
                 number_rows(lu);
             return failed;
