@@ -170,6 +170,7 @@ class Stepper(c.Structure):
         ("collocated", _I),
         ("show", _P),
         ("values", _P),
+        ("onto", _P),
     ]
 
 
@@ -346,7 +347,7 @@ class Dopri(c.Structure):
         *[(name, _P) for name in ["phi", "yd"]],
         *[(name, _P * DOPRI_STAGES) for name in ["y", "rate"]],
         ("f", _P * DOPRI_DENSE),
-        *[(name, _P) for name in ["ee", "weight", "memory"]],
+        *[(name, _P) for name in ["ee", "weight", "moved", "moved_d", "memory"]],
         *[(name, _L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
         *[(name, _I) for name in ["cause", "bad_row", "bad_column"]],
         ("stepper", Stepper),

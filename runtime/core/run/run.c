@@ -180,6 +180,22 @@ static int integrate(sd_run *run, double to)
     return !run->sampled;
 }
 
+/* The point moved onto the equations: by what the method has at hand, where that does.  The end of a step may be there. */
+static void settle_point(sd_run *run, double t)
+{
+    sd_settle *settle = run->settle;
+    const sd_stepper *stepper = run->stepper;
+    double moved = 0.0;
+    int at_hand = stepper->onto && !run->fresh;
+    if (at_hand && t == *stepper->t && sd_settle_holds(settle, t, run->point, run->point_d))
+        settle->drift = settle->constraints;
+    else if (at_hand && !stepper->onto(stepper->self, t, run->point, run->point_d, &moved)
+             && sd_settle_holds(settle, t, run->point, run->point_d))
+        settle->drift = moved;
+    else
+        sd_settle_point(settle, t, run->point, run->point_d);
+}
+
 /* The same where an event ends the step at `to`: Gauss's rule of degree 5, after many nodes 9, on settled points.  Within
  * a step the stages of what follows from constraints alone (the current of a source) are of lower order than their sum
  * over it. */
@@ -197,7 +213,7 @@ static void integrate_cut(sd_run *run, double to)
     for (int k = 0; k < (high ? 5 : 3) && run->audit && half > 0.0; k++) {
         double t = middle + node[high][k] * half;
         run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-        sd_settle_point(run->settle, t, run->point, run->point_d);
+        settle_point(run, t);
         powers(run, t, run->point, run->point_d);
         weigh(run, half * weight[high][k]);
     }
@@ -227,7 +243,7 @@ static void emit_compared(sd_run *run, double *row)
     memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
 }
 
-/* The point moved onto the equations; where only runs are compared by it, roughly, or not where states alone are seen. */
+/* The point of a row moved there; where only runs are compared by it, roughly, or not where states alone are seen. */
 static void settle_row(sd_run *run, double t, int32_t kind)
 {
     if (kind == SD_COMPARED && run->bare)
@@ -235,7 +251,7 @@ static void settle_row(sd_run *run, double t, int32_t kind)
     double enough = run->settle->enough;
     if (kind == SD_COMPARED)
         run->settle->enough = fmax(enough, run->rough);
-    sd_settle_point(run->settle, t, run->point, run->point_d);
+    settle_point(run, t);
     run->settle->enough = enough;
 }
 
@@ -424,7 +440,7 @@ void sd_run_observe(sd_run *run, double t, double *values)
 {
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
     if (run->settle)
-        sd_settle_point(run->settle, t, run->point, run->point_d);
+        settle_point(run, t);
     memset(values, 0, (size_t)run->observed * sizeof *values);
     run->observe->rows(&run->observe->frame, t, run->point, run->point_d, values);
 }

@@ -35,6 +35,11 @@ static void dense(const void *dopri, double t, double *y, double *yd)
     sd_dopri_dense((sd_dopri *)dopri, t, y, yd); /* the interpolant is made when it is first asked for */
 }
 
+static int onto(void *dopri, double t, double *y, double *yd, double *moved)
+{
+    return sd_dopri_onto(dopri, t, y, yd, moved);
+}
+
 static void start(void *dopri, double t, const double *y, const double *yd, double h)
 {
     sd_dopri_start(dopri, t, y, yd, h);
@@ -46,13 +51,14 @@ sd_dopri *sd_dopri_new(sd_system *system, sd_underlying *underlying)
     if (!dopri)
         return NULL;
     size_t m = (size_t)system->unknowns + 1;
-    dopri->memory = calloc((4 + 2 * SD_DOPRI_ALL + SD_DOPRI_DENSE) * m, sizeof(double));
+    dopri->memory = calloc((6 + 2 * SD_DOPRI_ALL + SD_DOPRI_DENSE) * m, sizeof(double));
     if (!dopri->memory) {
         free(dopri);
         return NULL;
     }
-    double *next = dopri->memory, **vectors[] = {&dopri->phi, &dopri->yd, &dopri->ee, &dopri->weight};
-    for (int i = 0; i < 4; i++, next += m)
+    double *next = dopri->memory;
+    double **vectors[] = {&dopri->phi, &dopri->yd, &dopri->ee, &dopri->weight, &dopri->moved, &dopri->moved_d};
+    for (int i = 0; i < 6; i++, next += m)
         *vectors[i] = next;
     for (int i = 0; i < SD_DOPRI_ALL; i++, next += 2 * m) {
         dopri->y[i] = next;
@@ -63,10 +69,11 @@ sd_dopri *sd_dopri_new(sd_system *system, sd_underlying *underlying)
     dopri->system = system;
     dopri->underlying = underlying;
     dopri->n = system->unknowns;
-    dopri->stepper =
-        (sd_stepper){dopri,         system,          dopri->n, &dopri->t, &dopri->t_end, dopri->phi,
-                     dopri->yd,     &dopri->taken,   step,     dense,     NULL,          start,
-                     SD_DOPRI_STAGES, sd_dopri_c,    sd_dopri_a[SD_DOPRI_STAGES], dopri->y, dopri->rate};
+    dopri->stepper = (sd_stepper){
+        .self = dopri, .system = system, .n = dopri->n, .t = &dopri->t, .t_end = &dopri->t_end, .y = dopri->phi,
+        .yd = dopri->yd, .taken = &dopri->taken, .step = step, .dense = dense, .start = start, .onto = onto,
+        .nodes = SD_DOPRI_STAGES, .node = sd_dopri_c, .node_weight = sd_dopri_a[SD_DOPRI_STAGES], .node_y = dopri->y,
+        .node_yd = dopri->rate};
     return dopri;
 }
 

@@ -39,7 +39,7 @@ typedef struct sd_dopri {
     double *phi, *yd;         /* [n] the last accepted point */
     double *y[SD_DOPRI_ALL], *rate[SD_DOPRI_ALL]; /* [n] stages of the last step: point, slopes; y[0]: its start */
     double *f[SD_DOPRI_DENSE]; /* [n] the interpolant */
-    double *ee, *weight, *memory;
+    double *ee, *weight, *moved, *moved_d, *memory;
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, taken;
     int32_t cause, bad_row, bad_column;
@@ -53,5 +53,7 @@ void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd
 int sd_dopri_step(sd_dopri *dopri);
 /* dopri_dense.c: y, yd [n] at any t within the last step */
 void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd);
+/* those values projected onto every constraint, with the slopes there; as `onto` of stepper.h */
+int sd_dopri_onto(sd_dopri *dopri, double t, double *y, double *yd, double *moved);
 
 #endif

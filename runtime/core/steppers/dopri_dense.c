@@ -87,3 +87,22 @@ void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd)
         yd[i] = integral ? turn / (dopri->h_used * dopri->h_used) : d;
     }
 }
+
+int sd_dopri_onto(sd_dopri *dopri, double t, double *y, double *yd, double *moved)
+{
+    sd_underlying *u = dopri->underlying;
+    size_t size = (size_t)dopri->n * sizeof *y;
+    double drift = u->drift; /* of the step */
+    memcpy(dopri->moved, y, size);
+    memcpy(dopri->moved_d, yd, size);
+    u->ready = 0;
+    int failed = sd_underlying_project(u, t, dopri->moved, dopri->moved_d)
+              || sd_underlying_slopes(u, t, dopri->moved, dopri->moved_d);
+    *moved = u->drift;
+    u->drift = drift;
+    if (failed)
+        return 1;
+    memcpy(y, dopri->moved, size);
+    memcpy(yd, dopri->moved_d, size);
+    return 0;
+}

@@ -54,6 +54,9 @@ typedef struct sd_stepper {
     void (*show)(const void *self, int32_t k, double *y, double *yd);
     /* y alone [n] at any t within the last step; NULL: dense gives it */
     void (*values)(const void *self, double t, double *y);
+    /* y, yd [n] of `dense` at t moved onto the equations by what the method has at hand: 0, and how far in `moved`
+     * (magnitudes); else they are as they were (NULL: it has nothing) */
+    int (*onto)(void *self, double t, double *y, double *yd, double *moved);
 } sd_stepper;
 
 #define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the largest that unknowns have been */

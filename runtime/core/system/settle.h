@@ -68,5 +68,7 @@ int *sd_settle_pivoted(sd_settle *settle);
 void sd_settle_free(sd_settle *settle);
 /* y, yd [unknowns] moved in place; 0 done, 1 it did not converge (they are unchanged) */
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
+/* 1: the point holds as far as round-off lets it, in the scales of the last one that was moved (none yet: 0) */
+int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd);
 
 #endif
