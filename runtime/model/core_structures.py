@@ -326,7 +326,7 @@ class Underlying(c.Structure):
         *[(name, _P) for name in ["unknown", "rate", "column", "source", "from_rate", "magnitude", "displaced"]],
         *[(name, _P) for name in ["goal_position", "goal_velocity"]],
         ("tolerance", _D),
-        *[(name, _P) for name in ["jy", "jyd", "values", "r", "step", "rest", "memory"]],
+        *[(name, _P) for name in ["values", "r", "step", "rest", "memory", "place_y", "place_yd"]],
         *[(name, _I) for name in ["ready", "bad_row", "bad_column"]],
         ("drift", _D),
     ]

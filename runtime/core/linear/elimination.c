@@ -18,8 +18,8 @@
 #else
 #define NUMBERS SD_REAL_NUMBERS
 #endif
-#define MAKING 40000       /* operations interpreted for the time that machine code takes to be made, */
-#define MAKING_ONE 100     /* and for each operation that it has: made earlier it costs a short run more than it saves */
+#define MAKING 8000        /* operations interpreted for the time that machine code takes to be made (10 us, most of it pages), */
+#define MAKING_ONE 15      /* and for each operation that it has: made earlier it costs a short run more than it saves */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
@@ -206,7 +206,7 @@ static int write_lists(sd_elimination *e, const char *entry)
     if (!cell)
         return 2;
     number_cells(e, entry, cell, source, work);
-    e->cell = calloc((size_t)e->inside, sizeof(sd_number));
+    e->cell = calloc((size_t)(e->inside + (e->entries > e->n ? e->entries : e->n)), sizeof(sd_number));
     for (int32_t i = 0; i < e->n && !failed; i++)
         failed = list_row(e, cell, source, work, i);
     failed = failed || !e->cell || list_solution(e, cell) || e->factor.pairs + e->solve.pairs > PAIRS;
@@ -283,37 +283,32 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
 
 /* --- new values -------------------------------------------------------------------------------------------------- */
 
-static sd_number at(const sd_elimination *e, const sd_number *outside, int32_t place)
+/* one sum; every place, also those of the caller's array, is one of `cell` */
+static inline sd_number sum_of(const sd_sum *sum, const int32_t *pair, const sd_number *cell)
 {
-    return place < e->inside ? e->cell[place] : outside[place - e->inside];
+    sd_number value = sum->source < 0 ? 0.0 : cell[sum->source];
+    if (sum->kind == SD_SUM_LARGEST) {
+        double most = 0.0;
+        for (int32_t p = sum->first; p < sum->last; p++) {
+            double size = sd_size(cell[pair[2 * p]] * cell[pair[2 * p + 1]]);
+            most = most > size ? most : size;
+        }
+        return most;
+    }
+    for (int32_t p = sum->first; p < sum->last; p++)
+        value -= cell[pair[2 * p]] * cell[pair[2 * p + 1]];
+    if (sum->kind == SD_SUM_TIMES)
+        return value * cell[sum->by];
+    return sum->kind == SD_SUM_INVERSE ? sd_inverse(value) : value;
 }
 
-static void interpret(sd_elimination *e, const sd_list *list, sd_number *outside)
+/* outside [count]: the caller's array, which stands behind the cells meanwhile */
+static void interpret(sd_elimination *e, const sd_list *list, const sd_number *outside, int32_t count)
 {
-    for (int32_t s = 0; s < list->sums; s++) {
-        const sd_sum *sum = &list->sum[s];
-        const int32_t *pair = list->pair;
-        sd_number value = sum->source < 0 ? 0.0 : at(e, outside, sum->source);
-        if (sum->kind == SD_SUM_LARGEST) {
-            double most = 0.0;
-            for (int32_t p = sum->first; p < sum->last; p++) {
-                double size = sd_size(at(e, outside, pair[2 * p]) * at(e, outside, pair[2 * p + 1]));
-                most = most > size ? most : size;
-            }
-            value = most;
-        } else {
-            for (int32_t p = sum->first; p < sum->last; p++)
-                value -= at(e, outside, pair[2 * p]) * at(e, outside, pair[2 * p + 1]);
-        }
-        if (sum->kind == SD_SUM_TIMES)
-            value *= e->cell[sum->by];
-        if (sum->kind == SD_SUM_INVERSE)
-            value = sd_inverse(value);
-        if (sum->target < e->inside)
-            e->cell[sum->target] = value;
-        else
-            outside[sum->target - e->inside] = value;
-    }
+    sd_number *cell = e->cell;
+    memcpy(cell + e->inside, outside, (size_t)count * sizeof *cell);
+    for (const sd_sum *sum = list->sum, *end = sum + list->sums; sum < end; sum++)
+        cell[sum->target] = sum_of(sum, list->pair, cell);
 }
 
 /* multipliers are moderate, and what is left of each pivot's column is more than round-off */
@@ -347,14 +342,17 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
     if (e->code)
         e->code->factor((sd_number *)values, e->cell);
     else
-        interpret(e, &e->factor, (sd_number *)values);
+        interpret(e, &e->factor, values, e->entries);
     return healthy(e);
 }
 
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
 {
-    if (elimination->code)
-        elimination->code->solve(x, elimination->cell);
-    else
-        interpret(elimination, &elimination->solve, x);
+    sd_elimination *e = elimination;
+    if (e->code) {
+        e->code->solve(x, e->cell);
+        return;
+    }
+    interpret(e, &e->solve, x, e->n);
+    memcpy(x, e->cell + e->inside, (size_t)e->n * sizeof *x);
 }

@@ -20,7 +20,8 @@
 /* how the target of a sum is made of S = source - sum over pairs of a b */
 enum sd_sum_kind { SD_SUM_PLAIN, SD_SUM_TIMES, SD_SUM_INVERSE, SD_SUM_LARGEST }; /* S; S times the cell `by`; 1 / S; largest |a b| */
 
-/* one operation; places below `inside` are cells, others those of the caller's array; source -1: 0 */
+/* one operation; places below `inside` are cells, others those of the caller's array (for the interpreter it stands behind
+ * the cells); source -1: 0 */
 typedef struct sd_sum {
     int32_t kind, target, source, by, first, last; /* its pairs [first, last) */
 } sd_sum;

@@ -1,6 +1,8 @@
 /* The step of DOP853: stages, error, projection, step size, stiffness (see dopri.h). */
 #include "steppers/dopri.h"
 
+#include "linear/lanes.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -168,19 +170,31 @@ static int slopes(sd_dopri *dopri, int s, int before, double t)
     return cause;
 }
 
-/* point of stage s: y0 + h sum a_sj k_j */
-static void combine(sd_dopri *dopri, int s, double h)
+/* sum [n] := of a_j k_j over the terms that are not zero, in their order */
+static SD_WIDE void add_up(int32_t n, int terms, const double *a, double *const *k, double *sum)
+{
+    int32_t used[SD_DOPRI_ALL], number = 0, whole = n - n % SD_LANES;
+    for (int32_t j = 0; j < terms; j++)
+        if (a[j] != 0.0)
+            used[number++] = j;
+    for (int32_t i = 0; i < whole; i += SD_LANES) {
+        sd_lanes total = {0.0};
+        for (int32_t m = 0; m < number; m++)
+            total += a[used[m]] * SD_FROM(k[used[m]], i);
+        SD_AT(sum, i) = total;
+    }
+    for (int32_t i = whole; i < n; i++) {
+        double total = 0.0;
+        for (int32_t m = 0; m < number; m++)
+            total += a[used[m]] * k[used[m]][i];
+        sum[i] = total;
+    }
+}
+
+void sd_dopri_combine(sd_dopri *dopri, int s, double h)
 {
     double *y = dopri->y[s];
-    memset(y, 0, (size_t)dopri->n * sizeof *y);
-    for (int j = 0; j < s; j++) {
-        double a = sd_dopri_a[s][j];
-        const double *k = dopri->rate[j];
-        if (a == 0.0)
-            continue;
-        for (int32_t i = 0; i < dopri->n; i++)
-            y[i] += a * k[i];
-    }
+    add_up(dopri->n, s, sd_dopri_a[s], dopri->rate, y);
     for (int32_t i = 0; i < dopri->n; i++)
         y[i] = dopri->y[0][i] + h * y[i];
 }
@@ -189,18 +203,8 @@ static void combine(sd_dopri *dopri, int s, double h)
 static double estimate(sd_dopri *dopri)
 {
     double *five = dopri->ee, *three = dopri->f[0];
-    memset(five, 0, (size_t)dopri->n * sizeof *five);
-    memset(three, 0, (size_t)dopri->n * sizeof *three);
-    for (int j = 0; j < SD_DOPRI_STAGES; j++) {
-        double a = sd_dopri_e5[j], b = sd_dopri_e3[j];
-        const double *k = dopri->rate[j];
-        if (a == 0.0 && b == 0.0)
-            continue;
-        for (int32_t i = 0; i < dopri->n; i++) {
-            five[i] += a * k[i];
-            three[i] += b * k[i];
-        }
-    }
+    add_up(dopri->n, SD_DOPRI_STAGES, sd_dopri_e5, dopri->rate, five);
+    add_up(dopri->n, SD_DOPRI_STAGES, sd_dopri_e3, dopri->rate, three);
     double s5 = squares(dopri, five, NULL), s3 = squares(dopri, three, NULL), both = s5 + 0.01 * s3;
     for (int32_t i = 0; i < dopri->n; i++)
         five[i] *= dopri->h;
@@ -226,14 +230,14 @@ static int attempt(sd_dopri *dopri, double *error)
     double h = dopri->h;
     int cause;
     for (int s = 1; s < SD_DOPRI_STAGES; s++) {
-        combine(dopri, s, h);
+        sd_dopri_combine(dopri, s, h);
         if ((cause = slopes(dopri, s, s - 1, dopri->t + sd_dopri_c[s] * h)))
             return cause;
     }
     *error = dopri->fixed_h > 0.0 ? 0.0 : estimate(dopri);
     if (!(*error < 1.0))
         return SD_ERROR_TEST;
-    combine(dopri, SD_DOPRI_STAGES, h);
+    sd_dopri_combine(dopri, SD_DOPRI_STAGES, h);
     /* the factors are those of the last stage, at the same t */
     double *new = dopri->y[SD_DOPRI_STAGES];
     cause = sd_underlying_project(dopri->underlying, dopri->t + h, new, dopri->rate[SD_DOPRI_STAGES - 1]);

@@ -51,6 +51,8 @@ void sd_dopri_free(sd_dopri *dopri);
 sd_stepper *sd_dopri_stepper(sd_dopri *dopri);
 void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd, double h);
 int sd_dopri_step(sd_dopri *dopri);
+/* point of stage s of a step h: y0 + h sum a_sj k_j */
+void sd_dopri_combine(sd_dopri *dopri, int s, double h);
 /* dopri_dense.c: y, yd [n] at any t within the last step */
 void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd);
 /* those values projected onto every constraint, with the slopes there; as `onto` of stepper.h */

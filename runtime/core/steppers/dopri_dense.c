@@ -10,12 +10,7 @@ static int more_stages(sd_dopri *dopri)
     double from = dopri->t - dopri->h_used;
     for (int s = SD_DOPRI_STAGES + 1; s < SD_DOPRI_ALL; s++) {
         double *y = dopri->y[s];
-        memset(y, 0, (size_t)dopri->n * sizeof *y);
-        for (int j = 0; j < s; j++)
-            for (int32_t i = 0; sd_dopri_a[s][j] != 0.0 && i < dopri->n; i++)
-                y[i] += sd_dopri_a[s][j] * dopri->rate[j][i];
-        for (int32_t i = 0; i < dopri->n; i++)
-            y[i] = dopri->y[0][i] + dopri->h_used * y[i];
+        sd_dopri_combine(dopri, s, dopri->h_used);
         memcpy(dopri->rate[s], dopri->rate[SD_DOPRI_STAGES], (size_t)dopri->n * sizeof *y);
         for (int32_t j = 0; j < u->solved; j++)
             if (!u->rate[j])

@@ -22,20 +22,20 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t nnz = (size_t)system->entries + 1;
     size_t n = (size_t)(system->rows > system->unknowns ? system->rows : system->unknowns) + 1;
-    u->memory = calloc(2 * nnz + (size_t)linear->entries + 1 + 3 * n, sizeof(double));
-    if (!u->memory) {
-        free(u);
+    u->memory = calloc((size_t)linear->entries + 1 + 3 * n, sizeof(double));
+    u->place_y = calloc(2 * nnz, sizeof(int32_t));
+    if (!u->memory || !u->place_y) {
+        sd_underlying_free(u);
         return NULL;
     }
+    u->place_yd = u->place_y + nnz;
     u->system = system;
     u->linear = linear;
     sd_linear_replayed(linear);
     u->n = system->unknowns;
     u->first = system->kinematics;
     u->solved = linear->n;
-    u->jy = u->memory;
-    u->jyd = u->jy + nnz;
-    u->r = u->jyd + nnz;
+    u->r = u->memory;
     u->step = u->r + n;
     u->rest = u->step + n;
     u->values = u->rest + n;
@@ -46,18 +46,58 @@ void sd_underlying_free(sd_underlying *underlying)
 {
     if (!underlying)
         return;
+    free(underlying->place_y);
     free(underlying->memory);
     free(underlying);
+}
+
+/* where the entries of the system stand in the matrix */
+static void find_places(sd_underlying *u)
+{
+    for (int32_t e = 0; e < u->system->entries; e++)
+        u->place_y[e] = u->place_yd[e] = u->linear->entries;
+    for (int32_t e = 0; e < u->linear->entries; e++)
+        (u->from_rate[e] ? u->place_yd : u->place_y)[u->source[e]] = e;
+}
+
+static void add_entries(sd_entries *block, const sd_call *call, int32_t n, const int32_t *slot, const int32_t *place, double t,
+                        const double *y, const double *yd, double *v, double *values)
+{
+    if (n == 0)
+        return;
+    block(&call->frame, t, y, yd, v);
+    for (int32_t e = 0; e < n; e++)
+        values[place[slot[e]]] += v[e];
+}
+
+/* u->values := the matrix at (t, y, yd) */
+static void evaluate(sd_underlying *u, double t, const double *y, const double *yd)
+{
+    const sd_system *system = u->matrix;
+    double *values = u->values;
+    if (u->linear->factorisations == 0)
+        find_places(u);
+    memset(values, 0, (size_t)(u->linear->entries + 1) * sizeof *values);
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
+        add_entries(call->dy, call, call->n_dy, call->slot_dy, u->place_y, t, y, yd, system->v, values);
+        add_entries(call->dyd, call, call->n_dyd, call->slot_dyd, u->place_yd, t, y, yd, system->v, values);
+    }
+    for (int32_t i = 0; i < system->clear; i++)
+        values[u->place_y[system->cleared[i]]] = values[u->place_yd[system->cleared[i]]] = 0.0;
+    for (int32_t i = 0; i < system->held; i++) {
+        int32_t slot = system->held_slot[i];
+        values[u->place_y[slot]] = values[u->place_yd[slot]] = 0.0;
+        values[(system->held_rate[i] ? u->place_yd : u->place_y)[slot]] = 1.0;
+    }
 }
 
 static int factorise(sd_underlying *u, double t, const double *y, const double *yd)
 {
     u->ready = 0;
-    sd_jacobian(u->matrix, t, y, yd, u->jy, u->jyd);
+    u->matrix->jacobian_evaluations++;
+    evaluate(u, t, y, yd);
     if (*u->system->stop)
         return SD_STOPPED;
-    for (int32_t e = 0; e < u->linear->entries; e++)
-        u->values[e] = u->from_rate[e] ? u->jyd[u->source[e]] : u->jy[u->source[e]];
     int32_t bad = sd_first_bad(u->linear->entries, u->values);
     if (bad >= 0) {
         u->bad_row = u->first + u->linear->row[bad];
@@ -100,6 +140,14 @@ static int kinematics(const sd_underlying *u, const double *y, double *yd)
     return SD_FINE;
 }
 
+/* the cause where the slopes are no numbers: the residual first */
+static int no_number(sd_underlying *u, int cause)
+{
+    int32_t bad = sd_first_bad(u->system->rows, u->r);
+    u->bad_row = bad >= 0 ? bad : u->bad_row;
+    return bad >= 0 || !cause ? SD_NONFINITE : cause;
+}
+
 int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
 {
     const sd_system *system = u->system;
@@ -112,17 +160,10 @@ int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
         sd_residual(u->direct ? u->applied : u->system, t, y, yd, u->r);
         if (*system->stop)
             return SD_STOPPED;
-        int32_t bad = sd_first_bad(system->rows, u->r);
-        if (bad >= 0) {
-            u->bad_row = bad;
-            return SD_NONFINITE;
-        }
         int cause = u->ready ? SD_FINE : factorise(u, t, y, yd);
-        if (cause)
-            return cause;
-        double size = correct(u, y, yd);
-        if (!isfinite(size))
-            return SD_NONFINITE;
+        double size = cause ? INFINITY : correct(u, y, yd);
+        if (!isfinite(size)) /* of a residual that is no number every correction is none */
+            return no_number(u, cause);
         if (u->direct || size <= DBL_EPSILON)
             return kinematics(u, y, yd);
         double ratio = m > 0 ? size / before : 1.0;

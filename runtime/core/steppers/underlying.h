@@ -34,7 +34,8 @@ typedef struct sd_underlying {
     const int32_t *displaced;    /* [rows] 1: a row of phi in `position` */
     const double *goal_position, *goal_velocity; /* [rows] what the constraints are moved onto; NULL: zero */
     double tolerance;            /* of Newton's iteration, in magnitudes */
-    double *jy, *jyd, *values, *r, *step, *rest, *memory;
+    double *values, *r, *step, *rest, *memory;
+    int32_t *place_y, *place_yd; /* [entries of system] place of dF/dy, dF/dyd in the matrix, one behind it where they have none */
     int32_t ready, bad_row, bad_column;
     double drift;                /* how far the last projection moved first, in magnitudes */
 } sd_underlying;
