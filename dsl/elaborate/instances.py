@@ -22,7 +22,7 @@ from sysdyn.dsl.elaborate.unit_variables import solve_units
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import LevelChoice
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS, own_variables
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
