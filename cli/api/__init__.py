@@ -14,32 +14,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.api.compiled import Module, compile_model, shown
 from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
-from sysdyn.cli.export.files import manifest_of
-from sysdyn.cli.export.index_parameters import index_parameters
-from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
-from sysdyn.cli.export.naming import elements
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.checking import checked
 from sysdyn.cli.run.loaded import Loaded
-from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.running import Ran, Request, run
-from sysdyn.cli.run.starting import start
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.opened import Sweep
 from sysdyn.dsl import load as load_
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.judgement import NotMet as Missed
-from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
-from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.start import consistent_start
+from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.trace.trace import Trace
 
 __all__ = [
