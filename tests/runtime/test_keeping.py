@@ -1,7 +1,11 @@
 """Runs in memory and in files hold the same rows; what stands beside a trace is taken away."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.trace.keeping import Files, Memory, keeping
 from sysdyn.runtime.trace.trace import Trace, TraceError
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Parameter, clear, input_output
@@ -96,6 +100,12 @@ def test_faults_of_files_are_told_with_their_path(tmp_path):
     path = tmp_path / "no" / "t.h5"
     with pytest.raises(TraceError, match=r"t\.h5"), input_output(path):
         path.read_bytes()
+
+
+def test_the_head_of_a_row_is_as_long_in_the_core_as_in_what_reads_it():
+    header = Path(__file__).parents[2] / "runtime" / "core" / "run" / "run.h"
+    counted = int(re.search(r"#define SD_ROW_HEAD (\d+)", header.read_text(encoding="utf-8"))[1])
+    assert counted == lib.ROW_HEAD == BEFORE
 
 
 def test_parameters_of_one_unit_and_of_several_come_back(tmp_path):
