@@ -9,6 +9,7 @@ from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.starting import Started
 from sysdyn.compiler.binding.following import Following, following
 from sysdyn.compiler.binding.following import Group as Formulas
+from sysdyn.compiler.forms import descriptor
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.underlying import Accelerations, Selection, Underlying, underlying_form
 from sysdyn.runtime.model.description import Floats, Ints
@@ -24,7 +25,7 @@ from sysdyn.values import dataclass
 STATE = ("q", "f", "p", "s")
 LARGEST = 4_000_000
 """Entries of dF/dy of the underlying equation beyond which it is not written: it is full where inertia couples all."""
-AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
+AUDIT = (*descriptor.AUDIT, "drift")
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, Parameter, State, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, si
 from sysdyn.dsl.names.calls import walk
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import (
     BundleNode,
     BundleSymbol,

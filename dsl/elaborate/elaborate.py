@@ -22,7 +22,7 @@ from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State
 from sysdyn.dsl.model.units import Dimension, si
-from sysdyn.dsl.names.context import Failed, NotYetError, SeveralError
+from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.symbols import Definition, Scope, Space, Typed
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.tree import syntax

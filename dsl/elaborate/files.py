@@ -12,7 +12,7 @@ from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.network import Table
 from sysdyn.dsl.model.units import NONE, Unit, multiply, si
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import (
     BundleSymbol,

@@ -15,15 +15,14 @@ from sysdyn.dsl.elaborate.elements import Elements
 from sysdyn.dsl.elaborate.files import FileScope, exported
 from sysdyn.dsl.elaborate.head import Body, Interface
 from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
-from sysdyn.dsl.elaborate.moulds import Moulds
+from sysdyn.dsl.elaborate.moulds import Moulds, charge
 from sysdyn.dsl.elaborate.parameters import Argument
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
-from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import LevelChoice
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS, own_variables
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
@@ -142,7 +141,7 @@ class Instances(Elements):
         if component.name in chain:
             around = (*chain[chain.index(component.name) :], component.name)
             raise self.resolver.fail("E801", f"component contains itself: {' -> '.join(around)}", s.component.span)
-        budget.charge(budget.INSTANCE, f"instances of component '{component.name}'")
+        charge(self, s, component)
         at, shape = self._label(s)
         path = self.current.family(s.decl.name).name
         number = len(symbol.spaces)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from sysdyn.dsl.elaborate.level_ports import level_ports
 from sysdyn.dsl.model.network import LevelChoice
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import ComponentSymbol, nearest
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax

@@ -16,7 +16,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Shape
 from sysdyn.dsl.model.paynter import MEMBERS
 from sysdyn.dsl.model.values import Values
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.members import AUDIT
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,

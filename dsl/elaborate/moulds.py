@@ -182,7 +182,7 @@ class Moulds:
         ends = _between(it.scope, s.connections[0], mould.domain)
         if ends is None or len(given) != len(s.args or ()):
             return False
-        _charge(it, s, component)
+        charge(it, s, component)
         values = {name: it.resolver.scalar(value).node for name, value in given.items()}
         space = _space(it, s, component, mould, ends)
         for held in mould.parameters:
@@ -196,7 +196,8 @@ class Moulds:
         return True
 
 
-def _charge(it: Instances, s: syntax.Instance, component: ComponentSymbol) -> None:
+def charge(it: Instances, s: syntax.Instance, component: ComponentSymbol) -> None:
+    """An instance counts, whichever way it takes."""
     try:
         budget.charge(budget.INSTANCE, f"instances of component '{component.name}'")
     except budget.SpentError as spent:

@@ -12,7 +12,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Parameter, Shape
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.calls import walk
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Related

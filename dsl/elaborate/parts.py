@@ -33,7 +33,7 @@ from sysdyn.dsl.model.network import (
     Work,
 )
 from sysdyn.dsl.model.units import Unit
-from sysdyn.dsl.names.context import Failed, NotYetError, SeveralError
+from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol
 from sysdyn.dsl.names.unit_reading import read_unit

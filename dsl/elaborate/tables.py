@@ -14,7 +14,7 @@ from pathlib import Path
 
 from sysdyn.dsl.model.network import Table
 from sysdyn.dsl.model.units import Unit
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 

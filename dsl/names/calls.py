@@ -11,7 +11,8 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.context import Context, Failed, SeveralError, Value
+from sysdyn.dsl.names.context import Context, Value
+from sysdyn.dsl.names.failures import Failed, SeveralError
 from sysdyn.dsl.names.symbols import Definition, FunctionSymbol, Space, TableSymbol, Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.tree import syntax

@@ -5,7 +5,6 @@ The resolver's rules are spread over `names`, `members`, `arithmetic` and `calls
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -16,19 +15,18 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.units import NONE, Dimension
 from sysdyn.dsl.names import fitting, habits
+from sysdyn.dsl.names.failures import Failed, Part, SeveralError
+from sysdyn.dsl.names.fitting import Sight
 from sysdyn.dsl.names.symbols import (
     Definition,
     InstanceSymbol,
-    ParameterSymbol,
     Scope,
     Space,
     Typed,
-    UnknownSymbol,
     Vector,
 )
 from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
-from sysdyn.dsl.tree.walking import children
 from sysdyn.values import dataclass
 
 Value = Typed | Vector
@@ -57,35 +55,6 @@ class Quadrature:
     dimension: Dimension
     place: Place
     first: Node | None = None
-
-
-class Failed(Exception):  # noqa: N818
-    """The expression is wrong and has been reported."""
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A range of a loop variable in which a label has one statement: that statement's space."""
-
-    space: Space
-    first: Node
-    last: Node
-
-
-class NotYetError(Failed):
-    """A constraint is read that has not been resolved: what reads it is tried again when it has."""
-
-    def __init__(self, name: str, span: syntax.Span) -> None:
-        super().__init__(name)
-        self.name, self.span = name, span
-
-
-class SeveralError(Failed):
-    """A loop runs over several statements of one label: whoever owns the loop cuts it into these parts."""
-
-    def __init__(self, label: str, key: tuple[int, tuple[Node, ...]], loop: str, parts: tuple[Part, ...]) -> None:
-        super().__init__(label)
-        self.label, self.key, self.loop, self.parts = label, key, loop, parts
 
 
 class Entered:
@@ -349,84 +318,15 @@ class Context:
         return value.node
 
     def missing(self, have: Dimension | None, want: Dimension | None, *within: syntax.Expr) -> str | None:
-        """What factor would make two dimensions agree, and which parameter has it, or was given without a unit.
-
-        within: expressions of which the first has the dimension `have`, the second `want`.
+        """What would make two dimensions agree (fitting.py); within: expressions of which the first has the dimension
+        `have`, the second `want`.
         """
-        if have is None or want is None:
-            return None
-        pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
-        bare = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := self._bare(e))]
-        if bare:
-            return bare[0]
-        for e, wanted in zip(within, (want, have), strict=False):
-            if isinstance(e.operand if isinstance(e, syntax.Negative) else e, (syntax.Number, syntax.Quantity)):
-                return fitting.in_unit(e, wanted)
-        for factor in (dim.quotient(want, have), dim.quotient(have, want)):
-            level: Scope | None = self.scope
-            while level is not None:
-                for s in level.symbols.values():
-                    if isinstance(s, ParameterSymbol) and not s.shape and factor and s.dimension == factor:
-                        return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
-                level = level.outer
-        # a prime is forgotten more often than it is too much
-        rates = sorted(filter(None, (self._rate(e, factor) for e, factor in pairs)), key=lambda said: said[-2] == "'")
-        others = [fitting.refitted(self.scope, e, factor) for e, factor in pairs if factor]
-        said = [*rates, *filter(None, others)]
-        return said[0] if said else None
-
-    def _rate(self, expression: syntax.Expr, factor: Dimension) -> str | None:
-        """A prime that is missing, or one too many: an expression is off by a time (or its square), and one thing in
-        it moves.
-        """
-        powers = dict(factor)
-        if set(powers) != {"s"} or abs(powers["s"]) not in (1, 2):
-            return None
-        primed, plain = set(), set()
-        stack: list[object] = [expression]
-        while stack:
-            e = stack.pop()
-            if isinstance(e, syntax.Prime):
-                primed.add(self._written(e.base))
-            elif isinstance(e, syntax.Name) and isinstance(self.scope.find(e.name), UnknownSymbol):
-                plain.add(e.name)
-            elif not isinstance(e, (syntax.Member, syntax.Method)):
-                stack += children(e)
-        found = primed if powers["s"] > 0 else plain
-        if len(found) != 1:
-            return None
-        (name,) = found
-        return f"{name} in place of {name}'?" if powers["s"] > 0 else f"{name}' in place of {name}?"
-
-    def _written(self, e: syntax.Expr) -> str:
-        return " ".join(self.source.text[e.span.start : e.span.end].split())
+        return fitting.missing(Sight(self.scope, self.source, self.whole), have, want, *within)
 
     def bare(self, expression: syntax.Expr) -> str | None:
         """The name of the one parameter among the factors of an expression that is a bare number."""
-        found = self._bare(expression)
+        found = fitting.bare(Sight(self.scope, self.source, self.whole), expression)
         return None if found is None else found[0]
-
-    def _bare(self, expression: syntax.Expr) -> tuple[str, str | None] | None:
-        """The one parameter among the factors of an expression that is a bare number: its name and that number."""
-        if isinstance(expression, (syntax.Quantity, syntax.Number)):
-            return None
-        inner: object = expression
-        while isinstance(inner, (syntax.Negative, syntax.Group)):
-            inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
-        factors = [f for op, f in inner.factors if op != "/"] if isinstance(inner, syntax.Product) else [inner]
-        found = []
-        for factor in factors:
-            if isinstance(factor, syntax.Negative):
-                factor = factor.operand
-            symbol = self.scope.find(factor.name) if isinstance(factor, syntax.Name) else None
-            if isinstance(symbol, ParameterSymbol) and not symbol.dimension and not symbol.truth and not symbol.shape:
-                found.append(symbol)
-        if len(found) != 1 or found[0].name in self.whole:
-            return None
-        place = found[0].place
-        line = place.source.text[place.span.end :].partition("\n")[0]
-        number = re.match(r"\s*=\s*(-?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(?:[#;].*)?$", line)
-        return found[0].name, number.group(1) if number else None
 
     def is_number(self, value: Typed, e: syntax.Expr) -> None:
         """Report a condition in the place of a number."""

@@ -2,11 +2,106 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
+
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import Dimension, multiply, si_text
-from sysdyn.dsl.names.symbols import ParameterSymbol, Scope
+from sysdyn.dsl.names import habits
+from sysdyn.dsl.names.symbols import ParameterSymbol, Scope, UnknownSymbol
+from sysdyn.dsl.text.source import SourceText
 from sysdyn.dsl.tree import syntax
+from sysdyn.dsl.tree.walking import children
+from sysdyn.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """Names in sight, the text that is read, parameters that count (indices, sizes: they have no unit)."""
+
+    scope: Scope
+    source: SourceText
+    whole: Collection[str]
+
+    def written(self, e: syntax.Expr) -> str:
+        """An expression as it stands in the text."""
+        return " ".join(self.source.text[e.span.start : e.span.end].split())
+
+
+def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *within: syntax.Expr) -> str | None:
+    """What factor would make two dimensions agree, and which parameter has it, or was given without a unit.
+
+    within: expressions of which the first has the dimension `have`, the second `want`.
+    """
+    if have is None or want is None:
+        return None
+    pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
+    without = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := bare(sight, e))]
+    if without:
+        return without[0]
+    for e, wanted in zip(within, (want, have), strict=False):
+        if isinstance(e.operand if isinstance(e, syntax.Negative) else e, (syntax.Number, syntax.Quantity)):
+            return in_unit(e, wanted)
+    for factor in (dim.quotient(want, have), dim.quotient(have, want)):
+        level: Scope | None = sight.scope
+        while level is not None:
+            for s in level.symbols.values():
+                if isinstance(s, ParameterSymbol) and not s.shape and factor and s.dimension == factor:
+                    return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
+            level = level.outer
+    # a prime is forgotten more often than it is too much
+    rates = sorted(filter(None, (_rate(sight, e, factor) for e, factor in pairs)), key=lambda said: said[-2] == "'")
+    others = [refitted(sight.scope, e, factor) for e, factor in pairs if factor]
+    said = [*rates, *filter(None, others)]
+    return said[0] if said else None
+
+
+def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | None:
+    """A prime that is missing, or one too many: an expression is off by a time (or its square), and one thing in
+    it moves.
+    """
+    powers = dict(factor)
+    if set(powers) != {"s"} or abs(powers["s"]) not in (1, 2):
+        return None
+    primed, plain = set(), set()
+    stack: list[object] = [expression]
+    while stack:
+        e = stack.pop()
+        if isinstance(e, syntax.Prime):
+            primed.add(sight.written(e.base))
+        elif isinstance(e, syntax.Name) and isinstance(sight.scope.find(e.name), UnknownSymbol):
+            plain.add(e.name)
+        elif not isinstance(e, (syntax.Member, syntax.Method)):
+            stack += children(e)
+    found = primed if powers["s"] > 0 else plain
+    if len(found) != 1:
+        return None
+    (name,) = found
+    return f"{name} in place of {name}'?" if powers["s"] > 0 else f"{name}' in place of {name}?"
+
+
+def bare(sight: Sight, expression: syntax.Expr) -> tuple[str, str | None] | None:
+    """The one parameter among the factors of an expression that is a bare number: its name and that number."""
+    if isinstance(expression, (syntax.Quantity, syntax.Number)):
+        return None
+    inner: object = expression
+    while isinstance(inner, (syntax.Negative, syntax.Group)):
+        inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
+    factors = [f for op, f in inner.factors if op != "/"] if isinstance(inner, syntax.Product) else [inner]
+    found = []
+    for factor in factors:
+        if isinstance(factor, syntax.Negative):
+            factor = factor.operand
+        symbol = sight.scope.find(factor.name) if isinstance(factor, syntax.Name) else None
+        if isinstance(symbol, ParameterSymbol) and not symbol.dimension and not symbol.truth and not symbol.shape:
+            found.append(symbol)
+    if len(found) != 1 or found[0].name in sight.whole:
+        return None
+    place = found[0].place
+    line = place.source.text[place.span.end :].partition("\n")[0]
+    number = re.match(r"\s*=\s*(-?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(?:[#;].*)?$", line)
+    return found[0].name, number.group(1) if number else None
 
 
 def in_unit(number: syntax.Expr, wanted: Dimension) -> str:

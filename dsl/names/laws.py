@@ -6,7 +6,8 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.calls import walk
-from sysdyn.dsl.names.context import Context, Failed
+from sysdyn.dsl.names.context import Context
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.members import branch_dimension
 from sysdyn.dsl.names.symbols import BranchSymbol, Definition, Typed
 from sysdyn.dsl.tree import syntax

@@ -16,7 +16,8 @@ from sysdyn.dsl.model.network import Branch, Constraint, Domain
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.context import Failed, NotYetError, Part, Quadrature, SeveralError, Use, Value
+from sysdyn.dsl.names.context import Quadrature, Use, Value
+from sysdyn.dsl.names.failures import Failed, NotYetError, Part, SeveralError
 from sysdyn.dsl.names.names import Names
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,

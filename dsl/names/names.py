@@ -11,7 +11,8 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, known
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.context import Context, Failed, NotYetError, SeveralError, Use, Value
+from sysdyn.dsl.names.context import Context, Use, Value
+from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
     BundleNode,

@@ -30,7 +30,6 @@ from sysdyn.runtime.integrate.segments import Segment, segments
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.integrate.unknown_roles import Roles, roles
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model import core_structures as structures
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise
@@ -311,9 +310,9 @@ class Integration:
     def _projected(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
         if self.underlying is not None:
-            return c.addressof(self.underlying.core.contents) + structures.Underlying.drift.offset
+            return c.addressof(self.underlying.core.contents) + lib.Underlying.drift.offset
         if self._project is not None:
-            return c.addressof(self._project.core.contents) + structures.Settle.drift.offset
+            return c.addressof(self._project.core.contents) + lib.Settle.drift.offset
         return None
 
     def _driver(self) -> None:

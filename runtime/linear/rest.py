@@ -204,8 +204,8 @@ class Resting:
         return back if self._met(back) else y
 
     def _turned(self, y: Floats) -> Floats:
-        """Angles in -pi..pi where the rows cannot tell whole turns."""
-        turned = np.where(self.turns, np.pi - np.mod(np.pi - y, 2.0 * np.pi), y)
+        """Angles in -pi..pi where the rows cannot tell whole turns; -pi but for round-off is pi."""
+        turned = np.where(self.turns, np.pi + SAME - np.mod(np.pi + SAME - y, 2.0 * np.pi), y)
         near = solve(replace(self.problem(turned), guess=turned), turned, 3)
         return near.x if near.residual < MET else y
 

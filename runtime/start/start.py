@@ -9,7 +9,7 @@ order until the rows hold; the name of the one that found it stays with the stat
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -189,8 +189,19 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
     return best
 
 
-Strategy = Callable[[Starter, float, Floats, Floats, Mask], tuple[Solution, bool]]
-"""From t, a point x to begin at, the guess and the free unknowns: the best solution, and whether all rows hold."""
+Tries = Iterator[tuple[Solution, bool]]
+Strategy = Callable[[Starter, float, Floats, Floats, Mask], Tries]
+"""From t, a point x to begin at, the guess and the free unknowns: solutions, each with whether all rows hold."""
+
+
+def _first(tries: Tries, x: Floats) -> tuple[Solution, bool]:
+    """The first at which all rows hold, else the one of the least residual; x where there is none."""
+    best = Solution(x, np.inf, np.zeros(0))
+    for found, holds in tries:
+        if holds:
+            return found, True
+        best = found if found.residual < best.residual else best
+    return best, False
 
 
 def _beyond(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
@@ -201,18 +212,18 @@ def _beyond(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
     return bool(missed.any() and (missed * starter.row_scale(t, x, starter.scale(t, x)) > OWN).any())
 
 
-def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """What follows from the state alone, by Newton's method; where that is not enough everything, the least first: a
     guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
     """
-    follows = free & starter.following(t, x)
-    found, holds = Solution(x, np.inf, np.zeros(0)), False
+    follows, nearly = free & starter.following(t, x), False
     if not _beyond(starter, t, x, follows):
-        found, holds = _rescaled(starter, t, x, guess, follows, least=False)
-    if holds and (found.residual <= CLOSED or _own(starter, t, found.x, found.x) <= CLOSED):
-        return found, holds
-    best, also = _rescaled(starter, t, x, guess, free)
-    return (best, also) if also >= holds else (found, holds)
+        found, nearly = _rescaled(starter, t, x, guess, follows, least=False)
+        exact = nearly and (found.residual <= CLOSED or _own(starter, t, found.x, found.x) <= CLOSED)
+        yield found, exact
+    yield _rescaled(starter, t, x, guess, free)
+    if nearly:
+        yield found, True
 
 
 def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
@@ -237,17 +248,28 @@ def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
     return _rescaled(starter, t, x, guess, free, sized=sized)
 
 
-def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Down steep laws on the rows as written, with a share of work of its own; then everything."""
-    own, starter.work = starter.work, Work(WALKED, starter.work.until)
     rows = _as_written(starter, t, x)
-    for _ in range(_RESCALINGS):
-        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
-        if not np.isfinite(found.residual) or (found.x == x).all():
-            break
-        x = found.x
-    starter.work = own
-    return _completed(starter, t, x, guess, free)
+    with starter.granted(WALKED):
+        for _ in range(_RESCALINGS):
+            found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
+            if not np.isfinite(found.residual) or (found.x == x).all():
+                break
+            x = found.x
+    yield _completed(starter, t, x, guess, free)
+
+
+def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """Along what fades of the misses of rows as written, as fast as Newton's method follows, the state held if that
+    will do; then everything (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of
+    its own.
+    """
+    follows = free & starter.following(t, x)
+    for may in (follows, free) if (follows != free).any() else (free,):
+        with starter.granted():
+            found = _completed(starter, t, _at_the_end(starter, t, x, may), guess, may)
+        yield found
 
 
 def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Floats]:
@@ -255,55 +277,38 @@ def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Float
     return lambda x: starter.residual(t, x) - miss
 
 
-def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """Along what fades of the misses of rows as written, as fast as Newton's method follows, the state held if that
-    will do; then everything (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of
-    its own.
-    """
-    own, best, holds = starter.work, Solution(x, np.inf, np.zeros(0)), False
-    follows = free & starter.following(t, x)
-    for may in (follows, free) if (follows != free).any() else (free,):
-        starter.work = Work(until=own.until)
-        found, holds = _completed(starter, t, _at_the_end(starter, t, x, may), guess, may)
-        best = found if holds or found.residual < best.residual else best
-        if holds:
-            break
-    starter.work = own
-    return best, holds
-
-
 def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     """Where the homotopy leads; as far as it got where work is over."""
     every, miss, done, part = _as_written(starter, t, x), starter.residual(t, x), 0.0, 0.5
     while done < 1.0 and part > LEAST_PART and not starter.work.done:
-        rows = problem_of(starter, t, x, x, rows=every, free=free)
         left = _faded(starter, t, max(1.0 - done - part, 0.0) * miss)
+        rows = problem_of(starter, t, x, x, rows=every, free=free)
         found = solve(replace(rows, residual=left, core=None), x, FOLLOWED)
         follows = found.residual < NEARLY
         x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
     return solve(problem_of(starter, t, x, x, rows=every, free=free), x).x
 
 
-def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Everything at once from points around, always the same, as long as there is work left: where a guess lies on a
     singular point.
     """
-    best, holds, random = Solution(x, np.inf, np.zeros(0)), False, np.random.default_rng(20)
+    random = np.random.default_rng(20)
     for amplitude in _AMPLITUDES:
-        if holds or starter.work.done:
-            break
+        if starter.work.done:
+            return
         shaken = x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
-        found, holds = _rescaled(starter, t, shaken, guess, free)
-        best = found if holds or found.residual < best.residual else best
-    return best, holds
+        yield _rescaled(starter, t, shaken, guess, free)
 
 
-def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Everything at once in the largest scales that rows propose, with work of its own; kept where it succeeds."""
-    own, starter.work, starter.generous = starter.work, Work(until=starter.work.until), True
-    found, holds = _rescaled(starter, t, x, guess, free)
-    starter.work, starter.generous = own, holds
-    return (found if holds else replace(found, residual=np.inf)), holds
+    starter.generous = True
+    with starter.granted():
+        found, holds = _rescaled(starter, t, x, guess, free)
+    starter.generous = holds
+    if holds:
+        yield found, True
 
 
 STRATEGIES: tuple[tuple[str, Strategy], ...] = (
@@ -320,11 +325,9 @@ def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
     a diode makes steep laws lie far behind it.
     """
-    for strategy in (_newton, _walked, _led):
-        found, holds = strategy(starter, t, x, x, free)
-        if holds:
-            return found.x
-    return None
+    tries = (found for strategy in (_newton, _walked, _led) for found in strategy(starter, t, x, x, free))
+    found, holds = _first(tries, x)
+    return found.x if holds else None
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
@@ -332,7 +335,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     x = _begun(starter, t, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
-        found, holds = strategy(starter, t, x, guess, free)
+        found, holds = _first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
         if holds or sure:
             return _sharp(starter, t, again, free), name

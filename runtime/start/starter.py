@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import ctypes as c
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -122,6 +123,15 @@ class Starter:
         self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
+
+    @contextmanager
+    def granted(self, share: float = 1.0) -> Iterator[None]:
+        """Work of its own for what is done within, under the same limit of wall time."""
+        own, self.work = self.work, Work(share, self.work.until)
+        try:
+            yield
+        finally:
+            self.work = own
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""

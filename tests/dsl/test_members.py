@@ -10,7 +10,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Energy
 from sysdyn.dsl.model.units import NONE
 from sysdyn.dsl.model.values import Values
-from sysdyn.dsl.names.context import Failed
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.members import Members, ledger, reaction
 from sysdyn.dsl.names.names import STATICS, Names, pick
 from sysdyn.dsl.names.symbols import Typed, Vector

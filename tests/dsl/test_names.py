@@ -9,7 +9,8 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.arithmetic import Arithmetic
 from sysdyn.dsl.names.calls import Calls, walk
-from sysdyn.dsl.names.context import Context, Failed
+from sysdyn.dsl.names.context import Context
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import law_of, own_variables, ratio_of
 from sysdyn.dsl.names.symbols import Vector
 from sysdyn.dsl.text.diagnostics import Report, SourceText

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.core_structures import RadauMethod
+from sysdyn.runtime.model.structures.steppers import RadauMethod
 from sysdyn.runtime.numerics import radau_coefficients
 from test_bdf import run
 from test_radau import INSTANTS, KAPPA, Q1, oscillation

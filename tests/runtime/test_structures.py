@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from sysdyn.compiler.program import emit_c_support, emit_numpy
-from sysdyn.runtime.model import carrier, core_structures
+from sysdyn.runtime.model import carrier, core_library
 
 CORE = Path(__file__).parents[2] / "runtime" / "core"
 
@@ -34,7 +34,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     ]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]
     for name, tag in pairs:
-        fields = [field[0].removesuffix("_") for field in getattr(core_structures, name)._fields_]
+        fields = [field[0].removesuffix("_") for field in getattr(core_library, name)._fields_]
         lines.append(f'printf("%zu\\n", sizeof({tag}));')
         lines += [f'printf("%zu\\n", offsetof({tag}, {field}));' for field in fields]
     source = tmp_path / "sizes.c"
@@ -45,7 +45,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     ).stdout.split()
     expected = []
     for name, _ in pairs:
-        structure = getattr(core_structures, name)
+        structure = getattr(core_library, name)
         expected.append(ctypes.sizeof(structure))
         expected += [getattr(structure, field[0]).offset for field in structure._fields_]
     assert [int(item) for item in found] == expected
@@ -76,7 +76,7 @@ def test_a_change_of_the_contract_raises_its_number():
 
 def test_every_structure_of_the_core_is_compared():
     """Structures that ctypes mirrors, against those that the test above asks the compiler about."""
-    mirrored = {name for name in dir(core_structures) if _is_structure(getattr(core_structures, name))}
+    mirrored = {name for name in dir(core_library) if _is_structure(getattr(core_library, name))}
     text = Path(__file__).read_text()
     assert {name for name in mirrored if f'("{name}", "sd_' not in text} == set()
 

@@ -7,6 +7,9 @@
 #include <string.h>
 #include <time.h>
 
+#include "run/many_compare.h"
+#include "run/many_start.h"
+
 #define MOST 48          /* instants of comparison, at most twice that (many/batch.py) */
 #define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
 #define SAFETY 2.5
@@ -15,21 +18,11 @@
 #define SLOWEST 0.75
 #define STRETCH 1.5
 #define SHORT 60
-#define UNSEEN 100.0
 #define SHORT_CREDIT 0.85
 #define FIRST_DROP 1e-2
-#define PARTED 10.0
-#define MUCH 0.3
-#define BEND 4.0
 #define LOOSE 1e-5
 #define TAME 1e-6
-#define ROUND_OFF (64.0 * DBL_EPSILON)
-#define NOTHING 1e-12    /* of the largest of the same unit: what is left of a zero (model/scales.py) */
 #define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (integrate/runs.py) */
-#define MOVED 1e-10      /* of its magnitude: an anchor that moves by more is not what the text gives */
-#define CONTRACTS 0.5    /* largest residual over the one before: Newton's method converges (Deuflhard 2004, 2.1) */
-#define ALIKE 1e-8       /* of its magnitude: two starts that are one */
-#define VANISHED 1e-6    /* pivot of the start's matrix, or entry of its Jacobian, over that of the nominal start */
 #define SAME 1e-12       /* of an instant: a claim's */
 #define TRACE 1
 #define STEP 2
@@ -40,160 +33,6 @@ static double cpu_now(void)
     struct timespec t;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static void restore(const sd_region *region, int32_t regions)
-{
-    for (int32_t k = 0; k < regions; k++)
-        memcpy(region[k].at, region[k].copy, (size_t)region[k].size);
-}
-
-/* --- the start ------------------------------------------------------------------------------------------------- */
-
-/* 1: an entry of the start's Jacobian vanishes that counts in the nominal one, or a rate appears in a row */
-static int other_pattern(const sd_many *many)
-{
-    for (int32_t e = 0; e < many->start->system->entries; e++) {
-        double y = many->jy[e], yd = many->jyd[e];
-        if (!isfinite(y) || !isfinite(yd) || (many->jyd0[e] == 0.0 && yd != 0.0))
-            return 1;
-        if (many->counts[e] & 1 && !(fabs(y) > VANISHED * fabs(many->jy0[e])))
-            return 1;
-        if (many->counts[e] & 2 && !(fabs(yd) > VANISHED * fabs(many->jyd0[e])))
-            return 1;
-    }
-    return 0;
-}
-
-/* 1: the inertia has a negative direction (LDL^T; a column without a pivot has no inertia) */
-static int negative_inertia(const sd_many *many)
-{
-    int32_t n = many->flows;
-    double *m = many->inertia;
-    memset(m, 0, (size_t)n * (size_t)n * sizeof *m);
-    for (int32_t k = 0; k < many->inertias; k++) {
-        const double *from = many->inertia_rate[k] ? many->jyd : many->jy;
-        m[many->inertia_row[k] * n + many->inertia_column[k]] += many->inertia_sign[k] * from[many->inertia_entry[k]];
-    }
-    for (int32_t k = 0; k < n; k++) {
-        double own = m[k * n + k];
-        if (own < -1e-9 * fabs(own) || !isfinite(own))
-            return 1;
-    }
-    for (int32_t k = 0; k < n; k++) {
-        double d = m[k * n + k], size = 0.0;
-        for (int32_t i = k; i < n; i++)
-            size = fmax(size, fabs(m[i * n + k]));
-        if (d < -1e-9 * size)
-            return 1;
-        if (d <= 1e-12 * size)
-            continue;
-        for (int32_t i = k + 1; i < n; i++)
-            for (int32_t j = k + 1; j < n; j++)
-                m[i * n + j] -= m[i * n + k] / d * m[k * n + j];
-        for (int32_t i = k + 1; i < n; i++)
-            if (m[i * n + i] < 0.0 && m[i * n + i] > -1e-9 * fabs(m[i * n + k] / d * m[k * n + i]))
-                m[i * n + i] = 0.0; /* round-off */
-    }
-    return 0;
-}
-
-/* points are settled in these magnitudes */
-static void scale(sd_settle *settle, const double *magnitude, double tau)
-{
-    memcpy(settle->scale, magnitude, (size_t)settle->unknowns * sizeof *magnitude);
-    for (int32_t k = 0; k < settle->rates; k++)
-        settle->scale[settle->unknowns + k] = magnitude[settle->rate[k]] / tau;
-}
-
-/* what is left of a zero is zero, in the settler's magnitudes, and what the text gives is what it gives: balances would
- * be sized by round-off */
-static void clean(const sd_many *many, const double *anchor, double *y, double *yd)
-{
-    const sd_settle *settle = many->start;
-    for (int32_t i = 0; i < settle->unknowns; i++)
-        if (fabs(y[i] - (many->anchored[i] ? anchor[i] : 0.0)) <= NOTHING * settle->scale[i])
-            y[i] = many->anchored[i] ? anchor[i] : 0.0;
-    for (int32_t k = 0; k < settle->rates; k++)
-        if (fabs(yd[settle->rate[k]]) <= NOTHING * settle->scale[settle->unknowns + k])
-            yd[settle->rate[k]] = 0.0;
-    for (int32_t i = 0; i < settle->kinematics; i++)
-        yd[settle->k_q[i]] = y[settle->k_f[i]];
-}
-
-/* 1: y, yd settled, the anchored as they were, everything finite, on the root of the nominal start; magnitude: by which,
- * NULL: those of the nominal start */
-static int settled(sd_many *many, const double *anchor, const double *magnitude, double *y, double *yd)
-{
-    restore(many->region, many->regions);
-    if (magnitude)
-        scale(many->start, magnitude, many->tau);
-    if (sd_settle_point(many->start, many->t0, y, yd) || *many->start->system->stop)
-        return 0;
-    if (!(many->start->contracted <= CONTRACTS))
-        return 0;
-    clean(many, anchor, y, yd);
-    for (int32_t i = 0; i < many->written; i++) {
-        if (!isfinite(y[i]) || !isfinite(yd[i]))
-            return 0;
-        if (many->anchored[i] && !(fabs(y[i] - anchor[i]) <= MOVED * fmax(many->size[i], fabs(anchor[i]))))
-            return 0;
-    }
-    return 1;
-}
-
-/* 1: what the text guesses, if that is not what it guessed at the nominal start, leads to y, yd too */
-static int guessed(sd_many *many, const double *anchor, const double *y, const double *yd)
-{
-    int32_t n = many->written, other = 0;
-    double *a = many->passes[1].y, *b = many->passes[1].start_rate;
-    memcpy(a, y, (size_t)many->passes[0].n * sizeof *y);
-    memcpy(b, yd, (size_t)many->passes[0].n * sizeof *yd);
-    for (int32_t i = 0; i < n; i++)
-        if (many->guessed[i] && anchor[i] != many->guess[i]) {
-            other = 1;
-            a[i] = anchor[i];
-        }
-    if (!other)
-        return 1;
-    if (!settled(many, anchor, NULL, a, b))
-        return 0;
-    for (int32_t i = 0; i < n; i++)
-        if (!(fabs(a[i] - y[i]) <= ALIKE * fmax(many->size[i], fabs(y[i]))))
-            return 0;
-    return 1;
-}
-
-/* magnitudes at this start, as a run of its own finds them (runtime/integrate/origin.py); 1: they cannot be had */
-static int sized(sd_many *many)
-{
-    const sd_pass *pass = &many->passes[0];
-    memset(pass->yd, 0, (size_t)pass->n * sizeof(double));
-    for (int32_t i = 0; i < pass->n; i++)
-        if (pass->differential[i])
-            pass->yd[i] = pass->start_rate[i];
-    sd_jacobian(many->system, many->t0, pass->y, pass->start_rate, many->form_jy, many->form_jyd);
-    return sd_magnitudes(many->sizing, many->system, many->t0, many->t1 - many->t0, pass->y, pass->yd, many->form_jy,
-                         many->form_jyd, pass->yd, many->order, many->found, &many->tau);
-}
-
-/* y, yd of passes[0] := the consistent start with these anchors */
-static int begin(sd_many *many, const double *anchor)
-{
-    double *y = many->passes[0].y, *yd = many->passes[0].start_rate;
-    memset(y, 0, (size_t)many->passes[0].n * sizeof *y);
-    memset(yd, 0, (size_t)many->passes[0].n * sizeof *yd);
-    memcpy(y, many->y0, (size_t)many->written * sizeof *y);
-    memcpy(yd, many->yd0, (size_t)many->written * sizeof *yd);
-    for (int32_t i = 0; i < many->written; i++)
-        if (many->anchored[i])
-            y[i] = anchor[i];
-    if (!settled(many, anchor, NULL, y, yd) || !guessed(many, anchor, y, yd))
-        return SD_MANY_START;
-    sd_jacobian(many->start->system, many->t0, y, yd, many->jy, many->jyd);
-    if (other_pattern(many) || !(many->start->linear->smallest >= VANISHED * many->smallest) || negative_inertia(many))
-        return SD_MANY_STRUCTURE;
-    return sized(many) || !settled(many, anchor, many->found, y, yd) ? SD_MANY_START : SD_MANY_DONE;
 }
 
 /* --- one integration ------------------------------------------------------------------------------------------- */
@@ -223,7 +62,7 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
 {
     sd_run *run = pass->run;
     const double *y = many->passes[0].y, *yd = many->passes[0].start_rate;
-    restore(pass->region, pass->regions);
+    sd_many_restore(pass->region, pass->regions);
     if (run->ledgers)
         clear_ledgers(run->ledgers);
     memset(run->largest, 0, (size_t)many->observed * sizeof(double));
@@ -237,9 +76,9 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
             pass->yd[i] = yd[i];
     for (int32_t i = 0; i < pass->n; i++)
         pass->magnitude[i] = fmax(many->found[i], pass->least[i]);
-    scale(run->settle, pass->magnitude, many->tau);
+    sd_many_scale(run->settle, pass->magnitude, many->tau);
     if (pass->project)
-        scale(pass->project, pass->magnitude, many->tau);
+        sd_many_scale(pass->project, pass->magnitude, many->tau);
     memset(pass->met, 0, (size_t)pass->n * sizeof(double));
     *pass->rtol = tolerance;
     *pass->h_max = longest;
@@ -382,89 +221,6 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
 
 /* --- the accuracy ---------------------------------------------------------------------------------------------- */
 
-/* size [columns] of the traced quantities, noise [columns] below which one is zero */
-static void measures(const sd_many *many, const sd_pass *pass, double *size, double *noise, double *unit)
-{
-    const sd_run *run = pass->run;
-    memset(unit, 0, (size_t)many->units * sizeof *unit);
-    for (int32_t i = 0; i < many->written; i++)
-        if (many->unit_of[i] >= 0)
-            unit[many->unit_of[i]] = fmax(unit[many->unit_of[i]], pass->met[i]);
-    for (int32_t q = 0; q < many->columns; q++)
-        unit[many->unit[q]] = fmax(unit[many->unit[q]], run->largest[many->column[q]]);
-    for (int32_t q = 0; q < many->columns; q++) {
-        size[q] = fmax(run->largest[many->column[q]], NOTHING * unit[many->unit[q]]);
-        noise[q] = ROUND_OFF * unit[many->unit[q]];
-    }
-}
-
-/* what a value at a step moves by within the time tolerance: as its rate says, but no faster than BEND times what the
- * steps beside it show (integrate/accuracy.py) */
-static double lateness(const sd_many *many, const sd_samples *own, int32_t k, int32_t q)
-{
-    double least = INFINITY;
-    size_t columns = (size_t)many->columns;
-    for (int32_t side = k - 1; !many->known && side <= k; side++) {
-        if (side < 0 || side + 1 >= own->number)
-            continue;
-        double rise = own->value[(size_t)(side + 1) * columns + q] - own->value[(size_t)side * columns + q];
-        least = fmin(least, fabs(rise / (own->time[side + 1] - own->time[side])));
-    }
-    return fmin(own->late[(size_t)k * columns + q], BEND * many->late * least);
-}
-
-/* largest relative difference of two runs, and the same over the accuracy wanted */
-static double difference(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine,
-                         double *over)
-{
-    double *size = many->work, *noise = size + many->columns, worst = 0.0;
-    measures(many, pass, size, noise, noise + many->columns);
-    *over = 0.0;
-    if (coarse->number != fine->number)
-        return *over = INFINITY;
-    for (int32_t q = 0; q < many->columns; q++) {
-        double largest = 0.0, apart = 0.0;
-        if (size[q] == 0.0 || isinf(many->target[q]))
-            continue;
-        for (int32_t k = 0; k < fine->number; k++) {
-            size_t at = (size_t)k * many->columns + q;
-            double a = coarse->value[at], b = fine->value[at];
-            double d = fmax(fabs(b - a) - fmax(lateness(many, coarse, k, q), fine->late[at]), 0.0);
-            d = isfinite(a) && isfinite(b) ? d : INFINITY;
-            largest = fmax(largest, fmax(fabs(a), fabs(b)));
-            apart = fmax(apart, d);
-        }
-        if (largest <= noise[q])
-            continue;
-        if (size[q] > UNSEEN * largest)
-            apart = INFINITY; /* it did something between the instants of comparison */
-        apart = isfinite(size[q]) ? apart / size[q] : INFINITY;
-        worst = fmax(worst, apart);
-        *over = fmax(*over, apart / many->target[q]);
-    }
-    return worst;
-}
-
-/* 1: two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it is */
-static int parted(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine)
-{
-    double *size = many->work, *noise = size + many->columns;
-    measures(many, pass, size, noise, noise + many->columns);
-    for (int32_t q = 0; q < many->columns && fine->number; q++) {
-        double most = fabs(fine->value[q]);
-        if (!(most > noise[q]))
-            continue;
-        for (int32_t k = 1; k < fine->number; k++) {
-            size_t at = (size_t)k * many->columns + q;
-            double a = coarse->value[at], b = fine->value[at];
-            if (fabs(b - a) - fine->late[at] > fmax(PARTED * most, MUCH * fmax(fabs(a), fabs(b))))
-                return 1;
-            most = fmax(most, fabs(b));
-        }
-    }
-    return 0;
-}
-
 static double shrink(double power, double step, double far)
 {
     double ratio = fmax(pow(10.0, -power * step), pow(far, power));
@@ -548,11 +304,11 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         state = SD_MANY_DONE;
         if (many->known)
             match(many, there, last);
-        double over, apart = difference(many, &many->passes[1], last, there, &over);
+        double over, apart = sd_many_difference(many, &many->passes[1], last, there, &over);
         if (lost || lost_now)
             apart = over = INFINITY;
         double step = log10(tolerance / next), part;
-        if (taken == taken_before && apart < ROUND_OFF)
+        if (taken == taken_before && apart < SD_MANY_ROUND_OFF)
             return SD_MANY_ACCURACY; /* two runs that took the same steps say nothing */
         if (before >= 0.0 && over > before)
             part = 1.0;
@@ -563,7 +319,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             part = shrink(power < 0.0 ? credit : fmin(power, credit), step, many->far);
         }
         *estimate = apart * part;
-        int away = next > LOOSE && parted(many, &many->passes[1], last, there);
+        int away = next > LOOSE && sd_many_parted(many, &many->passes[1], last, there);
         if (over * part <= 1.0 && !away) {
             if (!balanced(many, many->passes[1].run->ledgers))
                 return SD_MANY_ENERGY;
@@ -617,7 +373,7 @@ void sd_many_runs(sd_many *many, int32_t runs, const double *p, const double *an
         memcpy(many->p, p + (size_t)k * many->parameters, (size_t)many->parameters * sizeof *p);
         steps[k] = 0;
         estimate[k] = NAN;
-        state[k] = begin(many, anchor + (size_t)k * many->written);
+        state[k] = sd_many_begin(many, anchor + (size_t)k * many->written);
         if (state[k] == SD_MANY_DONE)
             state[k] = control(many, &steps[k], &estimate[k]);
         double to = cpu_now();

@@ -27,6 +27,7 @@ enum sd_many_state {
 };
 
 #define SD_MANY_COUNTERS 8
+#define SD_MANY_NOTHING 1e-12 /* of the largest of the same unit: what is left of a zero (model/scales.py) */
 #define SD_MANY_ROWS 3 /* `keep`: all rows of the last integration stay where it wrote them */
 
 /* a structure as it was set up */

@@ -5,29 +5,17 @@
 #include <math.h>
 #include <string.h>
 
+#include "run/fits.h"
 #include "run/run.h"
 
 #define ITERATIONS 60    /* of Ridders' method */
 #define SAME 8.0         /* spacings of t within which two instants are one */
-#define FULL_SENSE 1e-9  /* of a sense: what it may pass its end by */
-#define SLIP 1e-9        /* of a bound of friction */
 #define HELD 1e8         /* weight of the state across an event */
-#define SLIDES 2.0       /* a branch, as events/kinks.py names them */
 #define ROWS_OF_EVENT 8  /* at most, beside those asked for */
-
-static double zero(const sd_modes *m, int32_t row)
-{
-    return m->small * m->largest[row];
-}
 
 static double spacing(double t)
 {
     return nextafter(fabs(t), INFINITY) - fabs(t);
-}
-
-static const sd_mode *present(const sd_modes *m)
-{
-    return &m->mode[m->now];
 }
 
 /* -- when ------------------------------------------------------------------------------------------------------ */
@@ -35,11 +23,11 @@ static const sd_mode *present(const sd_modes *m)
 /* Whether a watch changes between two points; what leaves zero upwards, and still does, has not. */
 static int falls(const sd_modes *m, int32_t k, const double *low, const double *high)
 {
-    const sd_mode *mode = present(m);
+    const sd_mode *mode = sd_mode_now(m);
     int32_t row = mode->row[k], rate = mode->rate[k];
     double side = mode->side[k];
     int rises = rate >= 0 && side * low[row] <= 0.0 && side * low[rate] > 0.0 && side * high[rate] >= 0.0;
-    return side * high[row] < -zero(m, row) && !rises;
+    return side * high[row] < -sd_mode_zero(m, row) && !rises;
 }
 
 /* Where side*value falls through zero between a (fa) and b (fb); a where it is not above zero there already. */
@@ -77,8 +65,8 @@ static double root(sd_run *run, int32_t row, double side, double a, double fa, d
 static double instant(sd_run *run, int32_t k, double a, double b)
 {
     sd_modes *m = run->modes;
-    int32_t row = present(m)->row[k], rate = present(m)->rate[k];
-    double side = present(m)->side[k], begin = a, value = side * m->low[row];
+    int32_t row = sd_mode_now(m)->row[k], rate = sd_mode_now(m)->rate[k];
+    double side = sd_mode_now(m)->side[k], begin = a, value = side * m->low[row];
     if (value <= 0.0 && rate >= 0 && side * m->low[rate] > 0.0 && side * m->high[rate] < 0.0) {
         begin = root(run, rate, side, a, side * m->low[rate], b, side * m->high[rate]);
         sd_run_observe(run, begin, m->values);
@@ -93,7 +81,7 @@ static double instant(sd_run *run, int32_t k, double a, double b)
 static int32_t crossing(sd_run *run, double end, double *t)
 {
     sd_modes *m = run->modes;
-    int32_t watches = present(m)->watches, hits = 0, same = 0;
+    int32_t watches = sd_mode_now(m)->watches, hits = 0, same = 0;
     double low = m->begin, high = low;
     sd_run_observe(run, low, m->low);
     for (int part = 1; part <= SD_PARTS && !hits; part++) {
@@ -168,111 +156,6 @@ static void enter(sd_run *run, int32_t number)
     m->now = number;
 }
 
-/* Whether an inequality, or a friction law, is as the mode says. */
-static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const double *v)
-{
-    double sense = c->sense >= 0 ? m->p[c->sense] : 1.0, slip = sense * v[c->value];
-    if (c->kind == SD_FOLLOWS)
-        return 1;
-    if (c->kind == SD_GUARDED)
-        return (v[c->guard] != 0.0) == holds;
-    if (c->kind == SD_FRICTION && v[c->bound] == 0.0)
-        return !holds && sense != 0.0;
-    if (holds && c->kind == SD_FRICTION)
-        return fabs(v[c->multiplier]) <= v[c->bound] * (1.0 + SLIP) + zero(m, c->multiplier);
-    if (holds)
-        return v[c->multiplier] >= -zero(m, c->multiplier) &&
-               (c->kind != SD_PHI || v[c->rate] >= -zero(m, c->rate));
-    if (sense == 0.0)
-        return 0;
-    if (slip > zero(m, c->value))
-        return 1;
-    return c->kind != SD_PHI && slip >= -zero(m, c->value) && sense * v[c->rate] >= -zero(m, c->rate);
-}
-
-static int touched(const sd_modes *m, const sd_mode *from, const sd_transition *one)
-{
-    for (int32_t k = 0; k < one->crossed; k++)
-        for (int32_t i = 0; i < m->contacts; i++) {
-            int32_t row = from->row[one->which[k]];
-            if (row == m->contact[i].value || row == m->contact[i].multiplier)
-                return 1;
-        }
-    return 0;
-}
-
-/* Whether the inequalities that a transition turns, which touches none, could not have stayed as they were: what would
- * hold and open alike at this instant (a diode that conducts beside a capacitor) stays. */
-static int decided(const sd_modes *m, const sd_mode *from, const sd_transition *one, const double *v)
-{
-    if (touched(m, from, one))
-        return 1;
-    for (int32_t k = 0; k < m->contacts; k++) {
-        const sd_contact *c = &m->contact[k];
-        int holds = present(m)->holds[k], turned = holds != from->holds[k] && (c->kind == SD_PHI || c->kind == SD_PSI);
-        if (turned && holds && !(v[c->multiplier] > zero(m, c->multiplier)))
-            return 0;
-        if (turned && !holds && !(v[c->value] > zero(m, c->value)) && !(v[c->rate] > zero(m, c->rate)))
-            return 0;
-    }
-    return 1;
-}
-
-/* Whether the branch of a law is what its switching function says. */
-static int kink_fits(const sd_modes *m, const sd_kink *k, const double *v)
-{
-    double branch = m->p[k->branch], small = zero(m, k->value);
-    if (branch == 0.0)
-        return fabs(v[k->value]) <= small;
-    if (branch == SLIDES)
-        return v[k->above] >= -FULL_SENSE && v[k->below] >= -FULL_SENSE;
-    if (branch * v[k->value] > small)
-        return 1;
-    return branch * v[k->value] >= -small && (k->rate < 0 || branch * v[k->rate] >= -zero(m, k->rate));
-}
-
-/* Whether a relation is on the side that the mode says; flipped: where it was. */
-static int relation_fits(const sd_modes *m, int32_t k, double side, double flipped, const double *v)
-{
-    double value = v[m->relation_row[k]], small = m->relation_moves[k] ? zero(m, m->relation_row[k]) : 0.0;
-    if (fabs(value) <= small && (value != 0.0 || m->exact[k]))
-        return side == flipped;
-    return side == (double)((value > 0.0) - (value < 0.0));
-}
-
-/* Whether every relation is on the side given, coming from `before`. */
-static int sides_fit(const sd_modes *m, const double *side, const double *before, const double *v)
-{
-    for (int32_t k = 0; k < m->relations; k++)
-        if (!relation_fits(m, k, side[k], before[k], v))
-            return 0;
-    return 1;
-}
-
-static int fits(const sd_modes *m, const double *before, const double *v)
-{
-    const sd_mode *mode = present(m);
-    for (int32_t k = 0; k < m->contacts; k++)
-        if (!contact_fits(m, &m->contact[k], mode->holds[k], v))
-            return 0;
-    for (int32_t k = 0; k < m->kinks; k++)
-        if (!kink_fits(m, &m->kink[k], v))
-            return 0;
-    return sides_fit(m, mode->relation, before, v);
-}
-
-/* Whether the stepper may go on from the point as the driver restarts: no size shows first here (integrate.py). */
-static int ordinary(const sd_modes *m)
-{
-    for (int32_t i = 0; i < m->unknowns; i++) {
-        if (fabs(m->restart[i]) > 2.0 * m->resolved[i])
-            return 0;
-        if (m->unnamed[i] && m->met[i] <= m->round_off && m->magnitude[i] == m->unknown_size && m->rate[i] != 0.0)
-            return 0;
-    }
-    return 1;
-}
-
 /* The assignments of a transition at t, to m->p and m->y, and its row of the log; 0: they lead elsewhere. */
 static int assign(sd_run *run, const sd_transition *one, double t)
 {
@@ -282,7 +165,7 @@ static int assign(sd_run *run, const sd_transition *one, double t)
     row[1] = (double)(one - m->transition);
     look(run, t, m->y, m->yd, m->values);
     for (int32_t k = 0; k < m->relations; k++)
-        m->exact[k] = one->sides[k] != present(m)->relation[k] && m->values[m->relation_row[k]] == 0.0;
+        m->exact[k] = one->sides[k] != sd_mode_now(m)->relation[k] && m->values[m->relation_row[k]] == 0.0;
     for (int32_t r = 0, a = 0; r < one->rounds; r++) {
         for (int32_t k = a; k < one->end[r]; k++) { /* all values are read, then all assigned */
             row[2 + 2 * k] = (one->kind[k] ? m->y : m->p)[one->place[k]];
@@ -291,7 +174,7 @@ static int assign(sd_run *run, const sd_transition *one, double t)
         for (; a < one->end[r]; a++)
             (one->kind[a] ? m->y : m->p)[one->place[a]] = row[3 + 2 * a];
         look(run, t, m->y, m->yd, m->values);
-        if (!sides_fit(m, one->sides + (r + 1) * m->relations, one->sides + r * m->relations, m->values))
+        if (!sd_mode_sides_fit(m, one->sides + (r + 1) * m->relations, one->sides + r * m->relations, m->values))
             return 0;
     }
     return 1;
@@ -331,8 +214,8 @@ static int lands(sd_run *run, const sd_transition *one, double t)
         memcpy(m->restart, m->y, written);
         memcpy(m->rate, m->yd, written);
         look(run, t, m->y, m->yd, m->values);
-        done = fits(m, one->sides + one->rounds * m->relations, m->values) && ordinary(m) &&
-               decided(m, &m->mode[from], one, m->values);
+        done = sd_mode_fits(m, one->sides + one->rounds * m->relations, m->values) && sd_mode_ordinary(m) &&
+               sd_mode_decided(m, &m->mode[from], one, m->values);
     }
     if (!done) {
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
@@ -345,11 +228,11 @@ static int lands(sd_run *run, const sd_transition *one, double t)
 static void watch(sd_run *run)
 {
     sd_modes *m = run->modes;
-    const sd_mode *mode = present(m);
+    const sd_mode *mode = sd_mode_now(m);
     for (int32_t i = 0; i < m->observed; i++)
         m->largest[i] = fmax(m->largest[i], run->largest[i]);
     for (int32_t k = 0; k < mode->watches; k++)
-        m->watch[k] = (sd_watch){mode->row[k], mode->side[k], zero(m, mode->row[k])};
+        m->watch[k] = (sd_watch){mode->row[k], mode->side[k], sd_mode_zero(m, mode->row[k])};
     run->watch = m->watch;
     run->watches = mode->watches;
 }
@@ -385,7 +268,7 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
     sd_modes *m = run->modes;
     if (m->logged >= m->room || t - m->last <= m->nothing)
         return NULL;
-    for (int32_t k = present(m)->first; k >= 0; k = m->transition[k].next) {
+    for (int32_t k = sd_mode_now(m)->first; k >= 0; k = m->transition[k].next) {
         const sd_transition *one = &m->transition[k];
         if (!same(one->crossed, one->which, crossed, m->which) || !same(one->due, one->sample, due, m->which))
             continue;

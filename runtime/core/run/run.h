@@ -84,6 +84,9 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
  * rows are full, `sd_run_drain` goes on */
 int sd_run_accept(sd_run *run, double to, int32_t kind);
 int sd_run_drain(sd_run *run);
+/* run->point, point_d at t within the last step moved onto the equations: by what the method has at hand, where that does; the
+ * end of a step may be there */
+void sd_run_settle(sd_run *run, double t);
 /* values [observed] of block observe at t within the last step, settled */
 void sd_run_observe(sd_run *run, double t, double *values);
 /* steps until `steps` more are taken, `seconds` are over, the rows are full, the end, a failure, or a step within which

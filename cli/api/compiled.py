@@ -1,0 +1,178 @@
+"""A compiled model as functions of arrays: residual, Jacobian, mass matrix, outputs, consistent starts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.cli.export.files import manifest_of
+from sysdyn.cli.export.index_parameters import index_parameters
+from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
+from sysdyn.cli.export.naming import elements
+from sysdyn.cli.run import targets
+from sysdyn.cli.run.prepare import prepare
+from sysdyn.cli.run.starting import start
+from sysdyn.dsl import load as load_
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.runtime.integrate.underlying import Underlying
+from sysdyn.runtime.model.failures import NoSuchForm
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import consistent_start
+
+
+class Module:
+    """A compiled model in one index form, at its consistent start; all numbers in SI units.
+
+    manifest: as `compile` writes it; unknowns, traced: names in the order of y and of `outputs`;
+    t0, y0, yd0: the start; parameters: values as bound; indptr, indices: pattern of the matrices by columns.
+    In index form 0, y are the differential unknowns and the residual is yd - F(t, y).
+    """
+
+    def __init__(self, formed: Formed) -> None:
+        self._formed = formed
+        self._numbers, following_ = tables(formed)
+        found = {"index_parameters": index_parameters(formed, self._numbers, following_)}
+        self.manifest: dict[str, Any] = {**manifest_of(formed), **found}
+        self.unknowns = elements(formed)
+        self.traced = tuple(output.name for output in self._numbers.outputs)
+        self.t0, self.y0, self.yd0 = self._numbers.t0, self._numbers.y0, self._numbers.yd0
+        self.parameters = shown(formed.prepared.binding.values)
+        pattern = self._numbers.state or self._numbers.system
+        self.indptr, self.indices = pattern.column, pattern.row
+        self._systems: dict[tuple[tuple[str, float], ...], System] = {(): formed.system}
+
+    def _system(self, parameters: Mapping[str, float] | None) -> System:
+        """The system with other values of parameters."""
+        key = tuple(sorted((parameters or {}).items()))
+        if key not in self._systems:
+            prepared, system = self._formed.prepared, self._formed.system
+            arrays = prepared.arrays_of(prepared.compiled.bind(dict(key)))
+            made = System(prepared.structure, arrays, prepared.carrier, system.form.name)
+            self._systems[key] = made.without(system.left_out) if system.left_out else made
+        return self._systems[key]
+
+    def residual(
+        self,
+        t: float,
+        y: NDArray[np.float64],
+        ydot: NDArray[np.float64],
+        parameters: Mapping[str, float] | None = None,
+    ) -> NDArray[np.float64]:
+        """F(t, y, ydot) [rows]; parameters: values that replace the model's."""
+        system, y, ydot = self._system(parameters), np.asarray(y, dtype=float), np.asarray(ydot, dtype=float)
+        if self._numbers.state is None:
+            return system.residual(t, y, ydot)
+        return np.asarray(ydot - self._slopes(system, t, y)[1][self._numbers.state.places])
+
+    def jacobian(
+        self,
+        t: float,
+        y: NDArray[np.float64],
+        ydot: NDArray[np.float64],
+        cj: float,
+        parameters: Mapping[str, float] | None = None,
+    ) -> NDArray[np.float64]:
+        """Entries of dF/dy + cj dF/dydot on the pattern: scipy.sparse.csc_array((values, indices, indptr))."""
+        system, y = self._system(parameters), np.asarray(y, dtype=float)
+        if self._numbers.state is not None:
+            inside, rates = self._slopes(system, t, y)
+            return state_jacobian(self._numbers, system, t, inside, rates, cj)
+        jy, jyd = system.jacobian(t, y, np.asarray(ydot, dtype=float))
+        return jy + cj * jyd
+
+    def mass(
+        self,
+        t: float,
+        y: NDArray[np.float64],
+        ydot: NDArray[np.float64],
+        parameters: Mapping[str, float] | None = None,
+    ) -> NDArray[np.float64]:
+        """Entries of dF/dydot on the pattern."""
+        if self._numbers.state is not None:
+            columns = np.repeat(np.arange(self.y0.size), np.diff(self.indptr))
+            return np.asarray(self.indices == columns, dtype=float)
+        return self._system(parameters).jacobian(t, np.asarray(y, dtype=float), np.asarray(ydot, dtype=float))[1]
+
+    def outputs(
+        self,
+        t: float,
+        y: NDArray[np.float64],
+        ydot: NDArray[np.float64],
+        parameters: Mapping[str, float] | None = None,
+    ) -> NDArray[np.float64]:
+        """What the scene traces at a point; not a number where it reads a ledger of a whole run."""
+        system, y, ydot = self._system(parameters), np.asarray(y, dtype=float), np.asarray(ydot, dtype=float)
+        if self._numbers.state is not None:
+            y, ydot = self._slopes(system, t, y)
+        kinetic, potential = system.audit(t, y, ydot)[:2]
+        known = dict.fromkeys(AUDIT, float("nan")) | {"kinetic": kinetic, "potential": potential}
+        places = [output.place for output in self._numbers.outputs]
+        return np.asarray(system.observe(t, y, ydot, known)[places])
+
+    def start(self, parameters: Mapping[str, float] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Consistent (y, ydot) at t0 for other parameters.  Raises InconsistentStart."""
+        system = self._system(parameters)
+        y, yd = consistent_start(system, self.t0).for_form(system)
+        if self._numbers.state is None:
+            return y, yd
+        places = self._numbers.state.places
+        return y[places], self._slopes(system, self.t0, y[places])[1][places]
+
+    def _slopes(
+        self, system: System, t: float, state: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The full layout (y, ydot) at a state of index form 0."""
+        assert self._numbers.state is not None
+        y = self._numbers.full_y.copy()
+        y[self._numbers.state.places] = state
+        return Underlying(system, np.ones(system.unknowns)).slopes(t, y, self._numbers.full_yd)
+
+
+def compile_model(
+    path: str | Path,
+    *,
+    model: str | None = None,
+    scene: str | None = None,
+    formulation: str = "auto",
+    index: str = "auto",
+    backend: str = "c",
+    no_prune: bool = False,
+) -> Module:
+    """Compile a model of a file, of a scene where one is named (without what that does not need).
+
+    index: 3 as written, 2 stabilised, 2v, 1, 0 (yd - F(t, y)); auto: the one that `simulate` takes.
+    """
+    report = Report()
+    document = targets.read(str(path), report)
+    target = targets.whole(document, str(path), model, scene, report)
+    report.raise_if_failed()
+    assert target is not None
+    with ex.fresh():
+        inner = Report()
+        network = load_.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
+        report.extend(inner if network else targets.unsupported(inner))
+        wanted = None if formulation == "auto" else formulation
+        if network is None:
+            raise ModelError(report.diagnostics)
+        prepared = prepare(network, report, formulation=wanted, backend=backend, prune=not no_prune)
+        if prepared is None:
+            raise ModelError(report.diagnostics)
+        said = prepared.network.scene
+        t0 = prepared.binding.evaluate(said.start) if said and said.start else 0.0
+        started = start(prepared, t0, report)
+        if started is None or report.failed:
+            raise ModelError(report.diagnostics)
+        try:
+            return Module(choose(prepared, started, None if index == "auto" else index))
+        except NoSuchForm as error:
+            report.error("E607", str(error), prepared.network.place)
+            raise ModelError(report.diagnostics) from error
+
+
+def shown(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters of the text: none that the compiler made."""
+    return {name: value for name, value in values.items() if not name.startswith("#")}

@@ -1,0 +1,1 @@
+"""The structures of runtime/core/*/*.h as ctypes sees them; see README.md."""

@@ -1,0 +1,234 @@
+"""The structures of core/run/*.h."""
+
+from __future__ import annotations
+
+import ctypes as c
+
+from sysdyn.runtime.model.structures.c_types import D, I, L, P
+
+ROW_HEAD = 8
+
+
+class Record(c.Structure):
+    """sd_record."""
+
+    _fields_ = [("t", D), ("value", D), ("ledger", I)]
+
+
+class Ledgers(c.Structure):
+    """sd_ledgers."""
+
+    _fields_ = [
+        ("count", I),
+        ("elements", I),
+        *[(name, P) for name in ["contents", "of", "inertia", "gross", "most", "largest", "element", "record"]],
+        ("records", I),
+        ("room", I),
+        *[(name, P) for name in ["stored", "balance", "highest", "dissipated", "supplied", "value", "before"]],
+        ("begun", I),
+        ("lost", I),
+    ]
+
+
+class Watch(c.Structure):
+    """sd_watch."""
+
+    _fields_ = [("row", I), ("side", I), ("tolerance", D)]
+
+
+class Held(c.Structure):
+    """sd_held."""
+
+    _fields_ = [
+        *[(name, I) for name in ["held", "clear"]],
+        *[(name, P) for name in ["row", "unknown", "slot", "rate", "cleared"]],
+    ]
+
+
+class Mode(c.Structure):
+    """sd_mode."""
+
+    _fields_ = [
+        *[(name, I) for name in ["watches", "first"]],
+        *[(name, P) for name in ["row", "side", "rate", "value", "relation", "holds", "held"]],
+    ]
+
+
+class Transition(c.Structure):
+    """sd_transition."""
+
+    _fields_ = [
+        *[(name, I) for name in ["to", "next", "crossed", "due", "rounds", "moves"]],
+        *[(name, P) for name in ["which", "sample", "end", "kind", "place", "read", "sides"]],
+        ("entries", L),
+    ]
+
+
+class Contact(c.Structure):
+    """sd_contact."""
+
+    _fields_ = [(name, I) for name in ["kind", "value", "rate", "multiplier", "bound", "guard", "sense"]]
+
+
+class Kink(c.Structure):
+    """sd_kink."""
+
+    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below"]]
+
+
+class Modes(c.Structure):
+    """sd_modes."""
+
+    _fields_ = [
+        *[(name, P) for name in ["mode", "transition"]],
+        *[(name, I) for name in ["now", "parameters", "places", "relations", "contacts", "kinks"]],
+        *[(name, I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
+        *[(name, P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
+        *[(name, P) for name in ["period", "next"]],
+        *[(name, D) for name in ["first", "segment", "last", "nothing", "begin", "longest"]],
+        *[(name, P) for name in ["t_end", "h_max", "largest"]],
+        *[(name, D) for name in ["small", "still"]],
+        *[(name, P) for name in ["alike", "alike_end", "state", "differential", "unnamed"]],
+        *[(name, P) for name in ["met", "magnitude", "resolved"]],
+        *[(name, D) for name in ["unknown_size", "round_off"]],
+        *[(name, P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
+        *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
+        *[(name, P) for name in ["exact", "found", "which", "watch", "log"]],
+        ("left", L),
+        *[(name, I) for name in ["width", "room", "logged", "waits"]],
+    ]
+
+
+class Run(c.Structure):
+    """sd_run."""
+
+    _fields_ = [
+        ("stepper", P),
+        ("settle", P),
+        ("least_norm", P),
+        ("ledgers", P),
+        ("written", I),
+        ("observed", I),
+        ("audited", I),
+        ("audit", P),
+        ("powers", P),
+        ("rated", I),
+        *[
+            (name, P)
+            for name in [
+                "observe",
+                "observe_rate",
+                "observe_scale",
+                "audit_at",
+                "instant",
+                "instant_kind",
+            ]
+        ],
+        ("instants", I),
+        ("every_step", I),
+        ("sample_steps", I),
+        ("bare", I),
+        ("unsummed", I),
+        ("rough", D),
+        ("apart", D),
+        ("start_rate", P),
+        ("row", P),
+        ("room", I),
+        ("rows", I),
+        ("next", I),
+        ("pending", I),
+        ("started", I),
+        ("fresh", I),
+        ("sampled", I),
+        *[(name, D) for name in ["stored", "dissipated", "supplied", "step_dissipated", "step_supplied"]],
+        ("t_from", D),
+        ("t_row", D),
+        *[(name, P) for name in ["power", "after", "sample", "integral", "end"]],
+        *[(name, P) for name in ["point", "point_d", "values", "largest", "slope", "memory"]],
+        ("rows_written", L),
+        ("first_energy", D),
+        ("watch", P),
+        ("watches", I),
+        ("end_kind", I),
+        ("start_kind", I),
+        ("t_to", D),
+        ("magnitude", P),
+        ("beyond", D),
+        ("projected", P),
+        ("modes", P),
+    ]
+
+
+class Region(c.Structure):
+    """sd_region."""
+
+    _fields_ = [("at", P), ("copy", P), ("size", L)]
+
+
+COUNTERS = 8
+"""Of the work of a pass."""
+
+
+class Pass(c.Structure):
+    """sd_pass."""
+
+    _fields_ = [
+        ("run", P),
+        ("region", P),
+        *[(name, I) for name in ["regions", "n"]],
+        *[(name, P) for name in ["y", "yd", "start_rate", "differential"]],
+        *[(name, P) for name in ["magnitude", "met", "least", "project", "rtol", "h_max", "opening"]],
+        ("longest", D),
+        ("counter", P * COUNTERS),
+    ]
+
+
+class RunClaim(c.Structure):
+    """sd_claim."""
+
+    _fields_ = [*[(name, I) for name in ["moment", "op", "left", "right", "within"]], ("at", D)]
+
+
+class RunSamples(c.Structure):
+    """sd_samples."""
+
+    _fields_ = [("time", P), ("value", P), ("late", P), ("number", I), ("room", I)]
+
+
+class Many(c.Structure):
+    """sd_many."""
+
+    _fields_ = [
+        ("p", P),
+        *[(name, I) for name in ["parameters", "written", "columns", "observed"]],
+        *[(name, P) for name in ["start", "region"]],
+        ("regions", I),
+        *[(name, P) for name in ["y0", "yd0", "anchored", "guessed", "guess", "size"]],
+        ("smallest", D),
+        *[(name, P) for name in ["jy0", "jyd0", "counts", "jy", "jyd"]],
+        *[(name, I) for name in ["flows", "inertias"]],
+        *[(name, P) for name in ["inertia_row", "inertia_column", "inertia_entry", "inertia_rate"]],
+        *[(name, P) for name in ["inertia_sign", "inertia"]],
+        *[(name, D) for name in ["t0", "t1"]],
+        *[(name, P) for name in ["system", "sizing", "order", "form_jy", "form_jyd", "found"]],
+        ("tau", D),
+        ("passes", Pass * 2),
+        *[(name, P) for name in ["column", "target", "unit", "unit_of"]],
+        *[(name, I) for name in ["units", "known"]],
+        *[(name, D) for name in ["late", "power", "credit", "finest", "far"]],
+        *[(name, D) for name in ["ratio", "little", "growth", "few_steps", "many_steps"]],
+        ("tolerance", D * 2),
+        ("max_steps", L),
+        ("energy", D),
+        ("claim", P),
+        *[(name, I) for name in ["claims", "keep"]],
+        ("thin", P),
+        ("thins", I),
+        ("sample", RunSamples * 3),
+        *[(name, I) for name in ["stride", "seen", "rows", "thinned", "broken", "judged"]],
+        ("last_time", D),
+        *[(name, P) for name in ["end", "least", "most", "thick", "work", "kind"]],
+        ("held", I),
+        ("spent", D),
+        ("counted", L * COUNTERS),
+    ]

@@ -1,0 +1,255 @@
+"""The structures of core/steppers/*.h."""
+
+from __future__ import annotations
+
+import ctypes as c
+
+from sysdyn.runtime.model.structures.c_types import D, I, L, P
+
+MAX_ORDER = 5
+STAGES = 7
+PAIRS = 3
+POINTS = 3
+DOPRI_STAGES = 16
+DOPRI_DENSE = 7
+ENERGY_STAGES = 6
+_ORDERS = D * (MAX_ORDER + 2)
+
+
+class Stepper(c.Structure):
+    """sd_stepper."""
+
+    _fields_ = [
+        ("self", P),
+        ("system", P),
+        ("n", I),
+        *[(name, P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
+        ("nodes", I),
+        *[(name, P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
+        *[(name, P) for name in ["moves", "part_moves"]],
+        ("collocated", I),
+        ("show", P),
+        ("values", P),
+        ("onto", P),
+    ]
+
+
+class Expanded(c.Structure):
+    """sd_expanded."""
+
+    _fields_ = [
+        ("face", Stepper),
+        *[(name, P) for name in ["inner", "condensed", "y", "yd", "z", "zd", "memory", "met", "magnitude"]],
+    ]
+
+
+class Bdf(c.Structure):
+    """sd_bdf."""
+
+    _fields_ = [
+        ("system", P),
+        ("linear", P),
+        ("n", I),
+        ("max_order", I),
+        ("tested", I),
+        ("rtol", D),
+        ("t_end", D),
+        ("h_max", D),
+        ("fixed_h", D),
+        ("atol", P),
+        ("magnitude", P),
+        ("met", P),
+        ("test", P),
+        ("power", P),
+        ("t", D),
+        ("h", D),
+        ("h_used", D),
+        ("cj", D),
+        ("cj_factored", D),
+        ("contraction", D),
+        ("order", I),
+        ("order_used", I),
+        ("ns", I),
+        ("rising", I),
+        ("fresh_jacobian", I),
+        ("jacobian_age", I),
+        ("ready", I),
+        ("psi", _ORDERS),
+        ("alpha", _ORDERS),
+        ("beta", _ORDERS),
+        ("sigma", _ORDERS),
+        ("gamma", _ORDERS),
+        ("phi", P * (MAX_ORDER + 2)),
+        *[
+            (name, P)
+            for name in (
+                [
+                    "y",
+                    "yd",
+                    "ee",
+                    "weight",
+                    "newton_weight",
+                    "test_weight",
+                    "delta",
+                    "moved",
+                    "moved_d",
+                    "scale",
+                    "terms",
+                    "rate",
+                    "jy",
+                    "jyd",
+                    "g",
+                    "memory",
+                    "newton_power",
+                    "test_power",
+                ]
+            )
+        ],
+        ("h_weighed", D),
+        ("powered", P),
+        ("powers", I),
+        ("error_next", D),
+        ("steps", L),
+        ("rejected_steps", L),
+        ("newton_failures", L),
+        ("newton_iterations", L),
+        ("taken", L),
+        ("cause", I),
+        ("bad_row", I),
+        ("bad_column", I),
+        ("project", P),
+        ("stepper", Stepper),
+    ]
+
+
+class RadauMethod(c.Structure):
+    """sd_radau_method."""
+
+    _fields_ = [
+        ("stages", I),
+        ("pairs", I),
+        *[(name, D * STAGES) for name in ["c", "b"]],
+        ("inverse", D * STAGES * STAGES),
+        ("gamma", D),
+        ("lambda_", D * 2 * PAIRS),
+        *[(name, D * STAGES) for name in ["column", "row"]],
+        *[(name, D * 2 * STAGES * PAIRS) for name in ["columns", "rows"]],
+        ("estimate", D * STAGES),
+        ("lift", D * (STAGES + 1)),
+        ("taylor", D * STAGES * 2),
+        ("constant", D),
+    ]
+
+
+class Radau(c.Structure):
+    """sd_radau."""
+
+    _fields_ = [
+        ("system", P),
+        ("linear", P),
+        ("complex_linear", P * PAIRS),
+        *[(name, I) for name in ["n", "tested", "stages", "most_stages"]],
+        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power", "smooth"]],
+        ("tolerance", D),
+        ("strict", D * 3),
+        *[(name, D) for name in ["t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
+        *[(name, D) for name in ["error_accepted", "theta", "state_size", "growth", "longest"]],
+        *[(name, I) for name in ["balances", "pressed", "ready", "old_jacobian", "rejected"]],
+        *[(name, P) for name in ["method", "used"]],
+        *[(name, I) for name in ["since", "hold", "creeping"]],
+        *[(name, P) for name in ["phi", "yd", "last", "before"]],
+        ("slope", P * POINTS),
+        ("refined", I * POINTS),
+        *[(name, P * STAGES) for name in ["z", "kept", "d", "base", "full"]],
+        *[(name, P) for name in ["first", "pull", "gap"]],
+        *[(name, D * POINTS) for name in ["apart", "bend"]],
+        *[(name, P) for name in ["y", "rate", "ee", "weight"]],
+        *[(name, P) for name in ["newton_weight", "scale", "terms", "jy", "jyd", "g", "memory"]],
+        ("w", P * PAIRS),
+        ("right", P),
+        *[(name, P) for name in ["beside", "other", "point_y", "point_rate"]],
+        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
+        *[(name, L) for name in ["factorisations", "taken"]],
+        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
+        ("project", P),
+        ("stepper", Stepper),
+    ]
+
+
+class Underlying(c.Structure):
+    """sd_underlying."""
+
+    _fields_ = [
+        *[(name, P) for name in ["system", "matrix", "applied", "position", "velocity", "linear"]],
+        *[(name, I) for name in ["n", "first", "solved", "direct"]],
+        *[(name, P) for name in ["unknown", "rate", "column", "source", "from_rate", "magnitude", "displaced"]],
+        *[(name, P) for name in ["goal_position", "goal_velocity"]],
+        ("tolerance", D),
+        *[(name, P) for name in ["values", "r", "step", "rest", "memory", "place_y", "place_yd"]],
+        *[(name, I) for name in ["ready", "bad_row", "bad_column"]],
+        ("drift", D),
+    ]
+
+
+class Dopri(c.Structure):
+    """sd_dopri."""
+
+    _fields_ = [
+        ("system", P),
+        ("underlying", P),
+        ("n", I),
+        ("tested", I),
+        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
+        *[(name, D) for name in ["patience", "spare", "opening", "t", "h", "h_used", "error_accepted"]],
+        *[(name, I) for name in ["rejected", "dense", "stiff", "smooth", "outrun", "even"]],
+        *[(name, P) for name in ["phi", "yd"]],
+        *[(name, P * DOPRI_STAGES) for name in ["y", "rate"]],
+        ("f", P * DOPRI_DENSE),
+        *[(name, P) for name in ["ee", "weight", "moved", "moved_d", "memory"]],
+        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
+        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
+        ("stepper", Stepper),
+    ]
+
+
+class Collocation(c.Structure):
+    """sd_collocation."""
+
+    _fields_ = [(name, P * ENERGY_STAGES) for name in ["y", "rate"]]
+
+
+class Energy(c.Structure):
+    """sd_energy."""
+
+    _fields_ = [
+        ("system", P),
+        ("underlying", P),
+        ("n", I),
+        ("tested", I),
+        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
+        ("patience", D),
+        ("audit", P),
+        ("audited", I),
+        *[(name, D) for name in ["t", "h", "h_used", "wanted", "anchor", "anchor_end"]],
+        *[(name, L) for name in ["count", "done"]],
+        *[(name, D) for name in ["rough", "before", "rough_before"]],
+        *[(name, L) for name in ["window", "since", "held"]],
+        *[(name, I) for name in ["limited", "grown"]],
+        *[(name, D) for name in ["frequency", "energy", "lost", "content"]],
+        *[(name, I) for name in ["finding", "guessed"]],
+        ("dense_t", D),
+        ("inner_ready", I),
+        *[(name, P) for name in ["phi", "yd", "rest", "from", "from_d", "from_rest"]],
+        ("from_t", D),
+        ("from_energy", D),
+        *[(name, Collocation) for name in ["stage", "side"]],
+        *[(name, P) for name in ["raw", "half", "half_rest", "inner", "inner_d", "trial", "old_y", "old_rate"]],
+        *[(name, P) for name in ["begin", "position", "velocity"]],
+        *[(name, P) for name in ["base", "sample", "work", "moves", "inner_moves", "ee", "weight", "memory"]],
+        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
+        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
+        ("stepper", Stepper),
+    ]

@@ -1,0 +1,138 @@
+"""At which instants runs are compared, and what is said of what they miss, on rows made by hand."""
+
+import numpy as np
+import pytest
+from sysdyn.runtime.integrate.common_instants import MANY, MOST, Thinned, beside, common, joined, known
+from sysdyn.runtime.integrate.ledgers import Balance
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.integrate.request import COMPARED, TRACE
+from sysdyn.runtime.integrate.round_off import LeftOpen
+from sysdyn.runtime.integrate.unknown_roles import Roles, without_rate
+from sysdyn.runtime.judgement import Estimate, allowed, cancelled, judge
+from sysdyn.runtime.model.failures import RowLabel
+
+
+def rows(times):
+    return np.stack([np.asarray(times, dtype=float), np.arange(len(times), dtype=float)], axis=1)
+
+
+def test_few_rows_are_all_kept():
+    thinned = Thinned()
+    assert thinned.time.size == 0
+    thinned.take(rows(range(5)))
+    thinned.take(rows([]).reshape(0, 2))
+    assert thinned.time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 4.0]  # the last one stands behind all
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_a_long_stream_is_thinned_evenly_whatever_its_chunks(chunk):
+    thinned, every = Thinned(), np.arange(3000.0)
+    for k in range(0, every.size, chunk):
+        thinned.take(rows(every[k : k + chunk]))
+    kept = thinned.time[:-1]
+    assert np.unique(np.diff(kept)).size == 1
+    assert MOST < kept.size <= 2 * min(max(MOST, every.size // 16), MANY)
+    assert thinned.time[-1] == 2999.0
+    assert thinned.rows(kept[3:5])[:, 0].tolist() == kept[3:5].tolist()
+    assert len(thinned.rows(np.array([0.5]))) == 0
+
+
+def test_instants_are_known_where_the_trace_has_an_interval():
+    assert known(np.arange(10.0), Options(None, 0.0, 9.0)) is None
+    many = known(np.linspace(0.0, 1.0, 1201), Options(None, 0.0, 1.0, every=1 / 1200))
+    assert many.size == 401  # every third, the last among them
+    few = known(np.array([0.0, 1.0]), Options(None, 2.0, 4.0, every=2.0))
+    assert few.size == MOST + 1
+    assert few[-1] == 4.0
+    assert ((few > 2.0) & (few <= 4.0)).all()
+
+
+def test_beside_a_jump_of_the_text_nothing_is_compared():
+    options = Options(None, 0.0, 10.0, stops=np.array([5.0, np.inf]))
+    assert common(np.array([0.0, 5.0 - 1e-9, 5.0, 5.1, 5.1]), options).tolist() == [0.0, 5.1]
+    assert common(np.array([5.0, 1.0]), Options(None, 0.0, 10.0)).tolist() == [1.0, 5.0]
+
+
+def test_between_one_event_of_two_runs_nothing_is_compared():
+    """The first events are 0.02 apart and 4 from the next: one event.  The second are as far apart as the third is."""
+    one, two = np.array([1.00, 5.0, 6.0]), np.array([1.02, 5.6, 6.0])
+    instants = np.array([0.99, 1.01, 1.03, 5.3, 6.0, 7.0])
+    assert beside(instants, one, two, 1.0).tolist() == [False, True, False, False, True, False]
+    assert not beside(instants, one, np.zeros(0), 1.0).any()
+
+
+def test_instants_of_both_kinds_are_one():
+    every, kinds = joined(np.array([0.0, 1.0]), np.array([TRACE, TRACE]), np.array([0.5, 1.0]))
+    assert every.tolist() == [0.0, 0.5, 1.0]
+    assert kinds.tolist() == [TRACE, COMPARED, TRACE | COMPARED]
+
+
+def test_round_off_of_a_balance_grows_with_what_passes():
+    """0.5 J stored; 2 W dissipated, 3 W supplied over 10 s."""
+    assert LeftOpen(np.zeros(0), np.array([[0.5, 2.0, 3.0, 9.0]])).balances(10.0).tolist() == [50.5]
+
+
+def test_flows_that_are_solved_for_carry_nothing():
+    yes, none = np.array([True, True]), np.zeros(2, np.int32)
+    found = without_rate(Roles(none, none, yes, yes, yes, ~yes), np.array([False, True]))
+    assert found.test.tolist() == [0, -1]
+    for mask in (found.state, found.differential, found.smooth):
+        assert mask.tolist() == [True, False]
+    assert found.idle.tolist() == [False, True]
+
+
+SPRING = RowLabel("spring.q", "observe", "m.sd", 3)
+
+
+def balance(value, turnover=2.0, kind="energy", passed=1.0, risen=()):
+    return Balance(kind, "energy", "J", passed, turnover, value, SPRING, risen)
+
+
+def test_what_a_balance_may_be_follows_from_the_accuracy():
+    assert allowed(Options(None, 0.0, 1.0, accuracy=1e-4)) == pytest.approx(1e-3)
+    assert allowed(Options(None, 0.0, 1.0, accuracy=1e-4, accuracy_on=(("x", 1e-2),))) == pytest.approx(0.1)
+    assert allowed(Options(None, 0.0, 1.0, accuracy=None)) == 1e-12
+    assert allowed(Options(None, 0.0, 1.0, rtol=1e-6)) == pytest.approx(1e-2)
+    assert allowed(Options(None, 0.0, 1.0, rtol=1.0)) == 0.1
+
+
+def test_a_run_misses_a_balance_at_its_first_instant_beyond():
+    options = Options(None, 0.0, 1.0, accuracy=1e-4)
+    found = judge(options, "bdf", [balance(0.01, risen=((0.1, 1e-3), (0.4, 5e-3), (0.7, 0.01)))], True, [])
+    (missed,) = found.not_met
+    assert (missed.what, missed.value, missed.element, missed.time) == ("energy", 0.01, "spring.q", 0.4)
+    assert missed.limit == pytest.approx(2e-3)
+    assert found.judged == ("accuracy", "energy")
+    assert found.attributes() == {"met": 0, "judged": "accuracy energy"}
+    assert judge(options, "bdf", [balance(1e-3)], True, []).met
+
+
+def test_round_off_may_be_all_that_a_balance_is():
+    found = judge(Options(None, 0.0, 1.0), "bdf", [balance(1e-20, turnover=0.0)], True, [], lambda: np.array([1e-19]))
+    assert found.met
+    assert not judge(Options(None, 0.0, 1.0), "bdf", [balance(np.nan)], True, []).met
+
+
+def test_implicit_euler_is_not_judged_and_what_should_stay_is_told():
+    kept = balance(0.5, passed=0.0)
+    found = judge(Options(None, 0.0, 1.0), "euler", [kept, balance(0.5)], True, [Estimate("x", 1.0, 1e-4, None)])
+    assert (found.judged, found.not_met) == ((), ())
+    assert found.kept() == [{"what": "energy", "drift": 0.5, "of": 2.0, "unit": "J"}]
+
+
+def test_a_quantity_that_misses_its_accuracy_is_named():
+    (missed,) = judge(Options(None, 0.0, 1.0), "bdf", [], True, [Estimate("x", None, 1e-4, 0.3)]).not_met
+    assert missed.to_json() == {
+        "what": "accuracy", "value": None, "limit": 1e-4, "element": "x", "time": 0.3, "unit": "1",
+    }  # fmt: skip
+    assert judge(Options(None, 0.0, 1.0), "bdf", [], False, [Estimate("x", 1.0, 1e-4, 0.3)]).met
+
+
+def test_a_difference_of_large_terms_is_told_where_their_error_is_too_much_of_it():
+    """Terms of 1000 known to 1e-6 are known to 1e-3, too little for 0.1 to 1e-4, enough for it to 2e-2."""
+    (found,) = cancelled({"d": 1000.0}, {"d": 0.1}, 1e-4, 1e-6)
+    assert (found.quantity, found.terms) == ("d", 1000.0)
+    assert found.known == pytest.approx(1e-3)
+    assert not list(cancelled({"d": 1000.0}, {"d": 0.1}, 2e-2, 1e-6))
+    assert not list(cancelled({"d": 1000.0}, {"d": 10.0}, 1e-9, 1e-6))  # one hundredth has not cancelled
+    assert not list(cancelled({"d": 1000.0}, {"d": 1e-13}, 1e-4, 1e-6))  # a zero by symmetry
