@@ -123,12 +123,13 @@ LAWS = {
     "energy": Law(1.0, 1.0, 0.9, 1e-15),
 }
 STEEP = Law(40.0, 1.0, 0.85, 2e-14, growth=1.25, ratio=0.2, loosest=2e-4, most=10_000, far=1e-3, little=0.3)
-"""Of the bdf where laws are steep: its error is 0.02 to 0.45 of steps times tolerance, however many steps (rectifiers,
+"""Of the bdf where laws are steep: its error is 0.02 to 0.9 of steps times tolerance, however many steps (rectifiers,
 diodes, transistors).
 """
 
-OF_THREE_STAGES = Law(1.5, 0.9, 0.6, 1e-17, ratio=0.01, little=0.02)
-"""Of radau there, which takes no more stages: a tolerance a hundredth as large costs it twice the steps."""
+OF_THREE_STAGES = Law(1.5, 0.9, 0.6, 1e-17, ratio=0.01, loosest=0.03, little=0.02)
+"""Of radau there, which takes no more stages: a tolerance a hundredth as large costs it twice the steps, and
+a draft looser than a thirtieth says little of them."""
 
 
 def law_of(method: str, *, steep: bool) -> Law:
