@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -279,6 +279,10 @@ class Integration:
         atol, magnitude, met = seen
         method.atol, method.magnitude, method.met = map(lib.pointer, (atol, magnitude, met))
         method.test, method.power = lib.pointer(found.test), lib.pointer(found.power)
+        if self.request.method == "bdf" and (found.common >= 0).any():
+            self._groups = found.groups()
+            method.common_from, method.common = map(lib.pointer, self._groups)
+            method.commons = self._groups[0].size - 1
         if self.request.method == "radau":
             method.smooth = lib.pointer(self._stepped[2])
         if self.system.form.scales and self.underlying is None:
@@ -290,8 +294,7 @@ class Integration:
     def _kept_roles(self, whole: System, kept: Ints) -> Roles:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
         _, jyd = whole.jacobian(self.start.t, self.y, self.yd)
-        found = roles(whole, self.start.t, jyd, min(self.request.index, 2))
-        return Roles(*(np.ascontiguousarray(getattr(found, field.name)[kept]) for field in fields(Roles)))
+        return roles(whole, self.start.t, jyd, min(self.request.index, 2)).kept(kept)
 
     def _sizes(self) -> tuple[Floats, Floats]:
         """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point."""
