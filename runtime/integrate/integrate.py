@@ -360,7 +360,8 @@ class Integration:
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps, run.apart = int(request.sample_steps), request.apart
         run.rough, run.bare = request.settled_to, int(self._bare and not request.audited)
-        run.unsummed = int(request.draft and not request.audited and request.events is None and self._unread)
+        unread = not request.audited and request.events is None and self._unread
+        run.unsummed = 1 + request.draft if unread else 0
         if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
         run.projected = self._projected()
