@@ -42,7 +42,7 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, null_place
 
 CHUNK_SECONDS = 0.05
-WINDOW, STRAINED = 32, 0.5
+WINDOW, STRAINED = 24, 0.5
 """Steps, with a quarter of those before, in which Newton may fail in this part of them: beyond, the tolerance says
 little of what a run finds."""
 CHUNK_STEPS = 1 << 20
