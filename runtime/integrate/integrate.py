@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -41,7 +41,7 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import DENSE, null_place
 
 CHUNK_SECONDS = 0.05
-WINDOW, STRAINED = 32, 0.5
+WINDOW, STRAINED = 24, 0.5
 """Steps, with a quarter of those before, in which Newton may fail in this part of them: beyond, the tolerance says
 little of what a run finds."""
 CHUNK_STEPS = 1 << 20
@@ -278,6 +278,10 @@ class Integration:
         atol, magnitude, met = seen
         method.atol, method.magnitude, method.met = map(lib.pointer, (atol, magnitude, met))
         method.test, method.power = lib.pointer(found.test), lib.pointer(found.power)
+        if self.request.method == "bdf" and (found.common >= 0).any():
+            self._groups = found.groups()
+            method.common_from, method.common = map(lib.pointer, self._groups)
+            method.commons = self._groups[0].size - 1
         if self.request.method == "radau":
             method.smooth = lib.pointer(self._stepped[2])
         if self.system.form.scales and self.underlying is None:
@@ -289,8 +293,7 @@ class Integration:
     def _kept_roles(self, whole: System, kept: Ints) -> Roles:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
         _, jyd = whole.jacobian(self.start.t, self.y, self.yd)
-        found = roles(whole, self.start.t, jyd, min(self.request.index, 2))
-        return Roles(*(np.ascontiguousarray(getattr(found, field.name)[kept]) for field in fields(Roles)))
+        return roles(whole, self.start.t, jyd, min(self.request.index, 2)).kept(kept)
 
     def _sizes(self) -> tuple[Floats, Floats]:
         """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point."""
@@ -356,7 +359,8 @@ class Integration:
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sample_steps, run.apart = int(request.sample_steps), request.apart
         run.rough, run.bare = request.settled_to, int(self._bare and not request.audited)
-        run.unsummed = int(request.draft and not request.audited and request.events is None and self._unread)
+        unread = not request.audited and request.events is None and self._unread
+        run.unsummed = 1 + request.draft if unread else 0
         if self.underlying is None and system.form.scales:
             run.magnitude = lib.pointer(self.magnitude)
         run.projected = self._projected()

@@ -1,6 +1,7 @@
 """Which unknowns the error test sees, and with which power of h Newton's test weighs them.
 
-Error test: displacements, momenta, dynamic variables, flows with inertia.  Left out: multipliers, implicit efforts,
+Error test: displacements, momenta, dynamic variables, flows with inertia.  Of flows that stores know by differences
+alone these differences: what they have in common follows from algebra.  Left out: multipliers, implicit efforts,
 flows of massless coordinates (they follow from the others; their accuracy is that of the state, and on index 2 their
 local error is one order larger than what it does to the solution).  Where nothing else is left, they are tested.
 Newton's test: multipliers and other index-2 unknowns with h, index-3 multipliers with h^2 (Petzold & Lötstedt 1986):
@@ -10,7 +11,7 @@ are nearly linear: an unknown of a steep law counts as it is.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +20,17 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.structure.rates import unique
 from sysdyn.values import dataclass
 
+BALANCED = 1e-12
+"""Sum of a row of dF/dyd over that of its magnitudes that is round-off."""
+
 
 @dataclass(frozen=True, slots=True)
 class Roles:
     """test [unknowns]: -1 left out, 0 tested, 1 tested with h; power [unknowns]: of h in Newton's norm.
 
     state [unknowns]: carry the state; differential [unknowns]: their derivative occurs;
-    smooth [unknowns]: it is determined; idle [unknowns]: steep laws may leave them open where their slopes underflow.
+    smooth [unknowns]: it is determined; common [unknowns]: number of the group of flows of which differences alone are
+    states (-1: of none); idle [unknowns]: steep laws may leave them open where their slopes underflow.
     """
 
     test: Ints
@@ -34,6 +39,20 @@ class Roles:
     differential: NDArray[np.bool_]
     smooth: NDArray[np.bool_]
     idle: NDArray[np.bool_]
+    common: Ints
+
+    def groups(self) -> tuple[Ints, Ints]:
+        """Where each group begins among the unknowns of all groups, and these [in groups], as the core has them."""
+        order = np.argsort(self.common, kind="stable")[int((self.common < 0).sum()) :].astype(np.int32)
+        begin = np.flatnonzero(np.diff(self.common[order], prepend=-1))
+        return np.append(begin, order.size).astype(np.int32), order
+
+    def kept(self, places: Ints) -> Roles:
+        """The roles of these unknowns; a group of which others leave is none."""
+        left = np.delete(self.common, places)
+        common = np.where(np.isin(self.common, left), -1, self.common)
+        arrays = (common if f.name == "common" else getattr(self, f.name) for f in fields(Roles))
+        return Roles(*(np.ascontiguousarray(array[places]) for array in arrays))
 
 
 def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
@@ -64,7 +83,43 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     if (test < 0).all():
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
-    return Roles(test.astype(np.int32), power, state, differential, smooth, idle)
+    common = _common(system, jyd, flows & state & ~smooth if index < 2 else np.zeros_like(flows))
+    return Roles(test.astype(np.int32), power, state, differential, smooth, idle, common)
+
+
+def _common(system: System, jyd: Floats, shared: NDArray[np.bool_]) -> Ints:
+    """Group of each unknown (-1: none): connected components of dF/dyd within `shared` all of whose rows sum to zero."""
+    column, row = system.pattern.columns_of(), system.pattern.row
+    there = jyd != 0.0
+    read = np.zeros(system.rows, dtype=bool)
+    read[row[there & shared[column]]] = True
+    there &= read[row]
+    found = np.full(system.unknowns, -1, dtype=np.int32)
+    if not there.any():
+        return found
+    row, column, value = row[there], column[there], jyd[there]
+    group = _components(row, column, system.unknowns)
+    total = np.bincount(row, value, system.rows), np.bincount(row, np.abs(value), system.rows)
+    other = (np.abs(total[0]) > BALANCED * total[1])[row] | ~shared[column]
+    good = ~np.isin(group[column], group[column[other]])
+    found[column[good]] = group[column[good]]
+    return found
+
+
+def _components(row: Ints, column: Ints, unknowns: int) -> Ints:
+    """Connected component of each column [unknowns] of a pattern: the least column in it.  Minima along rows, and of
+    the components that they name, until nothing changes.
+    """
+    label = np.arange(unknowns, dtype=np.int32)
+    least = np.full(int(row.max(initial=-1)) + 1, unknowns, dtype=np.int32)
+    while True:
+        before = label.copy()
+        np.minimum.at(least, row, label[column])
+        np.minimum.at(label, before[column], least[row])
+        np.minimum.at(label, column, least[row])
+        label = label[label]
+        if (label == before).all():
+            return label
 
 
 def without_rate(found: Roles, flows: NDArray[np.bool_]) -> Roles:
@@ -76,4 +131,5 @@ def without_rate(found: Roles, flows: NDArray[np.bool_]) -> Roles:
         differential=found.differential & ~flows,
         smooth=found.smooth & ~flows,
         idle=found.idle | flows,
+        common=np.full_like(found.common, -1),
     )

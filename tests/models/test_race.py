@@ -20,7 +20,7 @@ def test_the_peers_reach_published_ends(tmp_path, monkeypatch):
     if peers.missing:
         pytest.skip(f"no SUNDIALS: {peers.missing}")
     monkeypatch.setattr(race, "FORMS", ("0",))
-    found = list(peers.runs("hires", 321.8122, 0.2))
+    found = list(peers.runs("hires", 321.8122, 1.0))  # s: on a loaded machine a tenth of it
     assert {"ida", "bdf", "adams"} >= {who.split()[0] for who, _, _ in found}
     for number, wanted in ENDS["hires"].items():
         assert min(abs(values[f"y{number}"] / wanted - 1.0) for _, _, values in found) < 1e-6

@@ -121,12 +121,13 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
     double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
     double *out = run->end, dissipated = 0.0, supplied = 0.0;
+    const int alone = !at_step && (int32_t)kind == SD_COMPARED, unsummed = run->unsummed > !alone;
     if (run->fresh) {
         memcpy(run->point, run->stepper->y, (size_t)run->stepper->n * sizeof(double));
         memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
     } else {
         int there = 0;
-        if (!at_step && !run->unsummed) {
+        if (!at_step && !unsummed) {
             there = sd_run_integrate(run, t);
             dissipated = run->integral[2];
             supplied = run->integral[3];
@@ -147,10 +148,13 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         note_beyond(run);
     dissipated = at_step ? run->dissipated : run->step_dissipated + dissipated;
     supplied = at_step ? run->supplied : run->step_supplied + supplied;
-    sd_run_audit(run, t, run->point, run->point_d, out);
+    if (run->unsummed && alone)
+        memset(out, 0, (size_t)run->audited * sizeof *out);
+    else
+        sd_run_audit(run, t, run->point, run->point_d, out);
     if (!run->started)
         run->stored = out[0] + out[1];
-    if (run->unsummed)
+    if (unsummed)
         dissipated = supplied = NAN;
     double energy = out[0] + out[1] - run->stored + dissipated - supplied;
     double constraints = run->settle ? run->settle->constraints : 0.0;
@@ -166,7 +170,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     memset(row + SD_ROW_HEAD, 0, 2 * (size_t)run->observed * sizeof *row);
     if (run->observe)
         run->observe->rows(&run->observe->frame, t, run->point, run->point_d, row + SD_ROW_HEAD);
-    if (run->observe_rate)
+    if (run->observe_rate && !(compared && alone))
         run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d,
                                 row + SD_ROW_HEAD + run->observed);
     memset(run->values, 0, (size_t)run->observed * sizeof(double));
@@ -315,7 +319,7 @@ static void measure(sd_run *run, double from, double t)
     run->sampled = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
-    if (run->unsummed)
+    if (run->unsummed > 1)
         memset(run->integral, 0, (size_t)run->audited * sizeof(double));
     else if (t < *run->stepper->t && run->settle && !run->stepper->part_y)
         sd_run_integrate_cut(run, t);

@@ -43,7 +43,8 @@ typedef struct sd_run {
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
     int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
-    int32_t unsummed;                 /* nobody reads the integrals of powers: of a draft; they are no numbers */
+    int32_t unsummed;                 /* nothing observed reads the audit: rows for comparison alone are without it (1), a draft
+                                       * without integrals of powers (2); they are no numbers */
     double rough;                     /* scaled residual that will do for rows by which runs are compared and nothing else */
     double apart;                     /* part of a step: instants within it that are nearer to the row before are passed
                                        * over; 0: none is */

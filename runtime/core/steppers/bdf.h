@@ -9,6 +9,7 @@
  *   ns        steps taken with the present step size and order
  * Error test: weights w_i = atol_i + rtol |y_i|, atol_i = rtol * magnitude_i; unknowns with test_i < 0 (multipliers,
  * implicit efforts, flows of massless coordinates) are left out, those with test_i = k count with h^k.
+ * Of a group in `common` the part that its unknowns have in common (their mean in these weights) is left out too.
  * Newton's convergence test takes all of them, with h^power_i (1: index-2 unknowns, 2: index-3 multipliers).
  */
 #ifndef SYSDYN_BDF_H
@@ -29,6 +30,8 @@ typedef struct sd_bdf {
     double *magnitude;        /* [n] of the unknowns; grows with max |y| */
     double *met;              /* [n] max |y| */
     const int32_t *test, *power;
+    const int32_t *common_from, *common; /* [commons + 1] where each group begins in `common`: its unknowns */
+    int32_t commons;          /* groups of unknowns that are states but for what they have in common */
     /* state of the integration */
     double t, h, h_used, cj, cj_factored, contraction;
     int32_t order, order_used, ns, rising, fresh_jacobian, jacobian_age, ready;

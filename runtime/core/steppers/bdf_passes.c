@@ -135,6 +135,28 @@ SD_WIDE void sd_bdf_shift(sd_bdf *bdf)
     OF_ORDER(shift, bdf, bdf->order_used)
 }
 
+/* Squares, in the error weights, of x + by * other + more (or NULL) over the unknowns of groups, without what those of each
+ * group have in common */
+static double apart(const sd_bdf *bdf, const double *x, const double *other, double by, const double *more)
+{
+    double sum = 0.0;
+    for (int32_t g = 0; g < bdf->commons; g++) {
+        const int32_t *first = bdf->common + bdf->common_from[g], *end = bdf->common + bdf->common_from[g + 1];
+        double weights = 0.0, mean = 0.0;
+        for (const int32_t *i = first; i < end; i++) {
+            double w = bdf->weight[*i] * bdf->weight[*i];
+            weights += w;
+            mean += w * (x[*i] + by * other[*i] + (more ? more[*i] : 0.0));
+        }
+        mean /= weights;
+        for (const int32_t *i = first; i < end; i++) {
+            double v = bdf->weight[*i] * (x[*i] + by * other[*i] + (more ? more[*i] : 0.0) - mean);
+            sum += v * v;
+        }
+    }
+    return sum;
+}
+
 /* root mean squares over the tested unknowns of ee, ee + phi[k] and ee + phi[k] + phi[k-1]: corrections at the orders k,
  * k - 1, k - 2 */
 SD_WIDE void sd_bdf_orders(const sd_bdf *bdf, double *norm)
@@ -148,8 +170,14 @@ SD_WIDE void sd_bdf_orders(const sd_bdf *bdf, double *norm)
         sum[1] += b * w * (b * w);
         sum[2] += c * w * (c * w);
     }
+    double total[3] = {SD_TOTAL(sum[0]), SD_TOTAL(sum[1]), SD_TOTAL(sum[2])};
+    if (bdf->commons) {
+        total[0] += apart(bdf, ee, ee, 0.0, NULL);
+        total[1] += apart(bdf, ee, one, 1.0, NULL);
+        total[2] += apart(bdf, ee, one, 1.0, two);
+    }
     for (int j = 0; j < 3; j++)
-        norm[j] = bdf->tested ? sqrt(SD_TOTAL(sum[j]) / bdf->tested) : 0.0;
+        norm[j] = bdf->tested ? sqrt(total[j] / bdf->tested) : 0.0;
 }
 
 /* root mean square of x - minus in the error weights; both end on whole lanes */
@@ -162,7 +190,8 @@ SD_WIDE double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *min
         sd_lanes v = (SD_FROM(x, i) - SD_FROM(minus, i)) * SD_FROM(weight, i);
         sum += v * v;
     }
-    return bdf->tested ? sqrt(SD_TOTAL(sum) / bdf->tested) : 0.0;
+    double total = SD_TOTAL(sum) + (bdf->commons ? apart(bdf, x, minus, -1.0, NULL) : 0.0);
+    return bdf->tested ? sqrt(total / bdf->tested) : 0.0;
 }
 
 /* what a step of length h makes of the weights: powers of h in Newton's test and in that of the error */
@@ -175,6 +204,8 @@ static void set_powers(sd_bdf *bdf)
         bdf->newton_power[i] = power[bdf->power[i]];
         bdf->test_power[i] = test[bdf->test[i] + 1];
     }
+    for (int32_t k = 0; bdf->commons && k < bdf->common_from[bdf->commons]; k++)
+        bdf->test_power[bdf->common[k]] = 0.0; /* groups are summed apart */
     bdf->h_weighed = bdf->h;
 }
 

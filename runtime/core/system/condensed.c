@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* the same of one unknown, as most of a small model stand */
+/* x := factors * sources + constant of one unknown, as most of a small model stand: outside the wide loops */
 static inline void evaluate_one(const sd_straight *straight, double *x, int rate)
 {
     const int32_t *source = straight->source, terms = straight->terms;
@@ -65,16 +65,22 @@ static inline __attribute__((always_inline)) void evaluate(const sd_straight *st
         out[i] += c[i];
 }
 
-SD_WIDE void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
+SD_WIDE static void evaluate_many(const sd_straight *straight, double *x, int rate)
+{
+    if (straight->alike)
+        evaluate_alike(straight, x, rate);
+    else
+        evaluate(straight, x, rate);
+}
+
+void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
 {
     for (int32_t s = 0; s < condensed->straights; s++) {
         const sd_straight *straight = &condensed->straight[s];
         if (straight->number == 1)
             evaluate_one(straight, x, rate);
-        else if (straight->alike)
-            evaluate_alike(straight, x, rate);
         else
-            evaluate(straight, x, rate);
+            evaluate_many(straight, x, rate);
     }
 }
 
