@@ -60,7 +60,7 @@ static void find_places(sd_underlying *u)
         (u->from_rate[e] ? u->place_yd : u->place_y)[u->source[e]] = e;
 }
 
-static void add_entries(sd_entries *block, const sd_call *call, int32_t n, const int32_t *slot, const int32_t *place, double t,
+static void add_to_matrix(sd_entries *block, const sd_call *call, int32_t n, const int32_t *slot, const int32_t *place, double t,
                         const double *y, const double *yd, double *v, double *values)
 {
     if (n == 0)
@@ -71,7 +71,7 @@ static void add_entries(sd_entries *block, const sd_call *call, int32_t n, const
 }
 
 /* u->values := the matrix at (t, y, yd) */
-static void evaluate(sd_underlying *u, double t, const double *y, const double *yd)
+static void evaluate_matrix(sd_underlying *u, double t, const double *y, const double *yd)
 {
     const sd_system *system = u->matrix;
     double *values = u->values;
@@ -79,8 +79,8 @@ static void evaluate(sd_underlying *u, double t, const double *y, const double *
         find_places(u);
     memset(values, 0, (size_t)(u->linear->entries + 1) * sizeof *values);
     for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
-        add_entries(call->dy, call, call->n_dy, call->slot_dy, u->place_y, t, y, yd, system->v, values);
-        add_entries(call->dyd, call, call->n_dyd, call->slot_dyd, u->place_yd, t, y, yd, system->v, values);
+        add_to_matrix(call->dy, call, call->n_dy, call->slot_dy, u->place_y, t, y, yd, system->v, values);
+        add_to_matrix(call->dyd, call, call->n_dyd, call->slot_dyd, u->place_yd, t, y, yd, system->v, values);
     }
     for (int32_t i = 0; i < system->clear; i++)
         values[u->place_y[system->cleared[i]]] = values[u->place_yd[system->cleared[i]]] = 0.0;
@@ -95,7 +95,7 @@ static int factorise(sd_underlying *u, double t, const double *y, const double *
 {
     u->ready = 0;
     u->matrix->jacobian_evaluations++;
-    evaluate(u, t, y, yd);
+    evaluate_matrix(u, t, y, yd);
     if (*u->system->stop)
         return SD_STOPPED;
     int32_t bad = sd_first_bad(u->linear->entries, u->values);
