@@ -12,8 +12,8 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.start.instant import Instant
 from sysdyn.runtime.start.settled import HELD, Settler
-from sysdyn.runtime.start.start import behind
 from sysdyn.runtime.start.starter import Starter
+from sysdyn.runtime.start.strategies import behind
 
 STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""

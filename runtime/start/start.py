@@ -3,14 +3,11 @@
 Unknowns and equations: see starter.py.  Fixed values never move.  Guesses move least, those of the text first, then
 what no text says of stores, then displacements that hold nothing; what follows from these moves freely: each step is
 the least change from the *guess* on the linearised rows in this order (Gauss-Newton, in unknowns scaled by magnitude,
-rank-deficient rows tolerated; by weights where matrices are sparse).  Globalisation is the list STRATEGIES, tried in
-order until the rows hold; the name of the one that found it stays with the state.
+rank-deficient rows tolerated; by weights where matrices are sparse).  The strategies of globalisation (strategies.py)
+are tried in order until the rows hold; the name of the one that found it stays with the state.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
@@ -19,7 +16,6 @@ from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import (
     DENSE,
-    FOLDS,
     SINGULAR_VALUES,
     OutOfTimeError,
     Solution,
@@ -31,26 +27,13 @@ from sysdyn.runtime.numerics.least_change import (
 )
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
+from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, STRATEGIES, first, rescaled
 from sysdyn.values import dataclass
 
-_AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
-_RESCALINGS = 6
-HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi_rate", "gamma_rate")
-"""Groups of rows that are derivatives of others."""
-EXACT = 1e-9
-OWN = 1e-6
-CLOSED = 1e-12
-"""Scaled residual of rows that hold to round-off."""
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
-WALKED = 0.2
-"""Share of the work of a search that walking down steep laws may take."""
-LEAST_PART = 1e-6
-"""Of misses: less is not faded out at once."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
-FOLLOWED, NEARLY = 12, 1e-4
-"""Iterations in which Newton's method follows what fades, and the scaled residual at which it has."""
 EXPLAINED = 0.1
 """Share of the work of a search that explaining what was not found may take."""
 
@@ -109,47 +92,6 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
-def _rescaled(
-    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True, sized: Floats | None = None
-) -> tuple[Solution, bool]:
-    """Everything at once from x, and whether it holds; magnitudes are those of `sized` at first (None: x).
-
-    Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
-    in the magnitudes of the solution too.
-    """
-    at, best = x if sized is None else sized, Solution(x, np.inf, np.zeros(0))
-    for k in range(_RESCALINGS):
-        if k and starter.work.done:
-            break
-        problem = problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least)
-        best = solve(problem, best.x)
-        if not np.isfinite(best.residual):
-            break
-        at = starter.without_noise(best.x, problem.scale)
-        if best.residual < EXACT:
-            clean = next((c for c in (at, best.x) if _own(starter, t, at, c) < OWN), None)
-            if clean is not None:
-                return replace(best, x=clean), True
-    return best, False
-
-
-def _own(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
-    """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution: those of
-    noise beside their like are no less than that.
-    """
-    scale = np.maximum(starter.scale(t, magnitudes), NOISE * starter.largest_alike(magnitudes))
-    size = starter.row_scale(t, magnitudes, scale)[starter.every]
-    return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
-
-
-def _bent(starter: Starter, t: float, x: Floats) -> Mask:
-    """Rows that are not linear."""
-    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * starter.scale(t, x)))
-    bent = np.zeros(starter.settled.rows, dtype=bool)
-    bent[starter.rows[here != there]] = True
-    return bent
-
-
 def _anew(
     starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask
 ) -> tuple[Solution, bool]:
@@ -165,7 +107,7 @@ def _anew(
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
     back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
     for moved in (back, near):
-        found, holds = _rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
+        found, holds = rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
         if holds and found.residual <= max(CLOSED, best.residual):
             return found, True
     return best, False
@@ -189,153 +131,12 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
     return best
 
 
-Tries = Iterator[tuple[Solution, bool]]
-Strategy = Callable[[Starter, float, Floats, Floats, Mask], Tries]
-"""From t, a point x to begin at, the guess and the free unknowns: solutions, each with whether all rows hold."""
-
-
-def _first(tries: Tries, x: Floats) -> tuple[Solution, bool]:
-    """The first at which all rows hold, else the one of the least residual; x where there is none."""
-    best = Solution(x, np.inf, np.zeros(0))
-    for found, holds in tries:
-        if holds:
-            return found, True
-        best = found if found.residual < best.residual else best
-    return best, False
-
-
-def _beyond(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
-    """Whether rows that read none of these unknowns are missed: loops of springs, constraints of the state."""
-    known = starter.equations
-    read = np.bincount(known.rows, known.structural & free[known.columns], starter.settled.rows)
-    missed = np.where((read == 0) & ~known.unsettled, np.abs(starter.residual(t, x)), 0.0)
-    return bool(missed.any() and (missed * starter.row_scale(t, x, starter.scale(t, x)) > OWN).any())
-
-
-def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """What follows from the state alone, by Newton's method; where that is not enough everything, the least first: a
-    guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
-    """
-    follows, nearly = free & starter.following(t, x), False
-    if not _beyond(starter, t, x, follows):
-        found, nearly = _rescaled(starter, t, x, guess, follows, least=False)
-        exact = nearly and (found.residual <= CLOSED or _own(starter, t, found.x, found.x) <= CLOSED)
-        yield found, exact
-    yield _rescaled(starter, t, x, guess, free)
-    if nearly:
-        yield found, True
-
-
-def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
-    """Rows as written and such derivatives as are linear: far from a solution the derivative of an exponential hides
-    what itself is after.
-    """
-    return starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
-
-
-def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """From a point at which rows as written hold: rates, which follow from the rest by linear rows; where that is not
-    all, everything at once.
-    """
-    x, sized = x.copy(), starter.without_noise(x, starter.scale(t, x))  # what round-off left is no magnitude
-    x[starter.n :] = sized[starter.n :] = guess[starter.n :]
-    if (x == guess)[free & ~starter.following(t, x)].all():
-        rates = free & (np.arange(x.size) >= starter.n)
-        found, holds = _rescaled(starter, t, x, x, rates, least=False, sized=sized)
-        if holds:
-            return found, holds
-        x = found.x
-    return _rescaled(starter, t, x, guess, free, sized=sized)
-
-
-def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Down steep laws on the rows as written, with a share of work of its own; then everything."""
-    rows = _as_written(starter, t, x)
-    with starter.granted(WALKED):
-        for _ in range(_RESCALINGS):
-            found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
-            if not np.isfinite(found.residual) or (found.x == x).all():
-                break
-            x = found.x
-    yield _completed(starter, t, x, guess, free)
-
-
-def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Along what fades of the misses of rows as written, as fast as Newton's method follows, the state held if that
-    will do; then everything (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of
-    its own.
-    """
-    follows = free & starter.following(t, x)
-    for may in (follows, free) if (follows != free).any() else (free,):
-        with starter.granted():
-            found = _completed(starter, t, _at_the_end(starter, t, x, may), guess, may)
-        yield found
-
-
-def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Floats]:
-    """Rows that hold where those of the start are missed by so much."""
-    return lambda x: starter.residual(t, x) - miss
-
-
-def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
-    """Where the homotopy leads; as far as it got where work is over."""
-    every, miss, done, part = _as_written(starter, t, x), starter.residual(t, x), 0.0, 0.5
-    while done < 1.0 and part > LEAST_PART and not starter.work.done:
-        left = _faded(starter, t, max(1.0 - done - part, 0.0) * miss)
-        rows = problem_of(starter, t, x, x, rows=every, free=free)
-        found = solve(replace(rows, residual=left, core=None), x, FOLLOWED)
-        follows = found.residual < NEARLY
-        x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
-    return solve(problem_of(starter, t, x, x, rows=every, free=free), x).x
-
-
-def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Everything at once from points around, always the same, as long as there is work left: where a guess lies on a
-    singular point.
-    """
-    random = np.random.default_rng(20)
-    for amplitude in _AMPLITUDES:
-        if starter.work.done:
-            return
-        shaken = x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
-        yield _rescaled(starter, t, shaken, guess, free)
-
-
-def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Everything at once in the largest scales that rows propose, with work of its own; kept where it succeeds."""
-    starter.generous = True
-    with starter.granted():
-        found, holds = _rescaled(starter, t, x, guess, free)
-    starter.generous = holds
-    if holds:
-        yield found, True
-
-
-STRATEGIES: tuple[tuple[str, Strategy], ...] = (
-    ("newton", _newton),
-    ("rows_as_written", _walked),
-    ("homotopy", _led),
-    ("perturbed_guess", _perturbed),
-    ("largest_scales", _in_largest_scales),
-)
-"""Globalisation: what is tried, in this order, until all rows hold."""
-
-
-def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
-    """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
-    a diode makes steep laws lie far behind it.
-    """
-    tries = (found for strategy in (_newton, _walked, _led) for found in strategy(starter, t, x, x, free))
-    found, holds = _first(tries, x)
-    return found.x if holds else None
-
-
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
     """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
     x = _begun(starter, t, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
-        found, holds = _first(strategy(starter, t, x, guess, free), x)
+        found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
         if holds or sure:
             return _sharp(starter, t, again, free), name

@@ -10,7 +10,7 @@ from reduced import ROOT
 from start_strategies import strategies
 from sysdyn.cli.options import EVERY
 from sysdyn.cli.run.starting import SOUGHT, sought
-from sysdyn.runtime.start.start import STRATEGIES
+from sysdyn.runtime.start.strategies import STRATEGIES
 from sysdyn.runtime.trace.trace import Trace
 
 GALLERY = ROOT / "models" / "gallery"

@@ -1,0 +1,155 @@
+"""A model's text elaborated step by step: what each step enters, and where."""
+
+import pytest
+from sysdyn.dsl import load
+from sysdyn.dsl.elaborate.connections import Ends
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.elaborate.events import Draft
+from sysdyn.dsl.elaborate.files import FileScope
+from sysdyn.dsl.elaborate.instances import BUILTINS
+from sysdyn.dsl.elaborate.parts import NetworkBuilder, declared, flatten
+from sysdyn.dsl.elaborate.statements import STATEMENTS
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
+from sysdyn.dsl.names.symbols import NodeSymbol, ParameterSymbol
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.dsl.tree import syntax
+
+OSCILLATOR = """
+component spring { param k = 4 N/m; branch: translation; law e = k*q; init q = 1 m }
+model swing {
+  param m = 2*mass
+  param mass = 1.5 kg
+  node x: translation
+  M: kinetic(p = m*f) x -> ground
+  K: spring() x -> ground
+}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _fresh():
+    with ex.fresh():
+        yield
+
+
+def begun(text):
+    """The elaborator of the last model of a text, and its report."""
+    report = Report()
+    document = load.document(SourceText("m.sd", text), report)
+    *_, model = document.models.values()
+    return Elaborator(FileScope(document.file, report), model, report), report
+
+
+def whole(text):
+    elaborator, report = begun(text)
+    elaborator.names()
+    elaborator.elements()
+    elaborator.statements()
+    return elaborator, [d.code for d in report]
+
+
+def test_names_come_first_and_parameters_in_the_order_of_their_dependence():
+    elaborator, report = begun(OSCILLATOR)
+    assert elaborator.parts == NetworkBuilder()
+    elaborator.names()
+    assert list(elaborator.parts.parameters) == ["mass", "m"]
+    assert isinstance(elaborator.space.scope.symbols["m"], ParameterSymbol)
+    assert isinstance(elaborator.space.scope.symbols["x"], NodeSymbol)
+    assert elaborator.parts.branches == []
+    assert not list(report)
+
+
+def test_elements_make_branches_between_the_ends_that_the_text_says():
+    elaborator, said = whole(OSCILLATOR)
+    branches = {b.name: b for b in elaborator.parts.branches}
+    assert [(n, b.kind, b.side) for n, b in branches.items()] == [("M", "kinetic", "p"), ("K", "potential", "e")]
+    for b in branches.values():
+        assert (b.plus.node, b.minus.node) == ("x", None)
+    assert said == []
+    # the component's own parameter stands under the instance
+    assert ex.to_text(elaborator.parts.parameters["K.k"].values[0]) == "4"
+    assert branches["K"].law is ex.mul(ex.param("K.k"), ex.var("K", "bq"))
+
+
+def test_statements_of_instances_are_in_their_own_names():
+    elaborator, _ = whole(OSCILLATOR)
+    (initial,) = elaborator.parts.initials
+    assert initial.target is ex.var("K", "bq")
+    assert initial.fixed
+    model, _ = whole(OSCILLATOR.replace("K: spring() x -> ground", "K: spring() x -> ground; init K.q ~ 2 m"))
+    depths = {i.fixed: i.depth for i in model.parts.initials}
+    assert depths[False] < depths[True]  # the model's own goes before what a component inside says
+
+
+def test_a_circle_of_parameters_is_told_once():
+    elaborator, report = begun("model m { param a = b; param b = a; param c = 1 }")
+    elaborator.names()
+    assert [d.code for d in report] == ["E105"]
+    assert {"a", "b"} <= elaborator.space.scope.broken
+    assert "c" in elaborator.parts.parameters
+
+
+def test_statements_that_belong_to_components_are_refused_in_a_model():
+    for text, code in (("branch: translation", "E408"), ("port a: translation", "E408"), ("law e = 1 N", "E303")):
+        elaborator, report = begun(f"model m {{ {text} }}")
+        elaborator.names()
+        assert [d.code for d in report] == [code], text
+
+
+def test_a_component_in_itself_is_told():
+    text = "component a { node p: electrical; A: a() }\nmodel m { A: a() }"
+    assert "E801" in whole(text)[1]
+
+
+def test_a_label_in_a_loop_has_its_variable():
+    row = "node n[1..3]: electrical\n for i in 1..3 { R[i]: dissipator(e = 2 ohm*f) n[i] -> ground }"
+    elaborator, said = whole(f"model m {{ {row} }}")
+    (branch,) = elaborator.parts.branches
+    assert said == []
+    assert branch.at == (ex.index(branch.loops[0].index),)
+    assert (branch.loops[0].first, branch.loops[0].last) == (ex.const(1.0), ex.const(3.0))
+    assert whole(f"model m {{ {row.replace('R[i]', 'R')} }}")[1] == ["E106"]
+
+
+def test_events_assign_what_is_discrete_and_cross_what_moves():
+    text = "coord x: translation = 1 m\n energy T* = 1 kg*x'^2\n discrete g = 1\n"
+    elaborator, said = whole(f"model m {{ {text} when x < 0 m {{ g := 2 }}\n every 0.5 s {{ g := 3 }} }}")
+    assert said == []
+    assert elaborator.parts.discretes == {"g"}
+    one, other = elaborator.parts.events
+    assert one.name == "when x < 0 m"
+    assert other.period is ex.const(0.5)
+    assert whole(f"model m {{ {text} when g < 0 {{ g := 2 }} }}")[1] == []
+    assert whole(f"model m {{ {text} when 1 < 0 {{ g := 2 }} }}")[1] == ["E701"]
+    assert whole(f"model m {{ {text} every -1 s {{ g := 2 }} }}")[1] == ["E703"]
+
+
+def test_inequalities_wait_as_drafts_until_sizes_are_known():
+    elaborator, said = whole("model m { coord x: translation = 1 m; energy T* = 1 kg*x'^2; phi floor: x >= 0 m }")
+    assert said == []
+    assert [type(d) for d in elaborator.parts.drafts] == [Draft]
+    assert elaborator.parts.switches == []
+
+
+def test_builtin_elements_are_the_one_and_two_ports():
+    assert (*ONE_PORTS, *TWO_PORTS) == BUILTINS
+    assert all(issubclass(kind, syntax.Statement) for kind in STATEMENTS)
+
+
+def test_bodies_are_flattened_with_the_loops_around_each_statement():
+    elaborator, _ = begun("model m { for i in 1..2 { for j in 1..3 { param a[i, j] = 1 } }\n param b = 2 }")
+    found = [(s, [loop.index.name for loop in loops]) for s, loops in flatten(elaborator.model.body)]
+    assert [([d.name for d in declared(s)], loops) for s, loops in found] == [(["a"], ["i", "j"]), (["b"], [])]
+
+
+def test_ends_say_what_a_connection_joins():
+    along = Ends(None, None, None, None)
+    assert along.plus is None
+    elaborator, said = whole("model m { node a, b: electrical; R: dissipator(e = 1 ohm*f) a -> b }")
+    (branch,) = elaborator.parts.branches
+    assert (branch.plus.node, branch.minus.node, said) == ("a", "b", [])
+    backwards, _ = whole("model m { node a, b: electrical; R: dissipator(e = 1 ohm*f) b -> a }")
+    assert backwards.parts.branches[0].plus.node == "b"
+    assert whole("model m { node a: electrical; R: dissipator(e = 1 ohm*f) a -> nowhere }")[1] == ["E101"]
