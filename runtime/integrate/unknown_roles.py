@@ -88,15 +88,15 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
 
 
 def _common(system: System, jyd: Floats, shared: NDArray[np.bool_]) -> Ints:
-    """Group of each unknown (-1: none): connected components of dF/dyd within `shared` all of whose rows sum to zero."""
+    """Group of each unknown (-1: none): components of dF/dyd within `shared` all of whose rows sum to zero."""
+    found = np.full(system.unknowns, -1, dtype=np.int32)
+    if not shared.any():
+        return found
     column, row = system.pattern.columns_of(), system.pattern.row
     there = jyd != 0.0
     read = np.zeros(system.rows, dtype=bool)
     read[row[there & shared[column]]] = True
     there &= read[row]
-    found = np.full(system.unknowns, -1, dtype=np.int32)
-    if not there.any():
-        return found
     row, column, value = row[there], column[there], jyd[there]
     group = _components(row, column, system.unknowns)
     total = np.bincount(row, value, system.rows), np.bincount(row, np.abs(value), system.rows)
