@@ -64,6 +64,10 @@ class Parameters:
         order: list[Parameter] = []
         state: dict[str, int] = {}
         for root in self._network.parameters:
+            if root.name not in self._given and state.get(root.name) is None and _number(root) is not None:
+                state[root.name] = 2  # uses none
+                order.append(root)
+                continue
             stack = [root.name]
             while stack:
                 name = stack[-1]

@@ -376,7 +376,7 @@ class Forms:
             if stepped.paired:
                 return Order(paired_order(stepped.pattern), paired=True)
             order = any_order(stepped.pattern, leaving=bool(whole.form.scales))
-            return with_pairs(stepped.pattern, order, stepped.own_rows)
+            return with_pairs(stepped.pattern, order, lambda: stepped.own_rows)
 
         return whole.once(("order", *stepped.key), made)
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Ints
+from sysdyn.runtime.model.own_rows import own_rows
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.matching import matched
@@ -84,19 +85,19 @@ def order_of(system: System) -> Order:
 
 def net_order_of(system: System) -> Order:
     """The same with rows of their own where that fills less, of a large net."""
-    return system.once(("order", "net"), lambda: with_pairs(system.pattern, order_of(system)))
+    return system.once(("order", "net"), lambda: with_pairs(system.pattern, order_of(system), lambda: own_rows(system)))
 
 
-def with_pairs(pattern: Pattern, order: Order, given: Ints | None = None) -> Order:
+def with_pairs(pattern: Pattern, order: Order, given: Callable[[], Ints | None] = lambda: None) -> Order:
     """An order for any pivots, or, of a large net, one of A + A^T, rows permuted such that each unknown has its own.
 
-    A grid of 300 x 300 as written fills 26 million places by the first, 7 by the second.  given [unknowns]: rows of
-    unknowns that are known, -1: any.
+    A grid of 300 x 300 as written fills 26 million places by the first, 7 by the second.  given: rows of
+    unknowns that are known [unknowns], -1: any; asked for where they matter.
     """
     n = pattern.unknowns
     if n <= NET or order.filled <= SHORT * n:
         return order
-    own = matched(pattern, given)
+    own = matched(pattern, given())
     if (own < 0).any():
         return order
     of = np.empty(n, dtype=np.int32)

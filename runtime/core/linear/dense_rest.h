@@ -7,6 +7,7 @@
 #include "linear/blocks.h"
 
 #include <math.h>
+#include <string.h>
 
 #define PANEL 32        /* columns that are applied to all behind them together */
 #define REST_LEAST 64   /* columns of a rest that is worth it */
@@ -60,6 +61,15 @@ static void exchange(sd_sparse *lu, int32_t k, int32_t i, int32_t best, int32_t 
     at[r] = best;
 }
 
+/* the i-th column of the rest as one of both factors */
+static void keep_column(sd_sparse *lu, int32_t k, int32_t i, int32_t m, const sd_number *w)
+{
+    sd_number inverse = lu->inverse[k + i] = 1.0 / w[i], *l = lu->l_value + lu->l_start[k + i];
+    for (int32_t p = i + 1; p < m; p++)
+        l[p - i - 1] = w[p] * inverse;
+    memcpy(lu->u_value + lu->u_start[k + i + 1] - i, w, (size_t)i * sizeof *w);
+}
+
 /* the columns of the rest [m, m], the first of them the k-th, as factors; row [m], at [rows]: which row stands where */
 static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, int32_t m, sd_number *rest,
                        int32_t *row, int32_t *at, double threshold)
@@ -84,14 +94,39 @@ static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *va
                 return 1;
             }
             exchange(lu, k, i, best, m, rest, row, at);
-            sd_number inverse = lu->inverse[k + i] = 1.0 / w[i], *l = lu->l_value + lu->l_start[k + i];
             lu->place[row[i]] = k + i;
             lu->source[k + i] = row[i];
-            for (int32_t p = i + 1; p < m; p++)
-                l[p - i - 1] = w[p] * inverse;
-            sd_number *u = lu->u_value + lu->u_start[k + i + 1] - i;
-            for (int32_t p = 0; p < i; p++)
-                u[p] = w[p];
+            keep_column(lu, k, i, m, w);
+        }
+        for (int32_t j = to; j < m; j++)
+            lessen_block(lu, k + from, to - from, m - from - 1, rest + (size_t)j * m + from);
+    }
+    return 0;
+}
+
+/* the i-th column of the rest, with all before it taken from it, on the pivot that it had; 1: that became unhealthy */
+static int renew_column(sd_sparse *lu, int32_t k, int32_t i, int32_t m, const sd_number *w, double healthy)
+{
+    double largest = 0.0;
+    for (int32_t p = i; p < m; p++)
+        largest = sd_size(w[p]) > largest ? sd_size(w[p]) : largest;
+    double relative = largest > 0.0 ? sd_size(w[i]) / largest : 0.0;
+    lu->smallest = relative < lu->smallest ? relative : lu->smallest;
+    if (!(relative >= healthy) || !isfinite(sd_size(w[i])))
+        return 1;
+    keep_column(lu, k, i, m, w);
+    return 0;
+}
+
+/* the same on the pivots that these columns had, rows in their order: 0 done, 1 one of them became unhealthy */
+static int refactor_rest(sd_sparse *lu, int32_t k, int32_t m, sd_number *rest, double healthy)
+{
+    for (int32_t from = 0; from < m; from += PANEL) {
+        int32_t to = from + PANEL < m ? from + PANEL : m;
+        for (int32_t i = from; i < to; i++) {
+            lessen_block(lu, k + from, i - from, m - from - 1, rest + (size_t)i * m + from);
+            if (renew_column(lu, k, i, m, rest + (size_t)i * m, healthy))
+                return 1;
         }
         for (int32_t j = to; j < m; j++)
             lessen_block(lu, k + from, to - from, m - from - 1, rest + (size_t)j * m + from);

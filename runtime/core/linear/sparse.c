@@ -218,6 +218,7 @@ static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *r
     }
     if (!failed)
         failed = factor_rest(lu, column, value, k, m, rest, own, at, THRESHOLD);
+    lu->rest = failed ? n : k;
     for (int32_t i = 0; i < m && !failed; i++) {
         lu->first[k + i] = k;
         memcpy(lu->l_row + lu->l_start[k + i], own + i + 1, (size_t)(m - i - 1) * sizeof *own);
@@ -252,7 +253,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
     int64_t nl = 0, nu = 0;
     lu->pivoted = 0;
     lu->smallest = 1.0;
-    lu->rank = n;
+    lu->rank = lu->rest = n;
     for (int32_t i = 0; i < rows; i++) {
         lu->place[i] = -1;
         lu->mark[i] = -1;
@@ -358,7 +359,9 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     lu->count = lu->mark + rows;
     for (int32_t e = 0; e < column[lu->n]; e++)
         lu->count[row[e]]++;
+    unsigned before = sd_no_subnormals();
     int failed = lu->l_room == 0 && begin(lu, column[lu->n]) ? 2 : pivot_all(lu, column, row, value);
+    sd_subnormals(before);
     if (!failed && lu->n > SMALL) {
         fit(lu->l_start[lu->n], &lu->l_room, &lu->l_row, &lu->l_value);
         fit(lu->u_start[lu->n], &lu->u_room, &lu->u_row, &lu->u_value);
@@ -368,44 +371,76 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     return failed;
 }
 
+/* x := the k-th column, less the columns before it that stand among the first `number` entries of its column of U */
+static void renewed(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
+                    int32_t number, sd_number *block)
+{
+    int32_t c = lu->order[k], from = lu->u_start[k];
+    for (int32_t e = column[c]; e < column[c + 1]; e++)
+        lu->x[lu->place[row[e]]] += value[e];
+    apply_columns(lu, number, lu->u_row + from, NULL, lu->u_value + from, lu->x, block);
+}
+
+/* the k-th column on the pivot that it had: 1: that became unhealthy */
+static int refactor_column(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
+                           sd_number *block)
+{
+    sd_number *x = lu->x;
+    renewed(lu, column, row, value, k, lu->u_start[k + 1] - lu->u_start[k], block);
+    sd_number diagonal = x[k], inverse = 1.0 / diagonal;
+    double largest = sd_size(diagonal);
+    x[k] = 0.0;
+    lu->inverse[k] = inverse;
+    for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++) {
+        sd_number v = x[lu->l_row[l]];
+        x[lu->l_row[l]] = 0.0;
+        lu->l_value[l] = v * inverse;
+        largest = sd_size(v) > largest ? sd_size(v) : largest;
+    }
+    double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
+    if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(column, value, lu->order[k])) /* it may be left out now */
+        relative = 0.0;
+    lu->smallest = relative < lu->smallest ? relative : lu->smallest;
+    return !(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal));
+}
+
+/* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
+static int renew_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, sd_number *block)
+{
+    int32_t k = lu->rest, m = lu->n - k;
+    sd_number *rest = malloc(((size_t)m * (size_t)m + 1) * sizeof *rest);
+    if (!rest)
+        return 1;
+    for (int32_t i = 0; i < m; i++) {
+        renewed(lu, column, row, value, k + i, lu->u_start[k + i + 1] - lu->u_start[k + i] - i, block);
+        memcpy(rest + (size_t)i * m, lu->x + k, (size_t)m * sizeof *rest);
+        memset(lu->x + k, 0, (size_t)m * sizeof *rest);
+    }
+    int failed = refactor_rest(lu, k, m, rest, UNHEALTHY);
+    free(rest);
+    return failed;
+}
+
 int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
 {
-    sd_number *x = lu->x, *block = lu->widest ? malloc((size_t)lu->widest * sizeof *block) : NULL;
-    if (lu->widest && !block)
+    sd_number *block = lu->widest ? malloc((size_t)lu->widest * sizeof *block) : NULL;
+    int failed = lu->widest && !block;
+    if (failed)
         return 1;
     lu->smallest = 1.0;
-    for (int32_t k = 0; k < lu->n; k++) {
-        int32_t c = lu->order[k];
-        if (lu->source[k] < 0)
-            continue;
-        for (int32_t e = column[c]; e < column[c + 1]; e++)
-            x[lu->place[row[e]]] += value[e];
-        int32_t from = lu->u_start[k];
-        apply_columns(lu, lu->u_start[k + 1] - from, lu->u_row + from, NULL, lu->u_value + from, x, block);
-        sd_number diagonal = x[k], inverse = 1.0 / diagonal;
-        double largest = sd_size(diagonal);
-        x[k] = 0.0;
-        lu->inverse[k] = inverse;
-        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++) {
-            sd_number v = x[lu->l_row[l]];
-            x[lu->l_row[l]] = 0.0;
-            lu->l_value[l] = v * inverse;
-            largest = sd_size(v) > largest ? sd_size(v) : largest;
-        }
-        double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
-        if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(column, value, c)) /* it may be left out now */
-            relative = 0.0;
-        lu->smallest = relative < lu->smallest ? relative : lu->smallest;
-        if (!(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal))) {
-            memset(x, 0, ((size_t)lu->n + 1) * sizeof *x);
-            lu->pivoted = 0;
-            free(block);
-            return 1;
-        }
+    unsigned before = sd_no_subnormals();
+    for (int32_t k = 0; k < lu->rest && !failed; k++)
+        failed = lu->source[k] >= 0 && refactor_column(lu, column, row, value, k, block);
+    if (!failed && lu->rest < lu->n)
+        failed = renew_rest(lu, column, row, value, block);
+    sd_subnormals(before);
+    if (failed) {
+        memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
+        lu->pivoted = 0;
     }
-    x[lu->n] = 0.0;
+    lu->x[lu->n] = 0.0;
     free(block);
-    return 0;
+    return failed;
 }
 
 /* work[place] -= part, where those at two places are held apart */

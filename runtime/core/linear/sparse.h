@@ -22,6 +22,7 @@ typedef struct sd_sparse {
     int32_t *stack, *head, *mark, *count; /* [rows] search, while pivots are chosen */
     sd_number *block;            /* [rows + 1] what a block touches, while pivots are chosen */
     uint64_t *among;             /* bits of n positions, likewise */
+    int32_t rest;                /* the position from which the factors are full (dense_rest.h); n: none */
     int32_t widest;              /* numbers that the widest block touches; 0: there is none */
     sd_number *x;                /* [the larger of n and rows, + 1] */
     int pivoted;                 /* a valid pattern exists */
