@@ -74,11 +74,12 @@ def test_round_off_of_a_balance_grows_with_what_passes():
 
 def test_flows_that_are_solved_for_carry_nothing():
     yes, none = np.array([True, True]), np.zeros(2, np.int32)
-    found = without_rate(Roles(none, none, yes, yes, yes, ~yes), np.array([False, True]))
+    found = without_rate(Roles(none, none, yes, yes, yes, ~yes, common=none), np.array([False, True]))
     assert found.test.tolist() == [0, -1]
     for mask in (found.state, found.differential, found.smooth):
         assert mask.tolist() == [True, False]
     assert found.idle.tolist() == [False, True]
+    assert found.common.tolist() == [-1, -1]
 
 
 SPRING = RowLabel("spring.q", "observe", "m.sd", 3)
