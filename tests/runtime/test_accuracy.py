@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.integrate.accuracy import LAWS, STEEP, TAME, Lighter, control
+from sysdyn.runtime.integrate.accuracy import LAWS, STEEP, TAME, Lighter, control, law_of
 from sysdyn.runtime.integrate.pairs import ROUND_OFF, Sampled
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
@@ -206,3 +206,18 @@ def test_no_more_is_credited_than_a_tolerance_a_hundred_times_smaller():
     # the first run differs by a half: of the second that says next to nothing
     achieved = control(run, np.array([1e-4]), LAWS["radau"], first=1e-9)
     assert achieved.runs > 2
+
+
+def test_short_runs_on_steep_laws_are_not_believed_to_fall_fast():
+    """Errors of a water tube as co_hamiltonian, by steps; with what longer runs are credited the third was taken."""
+    errors = ((1e-2, 17, 0.21), (1e-4, 32, 0.023), (1e-5, 49, 0.012))
+
+    def run(tolerance, longest):
+        late = 0.0, round(378 * (1e-6 / tolerance) ** 0.1), 100.0 * tolerance
+        _, steps, error = next((item for item in errors if tolerance > item[0]), late)
+        return sampled(tolerance, [1.0, 0.5 + error], steps)
+
+    achieved = control(run, np.array([3e-3]), law_of("radau", steep=True))
+    assert achieved.met
+    assert achieved.tolerance < 1e-5
+    assert achieved.error_estimate > 100.0 * achieved.tolerance
