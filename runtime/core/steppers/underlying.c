@@ -58,6 +58,7 @@ static void find_places(sd_underlying *u)
         u->place_y[e] = u->place_yd[e] = u->linear->entries;
     for (int32_t e = 0; e < u->linear->entries; e++)
         (u->from_rate[e] ? u->place_yd : u->place_y)[u->source[e]] = e;
+    u->placed = 1;
 }
 
 static void add_to_matrix(sd_entries *block, const sd_call *call, int32_t n, const int32_t *slot, const int32_t *place, double t,
@@ -75,7 +76,7 @@ static void evaluate_matrix(sd_underlying *u, double t, const double *y, const d
 {
     const sd_system *system = u->matrix;
     double *values = u->values;
-    if (u->linear->factorisations == 0)
+    if (!u->placed)
         find_places(u);
     memset(values, 0, (size_t)(u->linear->entries + 1) * sizeof *values);
     for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {

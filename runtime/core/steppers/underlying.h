@@ -36,7 +36,7 @@ typedef struct sd_underlying {
     double tolerance;            /* of Newton's iteration, in magnitudes */
     double *values, *r, *step, *rest, *memory;
     int32_t *place_y, *place_yd; /* [entries of system] place of dF/dy, dF/dyd in the matrix, one behind it where they have none */
-    int32_t ready, bad_row, bad_column;
+    int32_t ready, placed, bad_row, bad_column; /* placed: the two above are there */
     double drift;                /* how far the last projection moved first, in magnitudes */
 } sd_underlying;
 

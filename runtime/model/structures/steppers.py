@@ -190,7 +190,7 @@ class Underlying(c.Structure):
         *[(name, P) for name in ["goal_position", "goal_velocity"]],
         ("tolerance", D),
         *[(name, P) for name in ["values", "r", "step", "rest", "memory", "place_y", "place_yd"]],
-        *[(name, I) for name in ["ready", "bad_row", "bad_column"]],
+        *[(name, I) for name in ["ready", "placed", "bad_row", "bad_column"]],
         ("drift", D),
     ]
 
