@@ -9,6 +9,7 @@
 #include <math.h>
 #include <string.h>
 
+#define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
 #define PANEL 32        /* columns that are applied to all behind them together */
 #define REST_LEAST 64   /* columns of a rest that is worth it */
 #define REST_MOST 4096  /* and those whose numbers have room */
@@ -104,28 +105,37 @@ static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *va
     return 0;
 }
 
+/* 1: the k-th column, in which `largest` is left, may keep the pivot that it had */
+static int keeps_pivot(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, sd_number pivot, double largest)
+{
+    double relative = largest > 0.0 ? sd_size(pivot) / largest : 0.0;
+    if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(column, value, lu->order[k])) /* it may be left out now */
+        relative = 0.0;
+    lu->smallest = relative < lu->smallest ? relative : lu->smallest;
+    return relative >= UNHEALTHY && isfinite(sd_size(pivot));
+}
+
 /* the i-th column of the rest, with all before it taken from it, on the pivot that it had; 1: that became unhealthy */
-static int renew_column(sd_sparse *lu, int32_t k, int32_t i, int32_t m, const sd_number *w, double healthy)
+static int renew_column(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, int32_t i, int32_t m,
+                        const sd_number *w)
 {
     double largest = 0.0;
     for (int32_t p = i; p < m; p++)
         largest = sd_size(w[p]) > largest ? sd_size(w[p]) : largest;
-    double relative = largest > 0.0 ? sd_size(w[i]) / largest : 0.0;
-    lu->smallest = relative < lu->smallest ? relative : lu->smallest;
-    if (!(relative >= healthy) || !isfinite(sd_size(w[i])))
+    if (!keeps_pivot(lu, column, value, k + i, w[i], largest))
         return 1;
     keep_column(lu, k, i, m, w);
     return 0;
 }
 
 /* the same on the pivots that these columns had, rows in their order: 0 done, 1 one of them became unhealthy */
-static int refactor_rest(sd_sparse *lu, int32_t k, int32_t m, sd_number *rest, double healthy)
+static int refactor_rest(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, int32_t m, sd_number *rest)
 {
     for (int32_t from = 0; from < m; from += PANEL) {
         int32_t to = from + PANEL < m ? from + PANEL : m;
         for (int32_t i = from; i < to; i++) {
             lessen_block(lu, k + from, i - from, m - from - 1, rest + (size_t)i * m + from);
-            if (renew_column(lu, k, i, m, rest + (size_t)i * m, healthy))
+            if (renew_column(lu, column, value, k, i, m, rest + (size_t)i * m))
                 return 1;
         }
         for (int32_t j = to; j < m; j++)

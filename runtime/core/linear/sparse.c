@@ -11,7 +11,6 @@
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
 #define NARROW 4        /* entries of both factors a column up to which they are a line's */
-#define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
 
 void sd_sparse_free(sd_sparse *lu)
 {
@@ -397,11 +396,7 @@ static int refactor_column(sd_sparse *lu, const int32_t *column, const int32_t *
         lu->l_value[l] = v * inverse;
         largest = sd_size(v) > largest ? sd_size(v) : largest;
     }
-    double relative = largest > 0.0 ? sd_size(diagonal) / largest : 0.0;
-    if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(column, value, lu->order[k])) /* it may be left out now */
-        relative = 0.0;
-    lu->smallest = relative < lu->smallest ? relative : lu->smallest;
-    return !(relative >= UNHEALTHY) || !isfinite(sd_size(diagonal));
+    return !keeps_pivot(lu, column, value, k, diagonal, largest);
 }
 
 /* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
@@ -416,7 +411,7 @@ static int renew_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, 
         memcpy(rest + (size_t)i * m, lu->x + k, (size_t)m * sizeof *rest);
         memset(lu->x + k, 0, (size_t)m * sizeof *rest);
     }
-    int failed = refactor_rest(lu, k, m, rest, UNHEALTHY);
+    int failed = refactor_rest(lu, column, value, k, m, rest);
     free(rest);
     return failed;
 }

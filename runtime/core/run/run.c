@@ -121,7 +121,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
     double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
     double *out = run->end, dissipated = 0.0, supplied = 0.0;
-    const int alone = !at_step && (int32_t)kind == SD_COMPARED, unsummed = run->unsummed > !alone;
+    const int alone = !at_step && (int32_t)kind == SD_COMPARED;
+    const int unsummed = run->unsummed > 1 || (run->unsummed && alone);
     if (run->fresh) {
         memcpy(run->point, run->stepper->y, (size_t)run->stepper->n * sizeof(double));
         memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
