@@ -92,6 +92,7 @@ class Integration:
         alone = origin is None and request.events is None
         system.trim()  # of the run before
         self.origin = origin = origin or Origin(system, start, request.index)
+        self._factors = origin.factors
         self.y, self.yd, self._start_rate = origin.point(own=alone)
         self._restart: Restart | None = None
         self.roles: Roles = origin.roles
@@ -186,11 +187,12 @@ class Integration:
 
     def _linear(self) -> None:
         if self.request.method in ON_UNDERLYING:
-            self.underlying = Underlying(self._solved, self.magnitude)
+            self.underlying = Underlying(self._solved, self.magnitude, self._factors)
             self.linear, self._order = self.underlying.linear, Order(None)
             return
         self._order = order_of(self.system) if self.forms is None else self.forms.order()
-        self.linear = self._order.linear(self.stepped.pattern)
+        self._taken = self._factors.take(self.stepped.pattern, self._order)
+        self.linear = self._taken.linear
 
     @property
     def _keeps(self) -> NDArray[np.bool_]:
@@ -230,7 +232,8 @@ class Integration:
     def _stepper(self) -> None:
         request = self.request
         first, most = self._stages()
-        self.method = Method(request.method, self.stepped, self.linear, self._order, self.underlying, most)
+        order = self._order
+        self.method = Method(request.method, self.stepped, self.linear, self._factors, order, self.underlying, most)
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         self._atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * self.magnitude)
         self._unnamed = self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
@@ -617,8 +620,6 @@ class Integration:
     def __del__(self) -> None:
         if getattr(self, "run_", None):
             lib.core.sd_run_free(self.run_)
-        if getattr(self, "linear", None) and self.underlying is None:
-            lib.core.sd_linear_free(self.linear)
 
 
 def integrate(

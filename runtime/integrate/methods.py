@@ -9,6 +9,7 @@ import ctypes as c
 from typing import Any
 
 from sysdyn.runtime.condense.condensed import Condensed
+from sysdyn.runtime.integrate.factors import Factorisation, Factors
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
@@ -19,8 +20,8 @@ from sysdyn.runtime.numerics.ordering import Order
 class Method:
     """One of "bdf", "radau", "dopri", "energy" on one system.
 
-    linear: the core's real factorisation; order: of its matrices; underlying: for dopri and energy;
-    stages: of radau, at most.
+    linear: the core's real factorisation; factors, order: where complex ones come from, of their matrices; underlying:
+    for dopri and energy; stages: of radau, at most.
     Of a condensed system it steps what is kept, and shows every unknown.
     """
 
@@ -29,16 +30,18 @@ class Method:
         name: str,
         system: System | Condensed,
         linear: Any,
+        factors: Factors,
         order: Order,
         underlying: Underlying | None = None,
         stages: int = 3,
     ) -> None:
         self.name = name
         self.expanded: Any = None
-        self.complex: tuple[int, ...] = ()
+        self._pairs: tuple[Factorisation, ...] = ()
         self._core: Any = None
         if name == "radau":
-            self.complex = tuple(order.complex_linear(system.pattern) for _ in range(stages // 2))
+            taken = [factors.take(system.pattern, order, complex_=True) for _ in range(stages // 2)]
+            self._pairs = tuple(taken)
             pairs = (c.c_void_p * lib.PAIRS)(*self.complex)
             self._core = lib.core.sd_radau_new(c.byref(system.core), linear, pairs, stages)
         elif name == "energy":
@@ -61,6 +64,11 @@ class Method:
             self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
             if not self.expanded:
                 raise MemoryError
+
+    @property
+    def complex(self) -> tuple[int, ...]:
+        """The core's complex factorisations."""
+        return tuple(item.linear for item in self._pairs)
 
     @property
     def contents(self) -> Any:
@@ -96,5 +104,3 @@ class Method:
             lib.core.sd_expanded_free(self.expanded)
         if getattr(self, "_core", None):
             getattr(lib.core, f"sd_{self.name}_free")(self._core)
-        for item in getattr(self, "complex", ()):
-            lib.core.sd_linear_z_free(item)

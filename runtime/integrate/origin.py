@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
 from sysdyn.runtime.integrate.unknown_roles import Roles, roles, without_rate
 from sysdyn.runtime.model.description import Floats
@@ -34,6 +35,7 @@ class Origin:
         self._explicit: tuple[System, Roles] | None = None
         self.kept: Roles | None = None
         """Roles of what is left where unknowns leave the runs (condense/)."""
+        self.factors = Factors()
 
     def point(self, *, own: bool) -> tuple[Floats, Floats, Floats]:
         """y, yd, rate [unknowns]; own: nobody else changes them."""

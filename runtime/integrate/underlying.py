@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
@@ -22,7 +23,7 @@ from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.matching import matched
-from sysdyn.runtime.numerics.ordering import column_order
+from sysdyn.runtime.numerics.ordering import Order, column_order
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.levels import undifferentiated
@@ -214,18 +215,18 @@ class Accelerations:
 
 
 class Underlying(Accelerations):
-    """system: of `underlying_form`; magnitude [unknowns], kept and read by the core."""
+    """system: of `underlying_form`; magnitude [unknowns], kept and read by the core; factors: where the matrix has its
+    factorisation from.
+    """
 
-    def __init__(self, system: System, magnitude: Floats) -> None:
+    def __init__(self, system: System, magnitude: Floats, factors: Factors | None = None) -> None:
         super().__init__(system)
         self._magnitude = magnitude
         self._parts = system.own("parts", lambda: _Parts(system, self._algebraic()))
-        order = system.once("order of accelerations", lambda: column_order(self.pattern))
-        self._order = order
-        self.linear = lib.core.sd_linear_new(
-            self.pattern.unknowns, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, order))
-        )
-        self.core: Any = lib.core.sd_underlying_new(c.byref(system.core), self.linear) if self.linear else None
+        self._order = system.once("order of accelerations", lambda: Order(column_order(self.pattern)))
+        self._taken = (factors or Factors()).take(self.pattern, self._order)
+        self.linear = self._taken.linear
+        self.core: Any = lib.core.sd_underlying_new(c.byref(system.core), self.linear)
         if not self.core:
             raise MemoryError
         self._systems(self.core.contents)
@@ -256,7 +257,7 @@ class Underlying(Accelerations):
             self.pattern,
             self._source,
             self._from_rate,
-            np.zeros(0, dtype=np.int32) if self._order is None else self._order,
+            np.zeros(0, dtype=np.int32) if self._order.columns is None else self._order.columns,
             self._parts.direct,
             tuple(k for k in calls if self._parts.calls[k].n_dy == 0),
             tuple(k for k in calls if not self.system.form.calls[k].block.endswith("_reaction")),
@@ -288,8 +289,6 @@ class Underlying(Accelerations):
     def __del__(self) -> None:
         if getattr(self, "core", None):
             lib.core.sd_underlying_free(self.core)
-        if getattr(self, "linear", None):
-            lib.core.sd_linear_free(self.linear)
 
 
 def underlying_form(system: System, state: ConsistentState) -> tuple[System, Sequence[str]]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import small_models as models
+from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.integrate.least_norm import LeastNorm
 from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.metric import kinematic_scale
@@ -132,13 +133,14 @@ def test_roles_of_a_point_on_a_rod():
 def test_a_method_steps_the_unknowns_of_its_system_with_a_complex_matrix_a_pair_of_stages(name, stages, pairs):
     of = system("1")
     order = net_order_of(of)
-    linear = order.linear(of.pattern)
-    method = Method(name, of, linear, order, stages=stages)
+    factors = Factors()
+    real = factors.take(of.pattern, order)
+    method = Method(name, of, real.linear, factors, order, stages=stages)
     assert method.contents.n == of.unknowns
     assert len(method.complex) == pairs
     assert lib.Stepper.from_address(method.stepper).n == of.unknowns
-    del method
-    lib.core.sd_linear_free(linear)
+    del method, real
+    assert len(factors.at_hand) == 1 + pairs
 
 
 def test_round_off_of_a_quantity_is_that_of_its_terms():
@@ -170,3 +172,31 @@ def test_structures_hold_numbers_and_addresses_alone():
         assert structure.__doc__.startswith("sd_")
         fields = [kind for _, kind, *_ in structure._fields_]
         assert kinds & set(fields)
+
+
+def test_what_a_run_learnt_of_pivots_serves_the_next():
+    """A second run from one start takes its factorisations again: it pivots nothing, where the first did so at first."""
+    of = system("1")
+    order, factors = net_order_of(of), Factors()
+    taken = factors.take(of.pattern, order)
+    lib.core.sd_linear_replayed(taken.linear)
+    jy, jyd = of.jacobian(0.0, point(of, q_1=3.0, q_2=-4.0), np.zeros(of.unknowns))
+    values, scale = jy + 100.0 * jyd, np.ones(of.unknowns)
+    given = np.arange(1.0, 1.0 + of.unknowns)
+    first = given.copy()
+    for _ in range(8):
+        assert lib.core.sd_linear_factor(taken.linear, lib.pointer(values), lib.pointer(scale)) == 0
+    lib.core.sd_linear_solve(taken.linear, lib.pointer(first))
+    assert taken.linear.contents.factorisations == 8
+    del taken
+    again = factors.take(of.pattern, order)
+    assert again.linear.contents.factorisations == 0
+    assert again.linear.contents.replayed == 0
+    assert lib.core.sd_linear_factor(again.linear, lib.pointer(values), lib.pointer(scale)) == 0
+    assert again.linear.contents.replayed == 1
+    second = given.copy()
+    lib.core.sd_linear_solve(again.linear, lib.pointer(second))
+    assert second.tolist() == first.tolist()
+    other = factors.take(of.pattern, order)  # while that one is held there is no other at hand
+    assert lib.core.sd_linear_factor(other.linear, lib.pointer(values), lib.pointer(scale)) == 0
+    assert other.linear.contents.replayed == 0

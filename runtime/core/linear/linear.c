@@ -341,6 +341,16 @@ void sd_linear_replayed(sd_linear *linear)
         linear->elimination = sd_elimination_new(linear->n, linear->column, linear->row);
 }
 
+void sd_linear_again(sd_linear *linear)
+{
+    if (linear->sparse)
+        linear->sparse->pivoted = 0;
+    linear->idle = NULL;
+    linear->null_pivot = 0.0;
+    linear->factorisations = linear->pivotings = 0;
+    linear->replayed = 0;
+}
+
 void sd_linear_solve(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;

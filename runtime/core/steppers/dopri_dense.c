@@ -1,6 +1,8 @@
 /* Values between the ends of a step of DOP853 (see dopri.h). */
 #include "steppers/dopri.h"
 
+#include "linear/lanes.h"
+
 #include <string.h>
 
 /* the three further stages; 0 done */
@@ -50,6 +52,45 @@ static void prepare(sd_dopri *dopri)
     dopri->dense = 1;
 }
 
+/* The nested form f0 x + f1 x (1 - x) + f2 x^2 (1 - x) + ... and its derivative by x: value, slope [n]. */
+static SD_WIDE void nested(int32_t n, double *const *f, double x, double *value, double *slope)
+{
+    int32_t whole = n - n % SD_LANES;
+    for (int32_t i = 0; i < whole; i += SD_LANES) {
+        sd_lanes v = {0.0}, d = {0.0};
+        for (int m = SD_DOPRI_DENSE - 1; m >= 0; m--) {
+            v += SD_FROM(f[m], i);
+            d = m % 2 ? d * (1.0 - x) - v : d * x + v;
+            v *= m % 2 ? 1.0 - x : x;
+        }
+        SD_AT(value, i) = v;
+        SD_AT(slope, i) = d;
+    }
+    for (int32_t i = whole; i < n; i++) {
+        double v = 0.0, d = 0.0;
+        for (int m = SD_DOPRI_DENSE - 1; m >= 0; m--) {
+            v += f[m][i];
+            d = m % 2 ? d * (1.0 - x) - v : d * x + v;
+            v *= m % 2 ? 1.0 - x : x;
+        }
+        value[i] = v;
+        slope[i] = d;
+    }
+}
+
+/* its second derivative, of one unknown */
+static double bend(double *const *f, int32_t i, double x)
+{
+    double v = 0.0, d = 0.0, turn = 0.0;
+    for (int m = SD_DOPRI_DENSE - 1; m >= 0; m--) {
+        v += f[m][i];
+        turn = m % 2 ? turn * (1.0 - x) - 2.0 * d : turn * x + 2.0 * d;
+        d = m % 2 ? d * (1.0 - x) - v : d * x + v;
+        v *= m % 2 ? 1.0 - x : x;
+    }
+    return turn;
+}
+
 void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd)
 {
     const sd_underlying *u = dopri->underlying;
@@ -60,27 +101,18 @@ void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd)
     }
     if (!dopri->dense)
         prepare(dopri);
-    double x = (t - (dopri->t - dopri->h_used)) / dopri->h_used;
+    double h = dopri->h_used, x = (t - (dopri->t - h)) / h;
+    nested(dopri->n, dopri->f, x, y, yd);
     for (int32_t i = 0; i < dopri->n; i++) {
-        double v = 0.0, d = 0.0, turn = 0.0; /* value, first and second derivative */
-        for (int m = SD_DOPRI_DENSE - 1; m >= 0; m--) {
-            v += dopri->f[m][i];
-            if (m % 2 == 0) {
-                turn = turn * x + 2.0 * d;
-                d = d * x + v;
-                v *= x;
-            } else {
-                turn = turn * (1.0 - x) - 2.0 * d;
-                d = d * (1.0 - x) - v;
-                v *= 1.0 - x;
-            }
-        }
-        d /= dopri->h_used;
-        int32_t column = u->column[i];
-        int integral = column >= 0 && !u->rate[column];
-        y[i] = integral ? d : dopri->y[0][i] + v;
-        yd[i] = integral ? turn / (dopri->h_used * dopri->h_used) : d;
+        y[i] = dopri->y[0][i] + y[i];
+        yd[i] /= h;
     }
+    for (int32_t j = 0; j < u->solved; j++)
+        if (!u->rate[j]) { /* the interpolant is of the integral */
+            int32_t k = u->unknown[j];
+            y[k] = yd[k];
+            yd[k] = bend(dopri->f, k, x) / (h * h);
+        }
 }
 
 int sd_dopri_onto(sd_dopri *dopri, double t, double *y, double *yd, double *moved)

@@ -370,14 +370,18 @@ static void put_near(const sd_settle *settle, double *y, double *yd)
 /* what the point makes of other unknowns, and its residuals; measured: those of the point as it comes are known */
 static void finish(sd_settle *settle, double t, double *y, double *yd, int done, int measured)
 {
-    int derived = settle->kinematics > 0 && !settle->system->left;
-    if (measured && !derived && !(done && settle->system->held > 0))
-        return;
-    for (int32_t i = 0; done && i < settle->system->held; i++)
-        y[settle->system->held_unknown[i]] = 0.0; /* not nearly: relative errors are taken of it */
-    for (int32_t i = 0; i < settle->kinematics && derived; i++)
+    int stays = measured;
+    for (int32_t i = 0; done && i < settle->system->held; i++) {
+        double *open = &y[settle->system->held_unknown[i]];
+        stays &= *open == 0.0;
+        *open = 0.0; /* not nearly: relative errors are taken of it */
+    }
+    for (int32_t i = 0; i < settle->kinematics && !settle->system->left; i++) {
+        stays &= yd[settle->k_q[i]] == y[settle->k_f[i]];
         yd[settle->k_q[i]] = y[settle->k_f[i]];
-    measure(settle, t, y, yd);
+    }
+    if (!stays)
+        measure(settle, t, y, yd);
 }
 
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */

@@ -1,0 +1,64 @@
+"""Factorisations of the matrices that a method steps with, handed on from run to run of one start.
+
+What a run learns of small matrices, the order of their pivots and its machine code (core/linear/elimination.h), serves
+the next run as well.  Where there is no next run they go with the run that took them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.numerics.ordering import Order
+
+LEARNT = 100
+"""Unknowns up to which a run learns anything (SD_REPLAYED)."""
+
+
+class _Made:
+    """One factorisation of the core, None once it is freed; it keeps pattern and order, which the core reads."""
+
+    def __init__(self, pattern: Pattern, order: Order, *, complex_: bool) -> None:
+        self.pattern, self.order, self.complex = pattern, order, complex_
+        self.linear: Any = order.complex_linear(pattern) if complex_ else order.linear(pattern)
+
+    def again(self) -> None:
+        """As new, but for what was learnt."""
+        (lib.core.sd_linear_z_again if self.complex else lib.core.sd_linear_again)(self.linear)
+
+    def __del__(self) -> None:
+        if getattr(self, "linear", None):
+            (lib.core.sd_linear_z_free if self.complex else lib.core.sd_linear_free)(self.linear)
+            self.linear = None
+
+
+class Factorisation:
+    """The core's factorisation of matrices of one pattern, until nobody holds it.
+
+    linear: its structure, of complex ones its address.
+    """
+
+    def __init__(self, made: _Made, factors: Factors) -> None:
+        self._made, self._factors = made, factors
+        self.linear: Any = made.linear
+
+    def __del__(self) -> None:
+        # where both are garbage at once the other may have gone first
+        if self._made.pattern.unknowns <= LEARNT and self._made.linear:
+            self._made.again()
+            self._factors.at_hand.append(self._made)
+
+
+class Factors:
+    """The factorisations of the runs from one start that no run holds."""
+
+    def __init__(self) -> None:
+        self.at_hand: list[_Made] = []
+
+    def take(self, pattern: Pattern, order: Order, *, complex_: bool = False) -> Factorisation:
+        """One of these, or a new one."""
+        for k, made in enumerate(self.at_hand):
+            if made.pattern is pattern and made.complex == complex_ and made.linear:
+                return Factorisation(self.at_hand.pop(k), self)
+        return Factorisation(_Made(pattern, order, complex_=complex_), self)
