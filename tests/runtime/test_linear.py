@@ -1,4 +1,5 @@
 import ctypes
+import os
 
 import numpy as np
 import pytest
@@ -266,6 +267,35 @@ def test_machine_code_and_interpreter_agree_to_the_bit():
         assert solver.factor(matrix.data) == 0
         assert solver.linear.contents.replayed
     assert (one.solve(b) == other.solve(b)).all()
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of forks beside threads
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes do not fork here")
+def test_a_process_that_forks_and_the_other_write_no_code_on_shared_pages():
+    """What a matrix that is no more left behind is there in both: each writes its next code on pages of its own."""
+    b = np.random.default_rng(4).normal(size=6)
+    matrices = [random_matrix(6, seed, 0.3) for seed in range(4)]
+    kept, gone = replayed(matrices[0]), replayed(matrices[1])
+    del gone
+    kept.factor(matrices[0].data)
+    before = kept.solve(b)
+    begin, told = os.pipe()
+    child = os.fork()
+    mine = matrices[2 if child else 3]
+    if not child:
+        os.read(begin, 1)
+    other = replayed(mine)
+    other.factor(mine.data)
+    first = other.solve(b)
+    kept.factor(matrices[0].data)
+    fine = np.allclose(mine @ first, b) and (kept.solve(b) == before).all()
+    if not child:
+        os._exit(0 if fine else 1)
+    os.write(told, b"x")
+    assert os.waitpid(child, 0)[1] == 0
+    assert fine
+    other.factor(mine.data)
+    assert (other.solve(b) == first).all()
 
 
 def complex_solutions(matrix, b, *, machine):

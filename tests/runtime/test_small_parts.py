@@ -175,7 +175,7 @@ def test_structures_hold_numbers_and_addresses_alone():
 
 
 def test_what_a_run_learnt_of_pivots_serves_the_next():
-    """A second run from one start takes its factorisations again: it pivots nothing, where the first did so at first."""
+    """A second run from one start takes its factorisations again: it pivots nothing, as the first did at first."""
     of = system("1")
     order, factors = net_order_of(of), Factors()
     taken = factors.take(of.pattern, order)

@@ -18,8 +18,8 @@
 #else
 #define NUMBERS SD_REAL_NUMBERS
 #endif
-#define MAKING 8000        /* operations interpreted for the time that machine code takes to be made (10 us, most of it pages), */
-#define MAKING_ONE 15      /* and for each operation that it has: made earlier it costs a short run more than it saves */
+#define MAKING 1000        /* operations interpreted for the time that machine code takes to be made, */
+#define MAKING_ONE 8       /* and for each operation that it has */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }

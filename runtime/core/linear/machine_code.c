@@ -1,6 +1,6 @@
 /* Machine code of lists of sums: see machine_code.h. */
-#if defined(__linux__) && !defined(_DEFAULT_SOURCE)
-#define _DEFAULT_SOURCE
+#if defined(__linux__) && !defined(_GNU_SOURCE)
+#define _GNU_SOURCE /* memfd_create */
 #endif
 #include "linear/machine_code.h"
 
@@ -20,9 +20,14 @@ int sd_code_early(void)
 }
 
 #if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(SD_INTERPRETED)
+#include <pthread.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #define LONGEST 10     /* bytes of an instruction */
+#define LEAST 16384    /* bytes of the pages of one code: what a run wants is less mostly, */
+#define MOST 262144    /* and of those that are kept at most */
+#define SPARES 4
 #define IN_A_PAIR 8    /* instructions at most */
 #define IN_A_SUM 8
 #define NEVER INT32_MAX
@@ -318,7 +323,7 @@ static size_t room_of(const sd_list *list)
     return LONGEST * (IN_A_SUM * (size_t)list->sums + IN_A_PAIR * (size_t)list->pairs + 3);
 }
 
-/* 0: both lists are written from `page` on */
+/* 0: both lists are written.  What was executed there before was so long ago: the processor has nothing of it on its way */
 static int write_lists(sd_code *code, const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
 {
     int32_t places = places_of(factor, places_of(solve, inside)), pairs = factor->pairs > solve->pairs ? factor->pairs : solve->pairs;
@@ -326,30 +331,90 @@ static int write_lists(sd_code *code, const sd_list *factor, const sd_list *solv
     int32_t *work = malloc((size_t)(places + 2 * pairs + 3 * sums) * sizeof *work + 1);
     if (!work)
         return 1;
-    writer w = {.at = code->page, .inside = inside, .size = numbers == SD_COMPLEX_NUMBERS ? 16 : 8, .numbers = numbers,
+    writer w = {.at = code->written, .inside = inside, .size = numbers == SD_COMPLEX_NUMBERS ? 16 : 8, .numbers = numbers,
                 .where = work, .after = work + places};
-    const uint8_t *start = w.at;
     write_list(&w, factor, places, inside - 2);
-    const uint8_t *next = w.at;
+    const uint8_t *start = code->run, *next = code->run + (w.at - code->written);
     write_list(&w, solve, places, inside - 2);
     free(work);
     memcpy(&code->factor, &start, sizeof start); /* a function's address is no object's in C */
     memcpy(&code->solve, &next, sizeof next);
-    return mprotect(code->page, code->size, PROT_READ | PROT_EXEC) != 0;
+    return 0;
+}
+
+/* pages of codes that are no more */
+static sd_code *spare[SPARES];
+static int forks;
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+static void count_fork(void)
+{
+    __atomic_add_fetch(&forks, 1, __ATOMIC_ACQ_REL);
+}
+
+static void watch_forks(void)
+{
+    pthread_atfork(count_fork, NULL, NULL);
+}
+
+/* nobody else may see what is written on them */
+static int is_own(const sd_code *code)
+{
+    return code->forks == __atomic_load_n(&forks, __ATOMIC_ACQUIRE);
+}
+
+static void give_back(sd_code *code)
+{
+    if (code->written)
+        munmap(code->written, code->size);
+    if (code->run)
+        munmap(code->run, code->size);
+    free(code);
+}
+
+static void *seen(int file, size_t size, int how)
+{
+    void *at = mmap(NULL, size, how, MAP_SHARED, file, 0);
+    return at == MAP_FAILED ? NULL : at;
+}
+
+/* new pages of `size` bytes; NULL where the system gives none that may be executed */
+static sd_code *new_pages(size_t size)
+{
+    sd_code *code = pthread_once(&once, watch_forks) ? NULL : calloc(1, sizeof *code);
+    int file = code ? memfd_create("sysdyn", MFD_CLOEXEC) : -1;
+    if (file >= 0 && ftruncate(file, (off_t)size) == 0) {
+        code->size = size;
+        code->forks = __atomic_load_n(&forks, __ATOMIC_ACQUIRE);
+        code->written = seen(file, size, PROT_READ | PROT_WRITE);
+        code->run = seen(file, size, PROT_READ | PROT_EXEC);
+    }
+    if (file >= 0)
+        close(file);
+    if (code && !(code->written && code->run)) {
+        give_back(code);
+        return NULL;
+    }
+    return code;
+}
+
+/* pages of `size` bytes or more: spare ones, or new */
+static sd_code *pages(size_t size)
+{
+    for (int k = 0; k < SPARES; k++) {
+        sd_code *code = __atomic_exchange_n(&spare[k], NULL, __ATOMIC_ACQ_REL);
+        if (code && code->size >= size && is_own(code))
+            return code;
+        sd_code_free(code);
+    }
+    return new_pages(size);
 }
 
 sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
 {
-    sd_code *code = permitted && __builtin_cpu_supports("avx") ? calloc(1, sizeof *code) : NULL;
-    if (!code)
-        return NULL;
-    code->size = (room_of(factor) + room_of(solve) + 4095) / 4096 * 4096;
-    code->page = mmap(NULL, code->size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (code->page == MAP_FAILED) {
-        free(code);
-        return NULL;
-    }
-    if (write_lists(code, factor, solve, inside, numbers)) {
+    size_t size = (room_of(factor) + room_of(solve) + 4095) / 4096 * 4096;
+    sd_code *code = permitted && __builtin_cpu_supports("avx") ? pages(size > LEAST ? size : LEAST) : NULL;
+    if (code && write_lists(code, factor, solve, inside, numbers)) {
         sd_code_free(code);
         return NULL;
     }
@@ -358,10 +423,13 @@ sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside
 
 void sd_code_free(sd_code *code)
 {
-    if (!code)
-        return;
-    munmap(code->page, code->size);
-    free(code);
+    for (int k = 0; code && k < SPARES && code->size <= MOST && is_own(code); k++) {
+        sd_code *none = NULL;
+        if (__atomic_compare_exchange_n(&spare[k], &none, code, 0, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED))
+            return;
+    }
+    if (code)
+        give_back(code);
 }
 #else
 sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)

@@ -3,8 +3,10 @@
  *
  * What is written are moves, products, differences and quotients of doubles at fixed distances from two pointers, and the
  * return: no branch, no call, nothing of the user's.  Numbers that are used again soon stay in registers.  A complex
- * number is the two halves of one; its products are those of plain formulae, as the compiler makes them.  Pages are
- * written, then made executable, never both.
+ * number is the two halves of one; its products are those of plain formulae, as the compiler makes them.  Pages are seen
+ * twice, to be written at one address and to be executed at another, at none both; those of a code that is no more wait for
+ * the next, for new ones cost five times what is written on them.  A process that forks shares its pages with the other:
+ * what was written before is never written again.
  */
 #ifndef SYSDYN_MACHINE_CODE_H
 #define SYSDYN_MACHINE_CODE_H
@@ -20,8 +22,9 @@ typedef void sd_run_code(void *outside, void *cell);
 
 struct sd_code {
     sd_run_code *factor, *solve;
-    void *page;
+    uint8_t *written, *run; /* the pages [size] at their two addresses */
     size_t size;
+    int forks;              /* of the process before they were made */
 };
 
 /* inside: as in elimination.h; the last two cells are a constant (real: 1; complex: the sign of an imaginary part) and the

@@ -52,7 +52,7 @@ sd_dopri *sd_dopri_new(sd_system *system, sd_underlying *underlying)
     sd_dopri *dopri = calloc(1, sizeof *dopri);
     if (!dopri)
         return NULL;
-    size_t m = (size_t)system->unknowns + 1;
+    size_t m = (size_t)sd_whole_lanes(system->unknowns);
     dopri->memory = calloc((6 + 2 * SD_DOPRI_ALL + SD_DOPRI_DENSE) * m, sizeof(double));
     if (!dopri->memory) {
         free(dopri);
@@ -156,7 +156,7 @@ void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd
 static int slopes(sd_dopri *dopri, int s, int before, double t)
 {
     const sd_underlying *u = dopri->underlying;
-    for (int32_t j = 0; j < u->solved; j++) {
+    for (int32_t j = 0; j < u->solved && !u->direct; j++) { /* what is solved at once begins at zero */
         int32_t k = u->unknown[j];
         dopri->rate[s][k] = dopri->rate[before][k];
         if (!u->rate[j])
@@ -170,33 +170,30 @@ static int slopes(sd_dopri *dopri, int s, int before, double t)
     return cause;
 }
 
-/* sum [n] := of a_j k_j over the terms that are not zero, in their order */
+/* sum [n] := of a_j k_j, in whole lanes: behind its unknowns every array has room for them, where nothing but zeros comes
+ * to stand; those few a_j that are zero cost less than a look at them */
 static SD_WIDE void add_up(int32_t n, int terms, const double *a, double *const *k, double *sum)
 {
-    int32_t used[SD_DOPRI_ALL], number = 0, whole = n - n % SD_LANES;
-    for (int32_t j = 0; j < terms; j++)
-        if (a[j] != 0.0)
-            used[number++] = j;
-    for (int32_t i = 0; i < whole; i += SD_LANES) {
+    for (int32_t i = 0; i < n; i += SD_LANES) {
         sd_lanes total = {0.0};
-        for (int32_t m = 0; m < number; m++)
-            total += a[used[m]] * SD_FROM(k[used[m]], i);
+        for (int j = 0; j < terms; j++)
+            total += a[j] * SD_FROM(k[j], i);
         SD_AT(sum, i) = total;
     }
-    for (int32_t i = whole; i < n; i++) {
-        double total = 0.0;
-        for (int32_t m = 0; m < number; m++)
-            total += a[used[m]] * k[used[m]][i];
-        sum[i] = total;
-    }
+}
+
+/* y [n] := y0 + h y */
+static SD_WIDE void lead(int32_t n, double h, const double *y0, double *y)
+{
+    for (int32_t i = 0; i < n; i += SD_LANES)
+        SD_AT(y, i) = SD_FROM(y0, i) + h * SD_FROM(y, i);
 }
 
 void sd_dopri_combine(sd_dopri *dopri, int s, double h)
 {
     double *y = dopri->y[s];
     add_up(dopri->n, s, sd_dopri_a[s], dopri->rate, y);
-    for (int32_t i = 0; i < dopri->n; i++)
-        y[i] = dopri->y[0][i] + h * y[i];
+    lead(dopri->n, h, dopri->y[0], y);
 }
 
 /* local error in the weights, from the embedded formulas of orders 5 and 3 */

@@ -114,7 +114,7 @@ static int factorise(sd_underlying *u, double t, const double *y, const double *
     return SD_FINE;
 }
 
-/* z moved by the solution; the largest move of what is undifferentiated, in magnitudes */
+/* z moved by the solution; the largest move of what is undifferentiated, in magnitudes (at once: of no interest) */
 static double correct(sd_underlying *u, double *y, double *yd)
 {
     double size = 0.0;
@@ -127,7 +127,8 @@ static double correct(sd_underlying *u, double *y, double *yd)
             yd[k] += u->step[j];
         } else {
             y[k] += u->step[j];
-            size = fmax(size, fabs(u->step[j]) / (u->magnitude[k] + fabs(y[k])));
+            if (!u->direct)
+                size = fmax(size, fabs(u->step[j]) / (u->magnitude[k] + fabs(y[k])));
         }
     }
     return sd_first_bad(u->solved, u->step) < 0 ? size : INFINITY;
