@@ -410,6 +410,10 @@ def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
     order: list[Node] = []
     for root in roots:
         stack: list[Node | None] = [root]
+        if root.op != "reduce" and not any(a.args for a in root.args):  # most are no deeper, and need no stack
+            order += [node for node in dict.fromkeys((*root.args, root)) if node not in seen]
+            seen.update((*root.args, root))
+            continue
         while stack:
             node = stack.pop()
             if node is None:  # all below what lies under it is done
@@ -455,6 +459,9 @@ def substitute(root: Node, change: Mapping[Node, Node]) -> Node:
 def variables(root: Node) -> frozenset[Node]:
     """The unknowns (var nodes) that occur; time counts as one."""
     if root.variables is not None:
+        return root.variables
+    if not any(a.args for a in root.args):
+        root.variables = frozenset(n for n in (*root.args, root) if n.op in ("var", "time"))
         return root.variables
     for node in topological([root]):
         if node.variables is None:

@@ -168,12 +168,22 @@ def _lossless(model: Elaborator, report: Report) -> None:
             report.error("E314", message, place)
 
 
+def _rises(law: Node, own: Node, known: Values) -> bool:
+    """Whether a law is its own variable times and over positive parameters, as most are."""
+    if law.op != "mul":
+        return False
+    factors = zip(law.data, law.args, strict=True)
+    return all(
+        e == 1.0 if a is own else a.op == "param" and not a.args and known.number(a) > 0.0 for e, a in factors
+    )
+
+
 def _sign(branch: Branch, known: Values, report: Report) -> None:
     """E321, E325: the modulus of a linear law, judged with the values bound."""
     if branch.law is None or branch.kind not in ("kinetic", "potential", "dissipator"):
         return
     own = [n for n in ex.variables(branch.law) if n.op == "var" and n.data[0] == branch.name and n.data[1][0] == "b"]
-    if len(own) != 1:
+    if len(own) != 1 or _rises(branch.law, own[0], known):
         return
     slope = ex.derivative(branch.law, own[0])
     if slope.op == "const" and not slope.data < 0.0:

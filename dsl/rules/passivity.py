@@ -15,6 +15,7 @@ from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.dsl.model.signs import ALL, Reals, reals
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.values import dataclass
 
 DECADES = tuple(s * m * 10.0**k for k in range(-9, 4) for m in (1.0, 3.0) for s in (1.0, -1.0))
 """Where laws are looked at, in SI units: a polynomial beyond any sensible range is the author's."""
@@ -24,14 +25,30 @@ ROUND_OFF = 1e-9
 """Of the largest value so far: what a difference of exponentials loses next to zero."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Law:
+    """A law of its own variable; params: its parameters, as met; slope: its derivative; through: it is zero at zero."""
+
+    node: Node
+    own: Node
+    params: tuple[Node, ...]
+    slope: Node
+    through: bool
+
+
+_Laws = dict[tuple[object, ...], _Law]
+"""By what they are but for the names in them: a netlist has few."""
+
+
 def passivity(network: Network, known: Values, report: Report) -> None:
     """Dissipators whose law is a function of their own variable alone; e f of a pseudo domain is no power."""
+    laws: _Laws = {}
     for branch in network.branches:
         if branch.kind == "dissipator" and branch.law is not None and not branch.domain.pseudo:
-            _judge(branch, branch.law, known, report)
+            _judge(branch, branch.law, known, laws, report)
 
 
-def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
+def _judge(branch: Branch, law: Node, known: Values, laws: _Laws, report: Report) -> None:
     if law.op == "sum" and law.data[0] == 0.0 and len(law.args) == 1 and law.args[0].op == "var":
         return  # 5 ohm*f
     factors = zip(law.data, law.args, strict=True) if law.op == "mul" else ()
@@ -41,16 +58,10 @@ def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
     own = [n for n in nodes if n.op == "var"]
     if len(own) != 1 or own[0].data[0] != branch.name or any(n.op in ("time", "table") for n in nodes):
         return
-    slope = ex.derivative(law, own[0])
-    through = ex.is_const(ex.substitute(law, {own[0]: ex.const(0.0)}), 0.0)
-    if through and not ex.variables(slope):
-        return
     bound: dict[Node, float] = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
-    held = {n: known.number(n, bound) for n in nodes if n.op == "param"} | bound
-    where = {n: Reals(v, v, v != 0.0) for n, v in held.items()} | {own[0]: ALL}
-    if through and _unbroken(law, where) and reals(slope, where).low >= 0.0:
-        return  # it rises from the origin
-    found = _active(law, own[0], held)
+    values = [known.number(n, bound) for n in nodes if n.op == "param"]
+    like = _like(nodes, own[0], laws)
+    found = _delivers(like, dict(zip(like.params, values, strict=True)) | bound)
     if found is not None:
         x, value = found
         domain, letter = branch.domain, own[0].data[1][1]
@@ -58,6 +69,28 @@ def _judge(branch: Branch, law: Node, known: Values, report: Report) -> None:
         name = branch.name.partition("#")[0]
         message = f"dissipator '{name}': e*f = {x * value:.3g} W < 0 at {letter} = {x:g} {unit.text}"
         report.error("E313", f"{message} (active element)", branch.place, help="an effort or flow source with that law")
+
+
+def _like(nodes: Sequence[Node], own: Node, laws: _Laws) -> _Law:
+    """The first law that differs in names alone; nodes: arguments before users."""
+    place = {node: k for k, node in enumerate(nodes)}
+    names = {"param": None, "var": None}
+    shape = tuple((n.op, names.get(n.op, n.data), *[place[a] for a in n.args]) for n in nodes)
+    if shape not in laws:
+        law, params = nodes[-1], tuple(n for n in nodes if n.op == "param")
+        through = ex.is_const(ex.substitute(law, {own: ex.const(0.0)}), 0.0)
+        laws[shape] = _Law(law, own, params, ex.derivative(law, own), through)
+    return laws[shape]
+
+
+def _delivers(law: _Law, held: Mapping[Node, float]) -> tuple[float, float] | None:
+    """An own variable at which the law delivers power, and the law there; None where there is none."""
+    if law.through and not ex.variables(law.slope):
+        return None
+    where = {n: Reals(v, v, v != 0.0) for n, v in held.items()} | {law.own: ALL}
+    if law.through and _unbroken(law.node, where) and reals(law.slope, where).low >= 0.0:
+        return None  # it rises from the origin
+    return _active(law.node, law.own, held)
 
 
 def _unbroken(law: Node, where: Mapping[Node, Reals]) -> bool:

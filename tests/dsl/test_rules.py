@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Energy
+from sysdyn.dsl.model.network import Energy, Parameter
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.counted_twice import counted_twice
 from sysdyn.dsl.rules.dependent_stores import dependent_stores
@@ -182,6 +182,21 @@ def test_a_dissipator_that_gives_power_somewhere(parts):
     cubic = with_law(parts, "R", ex.mul(f, f, f))
     assert said(passivity, cubic, Values({}, ())) == []
     assert said(passivity, with_law(parts, "R", ex.neg(f)), Values({}, ())) == []  # linear: judged by its slope
+
+
+def test_laws_that_differ_in_names_are_judged_by_their_own_values(parts):
+    """e = a f^3 + b f under three pairs of values: with b below zero power is given, whoever was judged before."""
+    resistor = next(b for b in parts.branches if b.name == "R")
+    branches, parameters = [], {}
+    for name, values in (("R1", (1.0, 2.0)), ("R2", (1.0, -2.0)), ("R3", (3.0, 4.0))):
+        a, b, f = ex.param(f"{name}.a"), ex.param(f"{name}.b"), of(name, "bf")
+        branches.append(replace(resistor, name=name, law=ex.add(ex.mul(a, f, f, f), ex.mul(b, f))))
+        for node, value in zip((a, b), values, strict=True):
+            unit, place = resistor.domain.flow, parts.place
+            parameters[node.data] = Parameter(node.data, (), unit, (ex.const(value),), (), place)
+    (found,) = said(passivity, replace(parts, branches=tuple(branches)), Values(parameters, ()))
+    assert found[0] == "E313"
+    assert found[1].startswith("dissipator 'R2': e*f = -")
 
 
 def test_a_law_that_rises_beside_a_pole_or_a_jump_gives_power_behind_it(parts):
