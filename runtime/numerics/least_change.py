@@ -1,8 +1,8 @@
 """Nonlinear equations with more unknowns than rows: the solution nearest to a guess.
 
 Gauss-Newton: with u = W (x - guess) / scale, each step takes the minimum-norm u of the linearised rows
-A u = A u_k - r, by singular values (dense) or the saddle-point system [a I A^T; A -eps] (sparse, SciPy, lazily),
-with halving of the step while the rows grow or are not finite.
+A u = A u_k - r, by singular values (dense) or the saddle-point system [a I A^T; A -eps] (sparse), with halving of the
+step while the rows grow or are not finite.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
+from sysdyn.runtime.numerics.symmetric import Symmetric
 from sysdyn.runtime.numerics.tall import determined
 from sysdyn.values import dataclass
 
@@ -322,11 +323,8 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
         inverse = np.linalg.inv(full)
         apply, back = full.dot, inverse.dot
     else:
-        from scipy.sparse import csc_array
-        from scipy.sparse.linalg import splu
-
-        matrix = csc_array((values, places), shape=(unknowns + rows, unknowns + rows))
-        apply, back = matrix.dot, splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.1).solve
+        matrix = Symmetric(unknowns + rows, places, values)
+        apply, back = matrix.times, matrix.solve
     found = np.zeros(unknowns + rows)
     for _ in range(_PROXIMAL):
         # eps acts on the change of the multipliers only, so that it leaves no trace in the solution

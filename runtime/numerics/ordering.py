@@ -141,6 +141,11 @@ def paired_order(pattern: Pattern) -> Ints | None:
     return order
 
 
+def symmetric_order(pattern: Pattern) -> Order:
+    """Of a large matrix whose pattern is symmetric: least fill of A + A^T, every row in its own column."""
+    return Order(*_large(neighbours(pattern)), paired=True)
+
+
 def neighbours(pattern: Pattern) -> Pattern:
     """A row for each two unknowns of which one stands in the row of the other, with both."""
     row, column = pattern.row, pattern.columns_of()
