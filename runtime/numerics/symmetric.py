@@ -41,7 +41,8 @@ class Symmetric:
 
     def times(self, x: Floats) -> Floats:
         """The product with x [number]."""
-        return np.bincount(self._pattern.row, weights=self._values * x[self._columns], minlength=x.size)
+        terms = self._values * x[self._columns]
+        return np.bincount(self._pattern.row, weights=terms, minlength=x.size).astype(np.float64)
 
     def solve(self, b: Floats) -> Floats:
         """The x [number] whose product is b."""
