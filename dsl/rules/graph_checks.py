@@ -87,8 +87,11 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
     """E411: sources that fix one quantity twice: effort sources between common-effort nodes, flow sources dually."""
     found: list[tuple[_End, _End, str]] = []
     joined = Joined[_End]()
+    blocked = _blocked(model)
     for branch in model.parts.branches:
         if branch.kind != branch.domain.common or branch.loops or branch.plus is None or branch.minus is None:
+            continue
+        if (branch.name, "bf" if branch.kind == "effort" else "be") in blocked:  # then it fixes nothing
             continue
         plus, minus = ((branch.domain.name, t.node, t.at) for t in (branch.plus, branch.minus))
         if joined.join(plus, minus):
@@ -98,6 +101,12 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
         message = f"loop of {branch.kind} sources: {names} fix the {branch.kind} between two nodes twice"
         report.error("E411", message, replace(branch.place, element=branch.name))
     _cutsets(model, report)
+
+
+def _blocked(model: Elaborator) -> set[tuple[str, str]]:
+    """Branches and their variables that constraints hold at times: a body diode lets no current back."""
+    held = (draft.value for draft in model.parts.drafts if draft.kind in ("psi", "guarded"))
+    return {v.data[:2] for value in held for v in ex.variables(value) if v.op == "var"}
 
 
 def _between(tree: list[tuple[_End, _End, str]], start: _End, goal: _End) -> list[str]:

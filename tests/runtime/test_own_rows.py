@@ -51,7 +51,7 @@ def test_no_row_belongs_to_two(index, family):
 
 
 def test_what_stores_couple_and_constraints_react_with_stands_on_both_sides_of_the_diagonal():
-    """Forces k (x - y) and reactions kappa dphi/dq: at index 3 the part of displacements and multipliers is symmetric."""
+    """Forces k (x - y) and reactions kappa dphi/dq: the part of displacements and multipliers is symmetric."""
     of = system("3")
     y = np.zeros(of.unknowns)
     for k in range(of.unknowns):

@@ -18,8 +18,7 @@
 #else
 #define NUMBERS SD_REAL_NUMBERS
 #endif
-#define MAKING 1000        /* operations interpreted for the time that machine code takes to be made, */
-#define MAKING_ONE 8       /* and for each operation that it has */
+#define TWICE 2            /* times that each operation is interpreted before machine code is made of them: those that come once do not pay */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
@@ -252,11 +251,11 @@ static void prepare(sd_elimination *e)
     e->interpreted = 0;
 }
 
-/* machine code once the list has been interpreted for as long as that takes to be written: at most twice the least */
+/* machine code behind the first times that the lists are interpreted */
 static void write_code(sd_elimination *e)
 {
     int64_t operations = e->factor.sums + e->factor.pairs + e->solve.sums + e->solve.pairs;
-    int64_t before = e->interpreted, due = sd_code_early() ? 0 : MAKING + MAKING_ONE * operations;
+    int64_t before = e->interpreted, due = sd_code_early() ? 0 : TWICE * operations;
     e->interpreted += operations;
     if (before <= due && e->interpreted > due)
         e->code = sd_code_new(&e->factor, &e->solve, e->inside, NUMBERS);

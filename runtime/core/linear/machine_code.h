@@ -6,7 +6,8 @@
  * number is the two halves of one; its products are those of plain formulae, as the compiler makes them.  Pages are seen
  * twice, to be written at one address and to be executed at another, at none both; those of a code that is no more wait for
  * the next, for new ones cost five times what is written on them.  A process that forks shares its pages with the other:
- * what was written before is never written again.
+ * what was written before is never written again.  (An emulator that keeps translations looks for new ones where it is told
+ * to: valgrind --smc-check=all.)
  */
 #ifndef SYSDYN_MACHINE_CODE_H
 #define SYSDYN_MACHINE_CODE_H
