@@ -18,7 +18,7 @@
 #else
 #define NUMBERS SD_REAL_NUMBERS
 #endif
-#define TWICE 2            /* times that each operation is interpreted before machine code is made of them: those that come once do not pay */
+#define TWICE 2            /* times that each operation is interpreted before machine code is made: those that come once do not pay */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
