@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +17,7 @@ from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.collecting import at_rest
+from sysdyn.dsl.model.depth import deep
 from sysdyn.dsl.model.network import Network, Parameter, Scene
 from sysdyn.dsl.model.rewriting import nodes_read
 from sysdyn.dsl.model.units import Dimension
@@ -32,8 +31,6 @@ from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
-
-_FRAMES = 20_000  # nesting is bounded by the parser (200 levels); chains of definitions by the file's size
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +107,7 @@ def network(
     None where the report has errors, or N608: a network that lacks a part of the text is none, and where a statement
     could not be read only names and units are judged.  required: parameters and inputs must have values.
     """
-    with _deep(), at_rest(), budget.drawn():
+    with deep(), at_rest(), budget.drawn():
         try:
             return _network(document, model, scene, report, settings, levels, required=required, outputs=outputs)
         except budget.SpentError as spent:
@@ -209,7 +206,7 @@ def listing(
     levels: Sequence[tuple[str, str]] = (),
 ) -> Listing | None:
     """What a model offers: parameters with values, names that can be read, components; None where it has errors."""
-    with _deep(), budget.drawn():
+    with deep(), budget.drawn():
         try:
             elaborator, reader = _elaborated(document, model, scene, report, (), levels)
             if report.failed:
@@ -306,7 +303,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
         return None
     value = items[0].value
     resolver = Resolver(report)
-    with _deep(), ex.fresh(), resolver.space(_space(document, source)):
+    with deep(), ex.fresh(), resolver.space(_space(document, source)):
         try:
             if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
                 return resolver.scalar(value).node.data  # type: ignore[no-any-return]
@@ -351,14 +348,3 @@ def _trace(expression: str, report: Report) -> tuple[SourceText, syntax.Trace] |
 def _space(document: Document, source: SourceText) -> Space:
     scope = FileScope(document.file, Report()).scope
     return Space("", scope, scope, source)
-
-
-@contextmanager
-def _deep() -> Iterator[None]:
-    """Room for nested expressions: frames of pure Python cost no C stack."""
-    before = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(before, _FRAMES))
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 import resource
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -35,7 +36,16 @@ NUMBER = 16
 """Bytes of an element of a parameter."""
 
 _GROUP = Path("/sys/fs/cgroup/memory.max")
-_left = math.inf
+
+
+class _Budget(threading.local):
+    """What is left of it in a thread (bytes)."""
+
+    def __init__(self) -> None:
+        self.left = math.inf
+
+
+_budget = _Budget()
 
 
 class SpentError(Exception):
@@ -81,19 +91,17 @@ def shown(amount: float) -> str:
 @contextmanager
 def drawn() -> Iterator[None]:
     """A stage that draws on the budget; a stage inside another draws on that one's."""
-    global _left
-    before = _left
+    before = _budget.left
     if before == math.inf:
-        _left = granted()
+        _budget.left = granted()
     try:
         yield
     finally:
-        _left = before
+        _budget.left = before
 
 
 def charge(amount: float, what: str) -> None:
     """Draw an amount (bytes) for something; SpentError where that is more than is left."""
-    global _left
-    _left -= amount
-    if _left < 0:
+    _budget.left = left = _budget.left - amount
+    if left < 0:
         raise SpentError(what)

@@ -19,13 +19,22 @@ from __future__ import annotations
 
 import itertools
 import math
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from sysdyn.dsl.model import budget
 
-_interned: dict[tuple[Any, ...], Node] = {}
+
+class _Interned(threading.local):
+    """The nodes of the block that a thread is in, by what they are: threads share none."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[tuple[Any, ...], Node] = {}
+
+
+_interned = _Interned()
 _numbers = itertools.count()  # never given twice: nodes of two `fresh` blocks may meet in one expression
 
 
@@ -57,21 +66,20 @@ def fresh(nodes: dict[Any, Node] | None = None) -> Iterator[None]:
 
     nodes: those of a block to which one returns.
     """
-    global _interned
-    before, _interned = _interned, {} if nodes is None else nodes
+    before, _interned.nodes = _interned.nodes, {} if nodes is None else nodes
     try:
         yield
     finally:
-        _interned = before
+        _interned.nodes = before
 
 
 def _make(op: str, data: Any, args: tuple[Node, ...], key: Any = None) -> Node:
     full = (op, data, args) if key is None else (op, key)
-    node = _interned.get(full)
+    nodes = _interned.nodes
+    node = nodes.get(full)
     if node is None:
         budget.charge(budget.NODE, "its expressions")
-        node = Node(op, data, args)
-        _interned[full] = node
+        nodes[full] = node = Node(op, data, args)
     return node
 
 

@@ -144,7 +144,7 @@ def test_the_stages_after_the_front_end_draw_on_it_too(monkeypatch):
     with pytest.raises(ModelError) as caught:
         compile_network(network, "lagrangian", "numpy")
     assert [d.code for d in caught.value.diagnostics] == ["E119"]
-    assert budget._left == float("inf")
+    assert budget._budget.left == float("inf")
 
 
 def test_findings_beyond_the_cap_are_counted():
