@@ -246,13 +246,13 @@ static void prepare(sd_elimination *e)
         return;
     }
     measure_columns(e);
-    e->ready = 1;
+    e->ready = e->scaled = 1; /* its magnitudes are still to be written */
     write_constants(e->cell + constants(e));
     e->interpreted = 0;
 }
 
 /* machine code behind the first times that the lists are interpreted */
-static void write_code(sd_elimination *e)
+static SD_APART void write_code(sd_elimination *e)
 {
     int64_t operations = e->factor.sums + e->factor.pairs + e->solve.sums + e->solve.pairs;
     int64_t before = e->interpreted, due = sd_code_early() ? 0 : TWICE * operations;
@@ -326,16 +326,24 @@ static SD_WIDE int healthy(const sd_elimination *e)
     return fine != 0;
 }
 
+/* the magnitudes of the pivots' columns; NULL: all of size one */
+static SD_APART void measure(sd_elimination *e, const double *scale)
+{
+    sd_number *magnitudes = e->cell + magnitude(e, 0);
+#pragma GCC unroll 4
+    for (int32_t k = 0; k < e->n; k++)
+        magnitudes[k] = scale ? scale[e->pivot_column[k]] : 1.0;
+    e->scaled = scale != NULL;
+}
+
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
 {
     sd_elimination *e = elimination;
     e->waited++;
     if (!e->ready)
         return 0;
-    sd_number *magnitudes = e->cell + magnitude(e, 0);
-#pragma GCC unroll 4
-    for (int32_t k = 0; k < e->n; k++)
-        magnitudes[k] = scale ? scale[e->pivot_column[k]] : 1.0;
+    if (scale || e->scaled)
+        measure(e, scale);
     if (!e->code)
         write_code(e);
     if (e->code)

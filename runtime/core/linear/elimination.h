@@ -37,7 +37,7 @@ typedef struct sd_code sd_code;
 typedef struct sd_elimination {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
-    int32_t ready;               /* an order was found */
+    int32_t ready, scaled;       /* an order was found; the magnitudes of its columns are not all one */
     int32_t factors, inside;     /* cells of factors; of all */
     int32_t samples, seen;
     int32_t wait, waited, missed; /* matrices from one order to the next at least; since the last; that it did not serve */

@@ -313,14 +313,9 @@ static void forget(sd_linear *linear)
     linear->pivoted = 1;
 }
 
-int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale)
+/* with exchanges of rows, which small matrices are met to learn of */
+static SD_APART int pivot(sd_linear *linear, const sd_number *values, const double *scale)
 {
-    linear->factorisations++;
-    if (!linear->pivoted)
-        forget(linear);
-    linear->replayed = replay(linear, values, scale);
-    if (linear->replayed)
-        return 0;
     equilibrate(linear, values, scale);
     int failed = linear->dense ? dense_factor(linear) : sparse_factor(linear);
     if (!failed && linear->rank < linear->n)
@@ -328,6 +323,15 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
     if (linear->elimination && !linear->idle && !failed)
         sd_elimination_learn(linear->elimination, linear->scaled);
     return failed;
+}
+
+int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale)
+{
+    linear->factorisations++;
+    if (!linear->pivoted)
+        forget(linear);
+    linear->replayed = replay(linear, values, scale);
+    return linear->replayed ? 0 : pivot(linear, values, scale);
 }
 
 int32_t *sd_linear_pivoted(sd_linear *linear)
@@ -351,14 +355,10 @@ void sd_linear_again(sd_linear *linear)
     linear->replayed = 0;
 }
 
-void sd_linear_solve(sd_linear *linear, sd_number *x)
+static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
     sd_number *rest = linear->work2;
-    if (linear->replayed) {
-        sd_elimination_solve(linear->elimination, x);
-        return;
-    }
     if (linear->sparse && linear->smallest >= REFINE && linear->rank == n) {
         sd_sparse_solve(linear->sparse, x, linear->work, linear->row_scale, linear->column_scale);
         return;
@@ -378,4 +378,12 @@ void sd_linear_solve(sd_linear *linear, sd_number *x)
         shorten(linear, x);
     for (int32_t i = 0; i < n; i++)
         x[i] *= linear->column_scale[i];
+}
+
+void sd_linear_solve(sd_linear *linear, sd_number *x)
+{
+    if (linear->replayed)
+        sd_elimination_solve(linear->elimination, x);
+    else
+        solve_pivoted(linear, x);
 }

@@ -7,6 +7,13 @@
 
 #include <math.h>
 
+/* a function that is called seldom stays out of the one that calls it, whose registers it would want */
+#ifdef __GNUC__
+#define SD_APART __attribute__((noinline))
+#else
+#define SD_APART
+#endif
+
 #define SD_LEAST_PIVOT 1e-290 /* part of its column below which a pivot is none, where every one but zero counts */
 
 #ifdef SD_COMPLEX

@@ -170,38 +170,56 @@ static int slopes(sd_dopri *dopri, int s, int before, double t)
     return cause;
 }
 
-/* sum [n] := of a_j k_j, in whole lanes: behind its unknowns every array has room for them, where nothing but zeros comes
- * to stand; those few a_j that are zero cost less than a look at them */
-static SD_WIDE void add_up(int32_t n, int terms, const double *a, double *const *k, double *sum)
+/* where the coefficients behind the first begin: zeros follow it in most formulas */
+static inline int begin_of(int terms, const double *a)
 {
+    int from = 1;
+    while (from < terms && a[from] == 0.0)
+        from++;
+    return from;
+}
+
+/* in whole lanes: behind its unknowns every array has room for them, where nothing but zeros comes to stand */
+SD_WIDE void sd_dopri_add_up(int32_t n, int terms, const double *a, double *const *k, double *sum)
+{
+    const int from = begin_of(terms, a);
     for (int32_t i = 0; i < n; i += SD_LANES) {
         sd_lanes total = {0.0};
-        for (int j = 0; j < terms; j++)
+        if (terms)
+            total = a[0] * SD_FROM(k[0], i);
+        for (int j = from; j < terms; j++)
             total += a[j] * SD_FROM(k[j], i);
         SD_AT(sum, i) = total;
     }
 }
 
-/* y [n] := y0 + h y */
-static SD_WIDE void lead(int32_t n, double h, const double *y0, double *y)
+/* y [n] := y0 + h times the sum of a_j k_j: two lanes at a time read the coefficients once */
+static SD_WIDE void lead(int32_t n, int terms, const double *a, double *const *k, double h, const double *y0, double *y)
 {
-    for (int32_t i = 0; i < n; i += SD_LANES)
-        SD_AT(y, i) = SD_FROM(y0, i) + h * SD_FROM(y, i);
+    const int from = begin_of(terms, a);
+    for (int32_t i = 0; i < n; i += 2 * SD_LANES) {
+        const int32_t i2 = i + SD_LANES < n ? i + SD_LANES : i;
+        sd_lanes one = a[0] * SD_FROM(k[0], i), two = a[0] * SD_FROM(k[0], i2);
+        for (int j = from; j < terms; j++) {
+            one += a[j] * SD_FROM(k[j], i);
+            two += a[j] * SD_FROM(k[j], i2);
+        }
+        SD_AT(y, i) = SD_FROM(y0, i) + h * one;
+        SD_AT(y, i2) = SD_FROM(y0, i2) + h * two;
+    }
 }
 
 void sd_dopri_combine(sd_dopri *dopri, int s, double h)
 {
-    double *y = dopri->y[s];
-    add_up(dopri->n, s, sd_dopri_a[s], dopri->rate, y);
-    lead(dopri->n, h, dopri->y[0], y);
+    lead(dopri->n, s, sd_dopri_a[s], dopri->rate, h, dopri->y[0], dopri->y[s]);
 }
 
 /* local error in the weights, from the embedded formulas of orders 5 and 3 */
 static double estimate(sd_dopri *dopri)
 {
     double *five = dopri->ee, *three = dopri->f[0];
-    add_up(dopri->n, SD_DOPRI_STAGES, sd_dopri_e5, dopri->rate, five);
-    add_up(dopri->n, SD_DOPRI_STAGES, sd_dopri_e3, dopri->rate, three);
+    sd_dopri_add_up(dopri->n, SD_DOPRI_STAGES, sd_dopri_e5, dopri->rate, five);
+    sd_dopri_add_up(dopri->n, SD_DOPRI_STAGES, sd_dopri_e3, dopri->rate, three);
     double s5 = squares(dopri, five, NULL), s3 = squares(dopri, three, NULL), both = s5 + 0.01 * s3;
     for (int32_t i = 0; i < dopri->n; i++)
         five[i] *= dopri->h;

@@ -51,6 +51,8 @@ void sd_dopri_free(sd_dopri *dopri);
 sd_stepper *sd_dopri_stepper(sd_dopri *dopri);
 void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd, double h);
 int sd_dopri_step(sd_dopri *dopri);
+/* sum [n] := of the first `terms` of a_j k_j */
+void sd_dopri_add_up(int32_t n, int terms, const double *a, double *const *k, double *sum);
 /* point of stage s of a step h: y0 + h sum a_sj k_j */
 void sd_dopri_combine(sd_dopri *dopri, int s, double h);
 /* dopri_dense.c: y, yd [n] at any t within the last step */

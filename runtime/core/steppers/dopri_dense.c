@@ -23,32 +23,51 @@ static int more_stages(sd_dopri *dopri)
     return 0;
 }
 
+/* f0, f1, f2 of one unknown from what it changes by over the step and its slopes at the ends, all times h */
+static inline void cubic(double *const *f, int32_t i, double change, double begin, double end)
+{
+    f[0][i] = change;
+    f[1][i] = begin - change;
+    f[2][i] = 2.0 * change - (begin + end);
+}
+
+/* sum of a_j k_j of one unknown */
+static double sum_of(int terms, const double *a, double *const *k, int32_t i)
+{
+    double sum = 0.0;
+    for (int j = 0; j < terms; j++)
+        sum += a[j] * k[j][i];
+    return sum;
+}
+
+/* of unknowns that are not integrated: the interpolant of their integral */
+static void integrals(sd_dopri *dopri, int terms)
+{
+    const sd_underlying *u = dopri->underlying;
+    double h = dopri->h_used, *const *y = dopri->y, **f = dopri->f;
+    for (int32_t j = 0; j < u->solved; j++) {
+        int32_t i = u->unknown[j];
+        if (u->rate[j])
+            continue;
+        cubic(f, i, h * sum_of(SD_DOPRI_STAGES, sd_dopri_a[SD_DOPRI_STAGES], y, i), h * y[0][i], h * y[SD_DOPRI_STAGES][i]);
+        for (int m = 3; m < SD_DOPRI_DENSE; m++)
+            f[m][i] = h * sum_of(terms, sd_dopri_d[m - 3], y, i);
+    }
+}
+
 /* The interpolant of a step: the unknowns, and the integrals of those that are not integrated. */
 static void prepare(sd_dopri *dopri)
 {
-    const sd_underlying *u = dopri->underlying;
-    const double *b = sd_dopri_a[SD_DOPRI_STAGES];
-    double h = dopri->h_used, **f = dopri->f;
-    int plain = more_stages(dopri); /* without them it is the cubic of both ends */
-    for (int32_t i = 0; i < dopri->n; i++) {
-        int32_t column = u->column[i];
-        double **k = column >= 0 && !u->rate[column] ? dopri->y : dopri->rate;
-        double change = dopri->phi[i] - dopri->y[0][i];
-        if (k == dopri->y) {
-            change = 0.0;
-            for (int j = 0; j < SD_DOPRI_STAGES; j++)
-                change += h * b[j] * k[j][i];
-        }
-        f[0][i] = change;
-        f[1][i] = h * k[0][i] - change;
-        f[2][i] = 2.0 * change - h * (k[0][i] + k[SD_DOPRI_STAGES][i]);
-        for (int m = 3; m < SD_DOPRI_DENSE; m++) {
-            double sum = 0.0;
-            for (int j = 0; !plain && j < SD_DOPRI_ALL; j++)
-                sum += sd_dopri_d[m - 3][j] * k[j][i];
-            f[m][i] = h * sum;
-        }
+    double h = dopri->h_used, **f = dopri->f, *const *k = dopri->rate;
+    const int terms = more_stages(dopri) ? 0 : SD_DOPRI_ALL; /* without them it is the cubic of both ends */
+    for (int32_t i = 0; i < dopri->n; i++)
+        cubic(f, i, dopri->phi[i] - dopri->y[0][i], h * k[0][i], h * k[SD_DOPRI_STAGES][i]);
+    for (int m = 3; m < SD_DOPRI_DENSE; m++) {
+        sd_dopri_add_up(dopri->n, terms, sd_dopri_d[m - 3], k, f[m]);
+        for (int32_t i = 0; i < dopri->n; i++)
+            f[m][i] *= h;
     }
+    integrals(dopri, terms);
     dopri->dense = 1;
 }
 

@@ -47,42 +47,92 @@ void sd_underlying_free(sd_underlying *underlying)
     if (!underlying)
         return;
     free(underlying->place_y);
+    free(underlying->written);
+    free(underlying->list);
+    free(underlying->from);
     free(underlying->memory);
     free(underlying);
 }
 
-/* where the entries of the system stand in the matrix */
-static void find_places(sd_underlying *u)
+/* A list of entries that a block of the matrix writes, behind those of the lists before. */
+struct sd_written {
+    sd_entries *block;
+    const sd_frame *frame;
+    double *to;
+};
+
+/* number of entries that the blocks of the matrix write */
+static int32_t written_by(const sd_system *system)
 {
-    for (int32_t e = 0; e < u->system->entries; e++)
-        u->place_y[e] = u->place_yd[e] = u->linear->entries;
-    for (int32_t e = 0; e < u->linear->entries; e++)
-        (u->from_rate[e] ? u->place_yd : u->place_y)[u->source[e]] = e;
-    u->placed = 1;
+    int32_t n = 0;
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++)
+        n += call->n_dy + call->n_dyd;
+    return n;
 }
 
-static void add_to_matrix(sd_entries *block, const sd_call *call, int32_t n, const int32_t *slot, const int32_t *place, double t,
-                        const double *y, const double *yd, double *v, double *values)
+/* Notes a list of n entries that is written to *to, and moves that on; they come to these places, where the first to come is
+ * copied and others are added. */
+static void note_list(sd_underlying *u, sd_entries *block, const sd_frame *frame, int32_t n, const int32_t *slot,
+                      const int32_t *place, double **to)
 {
+    const int32_t none = written_by(u->matrix), entries = u->linear->entries, at = (int32_t)(*to - u->written);
     if (n == 0)
         return;
-    block(&call->frame, t, y, yd, v);
-    for (int32_t e = 0; e < n; e++)
-        values[place[slot[e]]] += v[e];
+    u->list[u->lists++] = (sd_written){block, frame, *to};
+    for (int32_t e = 0; e < n; e++) {
+        int32_t there = place[slot[e]];
+        if (there < entries && u->from[there] == none) {
+            u->from[there] = at + e;
+        } else if (there < entries) {
+            u->more[2 * u->mores] = there;
+            u->more[2 * u->mores++ + 1] = at + e;
+        }
+    }
+    *to += n;
+}
+
+/* Where the entries of the system stand in the matrix, and which of what the blocks write makes each: behind that there
+ * is a zero.  0 or SD_MEMORY. */
+static int find_places(sd_underlying *u)
+{
+    const sd_system *system = u->matrix;
+    const int32_t none = written_by(system), entries = u->linear->entries;
+    u->written = calloc((size_t)none + 1, sizeof *u->written);
+    u->from = malloc(((size_t)entries + 2 * (size_t)none + 1) * sizeof *u->from);
+    u->list = malloc((2 * (size_t)system->calls + 1) * sizeof *u->list);
+    if (!u->written || !u->from || !u->list)
+        return SD_MEMORY;
+    u->more = u->from + entries;
+    for (int32_t e = 0; e < system->entries; e++)
+        u->place_y[e] = u->place_yd[e] = entries;
+    for (int32_t e = 0; e < entries; e++) {
+        (u->from_rate[e] ? u->place_yd : u->place_y)[u->source[e]] = e;
+        u->from[e] = none;
+    }
+    double *to = u->written;
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
+        note_list(u, call->dy, &call->frame, call->n_dy, call->slot_dy, u->place_y, &to);
+        note_list(u, call->dyd, &call->frame, call->n_dyd, call->slot_dyd, u->place_yd, &to);
+    }
+    u->flows = 0;
+    for (int32_t i = 0; i < u->system->kinematics; i++)
+        u->flows |= !u->rate[u->column[u->system->k_f[i]]];
+    u->placed = 1;
+    return SD_FINE;
 }
 
 /* u->values := the matrix at (t, y, yd) */
 static void evaluate_matrix(sd_underlying *u, double t, const double *y, const double *yd)
 {
     const sd_system *system = u->matrix;
-    double *values = u->values;
-    if (!u->placed)
-        find_places(u);
-    memset(values, 0, (size_t)(u->linear->entries + 1) * sizeof *values);
-    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
-        add_to_matrix(call->dy, call, call->n_dy, call->slot_dy, u->place_y, t, y, yd, system->v, values);
-        add_to_matrix(call->dyd, call, call->n_dyd, call->slot_dyd, u->place_yd, t, y, yd, system->v, values);
-    }
+    double *const values = u->values, *const written = u->written;
+    for (const sd_written *list = u->list, *end = list + u->lists; list < end; list++)
+        list->block(list->frame, t, y, yd, list->to);
+    const int32_t *const from = u->from, *const more = u->more, entries = u->linear->entries;
+    for (int32_t e = 0; e < entries; e++)
+        values[e] = written[from[e]];
+    for (int32_t k = 0; k < u->mores; k++)
+        values[more[2 * k]] += written[more[2 * k + 1]];
     for (int32_t i = 0; i < system->clear; i++)
         values[u->place_y[system->cleared[i]]] = values[u->place_yd[system->cleared[i]]] = 0.0;
     for (int32_t i = 0; i < system->held; i++) {
@@ -96,12 +146,13 @@ static int factorise(sd_underlying *u, double t, const double *y, const double *
 {
     u->ready = 0;
     u->matrix->jacobian_evaluations++;
+    if (!u->placed && find_places(u))
+        return SD_MEMORY;
     evaluate_matrix(u, t, y, yd);
     if (*u->system->stop)
         return SD_STOPPED;
-    int32_t bad = sd_first_bad(u->linear->entries, u->values);
-    if (bad >= 0) {
-        u->bad_row = u->first + u->linear->row[bad];
+    if (!sd_finite(u->linear->entries, u->values)) {
+        u->bad_row = u->first + u->linear->row[sd_first_bad(u->linear->entries, u->values)];
         return SD_NONFINITE;
     }
     int failed = sd_linear_factor(u->linear, u->values, NULL);
@@ -114,24 +165,29 @@ static int factorise(sd_underlying *u, double t, const double *y, const double *
     return SD_FINE;
 }
 
-/* z moved by the solution; the largest move of what is undifferentiated, in magnitudes (at once: of no interest) */
+/* The rows r solved for what they are off by, in their place.  NULL: something of it is no number. */
+static const double *solve(sd_underlying *u)
+{
+    double *off = u->r + u->first;
+    sd_linear_solve(u->linear, off);
+    return sd_finite(u->solved, off) ? off : NULL;
+}
+
+/* z moved by the solution; the largest move of what is undifferentiated, in magnitudes */
 static double correct(sd_underlying *u, double *y, double *yd)
 {
-    double size = 0.0;
-    for (int32_t j = 0; j < u->solved; j++)
-        u->step[j] = -u->r[u->first + j];
-    sd_linear_solve(u->linear, u->step);
-    for (int32_t j = 0; j < u->solved; j++) {
+    const double *off = solve(u);
+    double size = off ? 0.0 : INFINITY;
+    for (int32_t j = 0; j < u->solved && off; j++) {
         int32_t k = u->unknown[j];
         if (u->rate[j]) {
-            yd[k] += u->step[j];
+            yd[k] -= off[j];
         } else {
-            y[k] += u->step[j];
-            if (!u->direct)
-                size = fmax(size, fabs(u->step[j]) / (u->magnitude[k] + fabs(y[k])));
+            y[k] -= off[j];
+            size = fmax(size, fabs(off[j]) / (u->magnitude[k] + fabs(y[k])));
         }
     }
-    return sd_first_bad(u->solved, u->step) < 0 ? size : INFINITY;
+    return size;
 }
 
 /* q' = f: f may be among what is solved for */
@@ -143,30 +199,51 @@ static int kinematics(const sd_underlying *u, const double *y, double *yd)
 }
 
 /* the cause where the slopes are no numbers: the residual first */
-static int no_number(sd_underlying *u, int cause)
+static int no_number(sd_underlying *u, double t, const double *y, const double *yd, int cause)
 {
+    sd_residual(u->direct ? u->applied : u->system, t, y, yd, u->r); /* a solution may stand there */
     int32_t bad = sd_first_bad(u->system->rows, u->r);
     u->bad_row = bad >= 0 ? bad : u->bad_row;
     return bad >= 0 || !cause ? SD_NONFINITE : cause;
+}
+
+/* slopes where z is linear: of the rows at z = 0 */
+static int at_once(sd_underlying *u, double t, double *y, double *yd)
+{
+    double *const of[] = {y, yd};
+    const int32_t *const rate = u->rate, *const unknown = u->unknown, solved = u->solved;
+    for (int32_t j = 0; j < solved; j++)
+        of[rate[j] > 0][unknown[j]] = 0.0;
+    kinematics(u, y, yd);
+    sd_residual(u->applied, t, y, yd, u->r);
+    if (*u->system->stop)
+        return SD_STOPPED;
+    int cause = factorise(u, t, y, yd);
+    const double *off = cause ? NULL : solve(u);
+    if (!off)
+        return no_number(u, t, y, yd, cause);
+    for (int32_t j = 0; j < solved; j++)
+        of[rate[j] > 0][unknown[j]] = -off[j];
+    return u->flows ? kinematics(u, y, yd) : SD_FINE;
 }
 
 int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
 {
     const sd_system *system = u->system;
     double before = 0.0;
-    for (int32_t j = 0; u->direct && j < u->solved; j++)
-        *(u->rate[j] ? &yd[u->unknown[j]] : &y[u->unknown[j]]) = 0.0;
-    kinematics(u, y, yd);
     u->ready = 0;
+    if (u->direct)
+        return at_once(u, t, y, yd);
+    kinematics(u, y, yd);
     for (int m = 0; m < ITERATIONS; m++) {
-        sd_residual(u->direct ? u->applied : u->system, t, y, yd, u->r);
+        sd_residual(u->system, t, y, yd, u->r);
         if (*system->stop)
             return SD_STOPPED;
         int cause = u->ready ? SD_FINE : factorise(u, t, y, yd);
         double size = cause ? INFINITY : correct(u, y, yd);
-        if (!isfinite(size)) /* of a residual that is no number every correction is none */
-            return no_number(u, cause);
-        if (u->direct || size <= DBL_EPSILON)
+        if (!isfinite(size))
+            return no_number(u, t, y, yd, cause);
+        if (size <= DBL_EPSILON)
             return kinematics(u, y, yd);
         double ratio = m > 0 ? size / before : 1.0;
         if (m > 0 && ratio < 1.0 && size * ratio <= u->tolerance * (1.0 - ratio))
@@ -195,7 +272,7 @@ static int onto(sd_underlying *u, sd_system *rows, int displacements, double t, 
         for (int32_t j = 0; j < u->solved; j++)
             u->step[j] = (goal ? goal[u->first + j] : 0.0) - u->r[u->first + j];
         sd_linear_solve(u->linear, u->step);
-        if (sd_first_bad(u->solved, u->step) >= 0)
+        if (!sd_finite(u->solved, u->step))
             return SD_NONFINITE;
         for (int32_t i = 0; displacements && i < system->kinematics; i++) {
             int32_t k = system->k_q[i];

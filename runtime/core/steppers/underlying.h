@@ -18,6 +18,8 @@
 #include "system/assembly.h"
 #include "linear/linear.h"
 
+typedef struct sd_written sd_written;
+
 typedef struct sd_underlying {
     sd_system *system;           /* form 0 */
     sd_system *matrix;           /* the same rows, with the entries that the matrix holds alone */
@@ -36,7 +38,11 @@ typedef struct sd_underlying {
     double tolerance;            /* of Newton's iteration, in magnitudes */
     double *values, *r, *step, *rest, *memory;
     int32_t *place_y, *place_yd; /* [entries of system] place of dF/dy, dF/dyd in the matrix, one behind it where they have none */
-    int32_t ready, placed, bad_row, bad_column; /* placed: the two above are there */
+    sd_written *list;            /* [lists] the blocks of the matrix */
+    double *written;             /* what they write, one behind the other, and a zero */
+    int32_t *from, *more;        /* [entries of linear] which of these each is; [mores][2]: entry, another that is added to it */
+    int32_t lists, mores, flows; /* flows: some are solved for themselves */
+    int32_t ready, placed, bad_row, bad_column; /* placed: the tables above are there */
     double drift;                /* how far the last projection moved first, in magnitudes */
 } sd_underlying;
 

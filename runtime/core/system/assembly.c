@@ -12,6 +12,24 @@
  * transistor that is off) leaves a row whose only term is its residual */
 #define NOTHING (DBL_EPSILON * DBL_EPSILON)
 
+static inline void add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
+{
+    const int32_t *const row = system->k_row, *const q = system->k_q, *const f = system->k_f, kinematics = system->kinematics;
+    const double *const scale = system->k_scale;
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < kinematics; i++)
+        r[row[i]] = scale[i] * (yd[q[i]] - y[f[i]]);
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++)
+        call->rows(&call->frame, t, y, yd, r);
+    for (int32_t i = 0; i < system->held; i++)
+        r[system->held_row[i]] = (system->held_rate[i] ? yd : y)[system->held_unknown[i]];
+}
+
+void sd_add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
+{
+    add_rows(system, t, y, yd, r);
+}
+
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r)
 {
     system->residual_evaluations++;
@@ -20,20 +38,7 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
         return;
     }
     memset(r, 0, (size_t)system->rows * sizeof *r);
-    sd_add_rows(system, t, y, yd, r);
-}
-
-void sd_add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
-{
-    const int32_t *const row = system->k_row, *const q = system->k_q, *const f = system->k_f, kinematics = system->kinematics;
-    const double *const scale = system->k_scale;
-#pragma GCC unroll 4
-    for (int32_t i = 0; i < kinematics; i++)
-        r[row[i]] = scale[i] * (yd[q[i]] - y[f[i]]);
-    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++)
-        call->rows(&call->frame, t, y, yd, r);
-    for (int32_t i = 0; i < system->held; i++)
-        r[system->held_row[i]] = (system->held_rate[i] ? yd : y)[system->held_unknown[i]];
+    add_rows(system, t, y, yd, r);
 }
 
 /* adds one block's entries into their places; entries of one place add up */

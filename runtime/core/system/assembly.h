@@ -80,5 +80,13 @@ int32_t sd_first_astray(sd_system *system, double t, const double *y, const doub
                         const double *jy, const double *jyd, double h, const double *open, int all, double *s);
 /* position of the first number that is not finite, -1 where all are */
 int32_t sd_first_bad(int32_t n, const double *x);
+/* 1: all are; of few numbers at once */
+static inline int sd_finite(int32_t n, const double *x)
+{
+    double sum = 0.0; /* x - x is 0 for a finite number and not a number otherwise */
+    for (int32_t i = 0; i < n; i++)
+        sum += x[i] - x[i];
+    return sum == 0.0;
+}
 
 #endif
