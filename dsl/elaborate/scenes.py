@@ -11,6 +11,7 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
@@ -241,7 +242,7 @@ class SceneReader:
         if any(n.op in ("param", "var", "time") for n in ex.topological([node])):
             message = f"{what} changes which unknowns there are: it does not depend on values"
             raise self.resolver.fail("E405", message, value.span, help="true or false")
-        return ex.const(1.0 if ex.evaluate([node], dict[ex.Node, float]().__getitem__)[0] else 0.0)
+        return ex.const(1.0 if evaluate([node], dict[ex.Node, float]().__getitem__)[0] else 0.0)
 
     def _choice(self, word: syntax.Word, choices: tuple[str, ...], what: str) -> None:
         if word.name not in choices:

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Domain
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
@@ -585,9 +586,9 @@ def reaction(residual: Node, holonomic: bool, target: Node, multiplier: Node) ->
     top: list[Node] = []
     bottom: list[Node] = []
     for node in sorted((n for n in ex.variables(target) if n.op == "var"), key=lambda n: n.number):
-        slope = ex.derivative(target, node)
+        slope = derivative(target, node)
         held = node if holonomic else ex.var(node.data[0], _RATES.get(node.data[1], "f"), *node.args)
-        top.append(ex.mul(ex.derivative(residual, held), slope))
+        top.append(ex.mul(derivative(residual, held), slope))
         bottom.append(ex.mul(slope, slope))
     return ex.neg(ex.div(ex.mul(multiplier, ex.add(*top)), ex.add(*bottom)))
 
