@@ -18,7 +18,7 @@ from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.habits import blamed
-from sysdyn.dsl.names.members import Located
+from sysdyn.dsl.names.paths import Located
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, SourceText

@@ -9,7 +9,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.context import Context
 from sysdyn.dsl.names.failures import Failed
-from sysdyn.dsl.names.members import branch_dimension
+from sysdyn.dsl.names.quantities import branch_dimension
 from sysdyn.dsl.names.symbols import BranchSymbol, Definition, Typed
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass

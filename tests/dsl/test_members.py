@@ -12,8 +12,9 @@ from sysdyn.dsl.model.network import Energy
 from sysdyn.dsl.model.units import NONE
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
-from sysdyn.dsl.names.members import Members, ledger, reaction
+from sysdyn.dsl.names.members import Members
 from sysdyn.dsl.names.names import STATICS, Names, pick
+from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import Typed, Vector
 from sysdyn.dsl.rules import laws
 from sysdyn.dsl.text.diagnostics import Report, SourceText
