@@ -9,9 +9,9 @@ from typing import Any
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.asked import Request, options_of, rest, stops
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.running import Request, options_of, rest, stops
 from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import stopped

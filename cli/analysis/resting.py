@@ -9,7 +9,7 @@ import numpy as np
 from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
 from sysdyn.cli.analysis.linear import linearised, loose_of
 from sysdyn.cli.analysis.states import at, resting
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.rest import Rest
 from sysdyn.runtime.linear.stability import Verdict, energy_at, verdict

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.cli.analysis.asked import Found, arrived, begun, compiled, of_contents
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.events.start import eventful_start

@@ -19,9 +19,10 @@ from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.checking import checked
 from sysdyn.cli.run.loaded import Loaded
-from sysdyn.cli.run.running import Ran, Request, run
+from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.opened import Sweep
 from sysdyn.dsl import load as load_

@@ -7,7 +7,7 @@ from typing import Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.options import chosen
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 
 FORMS = ("descriptor", "matrices", "canonical", "underlying", "linear", "port_hamiltonian", "efforts", "elements")
 

@@ -8,7 +8,7 @@ import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER
 from sysdyn.cli.options import chosen
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 
 
 @with_console("equilibrium")

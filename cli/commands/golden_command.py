@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sysdyn.cli.golden.book import Golden
     from sysdyn.cli.golden.checking import Case, Mutant
     from sysdyn.cli.golden.recording import Recorded
-    from sysdyn.cli.run.running import Request
+    from sysdyn.cli.run.asked import Request
 
 RTOL = 2e-4
 """At 1e-3 a change of 1 % in a parameter of middling influence goes unnoticed."""
@@ -86,7 +86,7 @@ def record(
     ten times that; runs every formulation that can express the scene.
     """
     from sysdyn.cli.golden.book import BOOK, Accepted, Golden, read
-    from sysdyn.cli.run.running import Request
+    from sysdyn.cli.run.asked import Request
 
     if not (0.0 < rtol < 1.0 and 0.0 <= atol < math.inf):
         raise UsageError(f"--rtol {rtol:g} --atol {atol:g}: between 0 and 1, and not negative")

@@ -10,7 +10,7 @@ import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 
 KINDS = ("bode", "nyquist", "step")
 DATA = (".h5", ".mat", ".json")
@@ -59,7 +59,7 @@ def command(
     _known(files)
     from sysdyn.cli.analysis.linear import linearised
     from sysdyn.cli.analysis.states import state_of
-    from sysdyn.cli.run.running import separate
+    from sysdyn.cli.run.asked import separate
     from sysdyn.dsl.model import expression as ex
     from sysdyn.runtime.linear.tangent import NoLinearisation
 

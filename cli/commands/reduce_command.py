@@ -15,7 +15,7 @@ from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.reduce.activity import Activities
 from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
 from sysdyn.cli.report.balance import WORDS
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 
 KINDS = (".png", ".svg")
 BAR = 24

@@ -31,7 +31,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
     from sysdyn.cli.commands.diff_command import write
     from sysdyn.cli.report.collect import collect
     from sysdyn.cli.report.page import page
-    from sysdyn.cli.run.running import Request
+    from sysdyn.cli.run.asked import Request
     from sysdyn.dsl.model import expression as ex
 
     line = ProgressLine("never" if console.quiet else progress)

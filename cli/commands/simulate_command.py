@@ -15,7 +15,8 @@ from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
-    from sysdyn.cli.run.running import Ran, Request
+    from sysdyn.cli.run.asked import Request
+    from sysdyn.cli.run.running import Ran
 
 SHOWN = 4
 """Conserved quantities that the summary lists."""
@@ -32,7 +33,8 @@ SHOWN = 4
 @click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
 def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
     """Simulate a scene of FILE and write its trace."""
-    from sysdyn.cli.run.running import Request, run
+    from sysdyn.cli.run.asked import Request
+    from sysdyn.cli.run.running import run
     from sysdyn.cli.run.starting import described, shortened, sought
 
     line = ProgressLine("never" if console.quiet else progress)

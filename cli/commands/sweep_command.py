@@ -11,8 +11,8 @@ from sysdyn.cli.failures import FAULT, SOLVER, UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.crew import cores
-from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep.in_core import KEEPS
 from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner

@@ -15,7 +15,7 @@ from sysdyn.cli.options import chosen, side_by_side, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run import lock, targets
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
 from sysdyn.cli.trade.reference import NoReference
 from sysdyn.cli.trade.search import tolerance

@@ -41,7 +41,7 @@ def command(
     ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.  Formulations run
     side by side where that pays, with equal results.
     """
-    from sysdyn.cli.run.running import Request
+    from sysdyn.cli.run.asked import Request
     from sysdyn.cli.run.sizes import sizes
     from sysdyn.cli.verify.verification import verify
 

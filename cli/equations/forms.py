@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from sysdyn.cli.analysis.asked import begun
 from sysdyn.cli.analysis.linear import inputs_of, linearised
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Request
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.equations.book import (
     CO_WORDS,

@@ -11,7 +11,8 @@ from sysdyn.cli.export.layout import Formed
 from sysdyn.cli.export.tables import Tables
 from sysdyn.compiler.binding.following import Following
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.dsl.model.expression import derivative, is_const, topological_unbound, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import is_const, topological_unbound, variables
 from sysdyn.dsl.text.diagnostics import ModelError
 from sysdyn.runtime.structure.structure import index_of
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.running import Ran, Request, integrate, options_of, ready
+from sysdyn.cli.run.asked import Request, options_of
+from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.starting import as_written
 from sysdyn.compiler.model import energies
 from sysdyn.dsl.model import expression as ex

@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.report.balance import Part, observed, shares
+from sysdyn.cli.run.asked import Request, options_of
 from sysdyn.cli.run.prepare import prepare
-from sysdyn.cli.run.running import Ran, Request, integrate, options_of, ready
+from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Place, Report

@@ -19,7 +19,8 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.reduce import edits
 from sysdyn.cli.reduce.activity import Activities, activities
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.running import ACCURACY, Ran, Request, check_tolerances, integrate, options_of, ready
+from sysdyn.cli.run.asked import ACCURACY, Request, check_tolerances, options_of
+from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.dsl import load

@@ -15,20 +15,8 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.compiler.model.energies import flows
 from sysdyn.compiler.model.terms import canonical, local_variables, split, terms
 from sysdyn.dsl.model import dimensions as dim
-from sysdyn.dsl.model.expression import (
-    Node,
-    add,
-    const,
-    derivative,
-    index,
-    mul,
-    neg,
-    rate,
-    reduction,
-    sub,
-    substitute,
-    var,
-)
+from sysdyn.dsl.model.calculus import derivative, rate
+from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, reduction, sub, substitute, var
 from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
 from sysdyn.dsl.model.units import si
 from sysdyn.dsl.text.diagnostics import ModelError, Place

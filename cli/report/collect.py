@@ -13,8 +13,9 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.report.balance import Share, observed, shares
 from sysdyn.cli.report.study import Study, sources_of
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.asked import Request, check_tolerances, options_of
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, options_of
+from sysdyn.cli.run.running import Ran, integrate
 from sysdyn.cli.run.starting import start
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl import load

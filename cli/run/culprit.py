@@ -13,7 +13,8 @@ from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES
-from sysdyn.dsl.model.expression import Node, to_text, topological
+from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.system import System

@@ -13,8 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.cli.run.asked import Request, options_of, stops
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Ran, Request, options_of, stops
+from sysdyn.cli.run.running import Ran
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.columns import Read, following
@@ -22,7 +23,8 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.many.anchors import guesses
-from sysdyn.runtime.many.batch import ROWS, Batch, Claim, NotApplicableError, obstacle, way_of
+from sysdyn.runtime.many.asked import ROWS, Claim, NotApplicableError, obstacle, way_of
+from sysdyn.runtime.many.batch import Batch
 from sysdyn.runtime.model.failures import SolverFailure
 
 Floats = NDArray[np.float64]

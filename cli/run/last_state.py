@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.model.interpret import evaluate
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Constraint
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model.system import System
@@ -115,7 +117,7 @@ class LastState:
                     if abs(now) < SMALL * abs(before):
                         what = "the argument of a logarithm" if called else "a divisor"
                         itself = base.op == "var" and self._place(base) is not None
-                        value = "" if itself else f"{ex.to_text(base)} = {now:.3g}, "
+                        value = "" if itself else f"{to_text(base)} = {now:.3g}, "
                         return f"{what} goes to zero: {value}{', '.join(self.of(base)[:2])}"
         return None
 
@@ -132,7 +134,7 @@ class LastState:
             by = {"phi": [[ex.var(n, "q")] for n in names]}
             by["psi"] = [[ex.var(n, "q", order=1), ex.var(n, "f")] for n in names]
             rows = [
-                [sum(self.value(ex.derivative(c.expression, v), y) for v in vs) for vs in by[c.kind]] for c in found
+                [sum(self.value(derivative(c.expression, v), y) for v in vs) for vs in by[c.kind]] for c in found
             ]
             j = np.array(rows)
             return np.asarray(j / np.maximum(np.linalg.norm(j, axis=1, keepdims=True), 1e-300))
@@ -167,10 +169,10 @@ class LastState:
         found: list[tuple[float, Place]] = []
         for e in network.energies:
             if not e.loops:
-                found += [(abs(self.value(ex.derivative(e.expression, v))), e.place) for v in moves]
+                found += [(abs(self.value(derivative(e.expression, v))), e.place) for v in moves]
         for w in network.works:
             if not w.loops:
-                found.append((abs(self.value(ex.mul(w.effort, ex.derivative(w.on, position)))), w.place))
+                found.append((abs(self.value(ex.mul(w.effort, derivative(w.on, position)))), w.place))
         known = [item for item in found if math.isfinite(item[0]) and item[0] > 0.0]
         # a momentum says what moves, not why
         forces = [item for item in known if item[1] not in {e.place for e in network.energies if e.function == "T*"}]

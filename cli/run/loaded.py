@@ -15,16 +15,17 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.asked import Request, check_tolerances, options_of, parameters_of
 from sysdyn.cli.run.in_core import InCore
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Ran, Request, check_tolerances, integrate, options_of, parameters_of, ready
+from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.again import Way, again
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
-from sysdyn.runtime.many.batch import ROWS, NotApplicableError
+from sysdyn.runtime.many.asked import ROWS, NotApplicableError
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 

@@ -11,6 +11,7 @@ from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Expectation
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.text.diagnostics import Related, Report
@@ -255,7 +256,7 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
             return float("nan") if value is None else float(value)
         return prepared.binding.evaluate(node)
 
-    left, right = ex.evaluate([claim.left, claim.right], lookup)
+    left, right = evaluate([claim.left, claim.right], lookup)
     if missing:
         message = f"static quantity '{missing[0]}' is not known for this model (too large, or undetermined)"
         report.note("N608", message, claim.place)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.running import separate
+from sysdyn.cli.run.asked import separate
 from sysdyn.values import dataclass
 
 Numbers = NDArray[np.float64]

@@ -14,7 +14,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.integrate.options import instants
 from sysdyn.runtime.integrate.request import TRACE
-from sysdyn.runtime.many.batch import DONE, END, EXTREMA, TRACES, NotApplicableError
+from sysdyn.runtime.many.asked import DONE, END, EXTREMA, TRACES, NotApplicableError
 
 Floats = NDArray[np.float64]
 KEEPS = {"end": END, "extrema": EXTREMA, "traces": TRACES}

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.loaded import Loaded
-from sysdyn.cli.run.running import Ran, Request
+from sysdyn.cli.run.running import Ran
 from sysdyn.cli.sweep.axes import CHOICES
 from sysdyn.cli.sweep.in_core import Cases, thinned
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.study import Case
 from sysdyn.dsl.text.diagnostics import ModelError, Report
-from sysdyn.runtime.many.batch import NotApplicableError
+from sysdyn.runtime.many.asked import NotApplicableError
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.trace.trace import Trace
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from sysdyn import __version__
 from sysdyn.cli.run import lock
-from sysdyn.cli.run.running import Request, model_digest
+from sysdyn.cli.run.asked import Request, model_digest
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import Journal

@@ -16,7 +16,7 @@ from typing import Any
 
 from sysdyn import __version__
 from sysdyn.cli.run import lock
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.trade.traded import Combination, Measured, Reference, Runs
 from sysdyn.compiler.program import cache
 from sysdyn.dsl.text.diagnostics import SourceText

@@ -17,8 +17,9 @@ import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import TRIED
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.asked import ACCURACY, Request, options_of
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import ACCURACY, Ran, Request, begin, options_of, ready, run_from
+from sysdyn.cli.run.running import Ran, begin, ready, run_from
 from sysdyn.cli.run.starting import Started
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.trade.errors import error_of

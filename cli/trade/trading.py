@@ -12,8 +12,8 @@ from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.asked import Request, check_tolerances
 from sysdyn.cli.run.crew import company
-from sysdyn.cli.run.running import Request, check_tolerances
 from sysdyn.cli.trade.ahead import Asked, ahead
 from sysdyn.cli.trade.journal import journal as journal_of
 from sysdyn.cli.trade.measuring import Bench, Limits

@@ -19,9 +19,10 @@ from pathlib import Path
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import EVERY
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.asked import ACCURACY, Request, check_tolerances, options_of
 from sysdyn.cli.run.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import ACCURACY, Ran, Request, check_tolerances, integrate, options_of, ready
+from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.verify.agreement import Bounds, Gap, horizon
 from sysdyn.cli.verify.twins import Twins, free_quantities, twins

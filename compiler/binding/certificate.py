@@ -22,6 +22,7 @@ from sysdyn.compiler.binding.enclosures import enclose_over
 from sysdyn.compiler.model.interpret import Value, evaluate
 from sysdyn.compiler.model.terms import summands
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.dsl.text.diagnostics import Place
@@ -170,7 +171,7 @@ class _Judge:
             name = f"content of line {_line(energy.place)}"
             rates = {n: ex.var("#own", "bf", ex.const(float(k))) for k, n in enumerate(own)}
             inner = ex.substitute(energy.expression, dict(rates))
-            slopes = {n: ex.derivative(inner, v) for n, v in rates.items()}
+            slopes = {n: derivative(inner, v) for n, v in rates.items()}
             still = ex.substitute(energy.expression, dict.fromkeys(own, ex.const(0.0)))
             if own and not ex.is_const(still, 0.0) and self._sliding(energy.expression):
                 yield Finding(name, "port", "structure", "what it slides on moves", energy.place)
@@ -181,8 +182,8 @@ class _Judge:
 
     def _quadratic(self, name: str, content: Node, own: Sequence[Node], place: Place) -> Finding:
         """A content of several variables: proven where its second derivatives are numbers, else at points."""
-        slopes = [ex.derivative(content, v) for v in own]
-        second = [[ex.derivative(s, v) for v in own] for s in slopes]
+        slopes = [derivative(content, v) for v in own]
+        second = [[derivative(s, v) for v in own] for s in slopes]
         still = dict.fromkeys(own, ex.const(0.0))
         if not any(ex.variables(n) for row in second for n in row):
             matrix = np.array([[self._fixed(n) for n in row] for row in second])
@@ -201,7 +202,7 @@ class _Judge:
         for work in network.works:
             name = f"work of line {_line(work.place)}"
             try:
-                rate = ex.time_derivative(work.on)
+                rate = time_derivative(work.on)
             except ValueError:
                 yield Finding(name, "unknown", "structure", "the rate of its displacement is not known", work.place)
                 continue
@@ -236,11 +237,11 @@ class _Judge:
         closing = [c for c in network.constraints if c.kind == "gamma" and unknowns[0] in ex.variables(c.expression)]
         if len(unknowns) == len(flows) == len(closing) == 1:
             gamma, own = closing[0].expression, unknowns[0]
-            slope = ex.derivative(gamma, flows[0])
+            slope = derivative(gamma, flows[0])
             known = {n for n in ex.variables(gamma) if n.op == "var"} <= {own, flows[0]}
             if known and not ex.variables(slope) and self._fixed(slope) != 0.0:
                 flow = ex.neg(ex.div(ex.substitute(gamma, {flows[0]: ex.const(0.0)}), slope))
-                part = ex.derivative(effort, own)
+                part = derivative(effort, own)
                 if not ex.variables(part):
                     return self._signed(name, ex.neg(ex.mul(ex.substitute(rate, {flows[0]: flow}), part)), own, place)
         return Finding(name, "unknown", "structure", "an effort constraint gives its effort", place)
@@ -322,7 +323,7 @@ def _explicit(effort: Node, network: Network, given: set[str]) -> Node:
     for own in sorted(read, key=lambda n: n.number):
         closing = [c for c in network.constraints if c.kind == "gamma" and own in ex.variables(c.expression)]
         for c in closing:
-            slope = ex.derivative(c.expression, own)
+            slope = derivative(c.expression, own)
             rest = ex.substitute(c.expression, {own: ex.const(0.0)})
             if not ex.variables(slope) and not any(n.op == "var" and n.data[0] in given for n in ex.variables(rest)):
                 change[own] = ex.neg(ex.div(rest, slope))

@@ -14,7 +14,8 @@ from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
 from sysdyn.compiler.model.interpret import Value, over
 from sysdyn.compiler.model.parameters import Extents, positions
 from sysdyn.compiler.model.terms import has_reduction
-from sysdyn.dsl.model.expression import Node, derivative, is_const, topological, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, is_const, topological, variables
 
 Array = NDArray[np.float64]
 Point = tuple[float, Array, Array]  # t, y, yd

@@ -19,7 +19,8 @@ from sysdyn.compiler.binding.enclosures import Array, Bounds, Outline, Values, e
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
 from sysdyn.compiler.model.interpret import Value, evaluate, grid
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, const, differential, topological_unbound, variables
+from sysdyn.dsl.model.calculus import differential
+from sysdyn.dsl.model.expression import Node, const, topological_unbound, variables
 from sysdyn.dsl.model.network import Loop, Table
 
 HIDDEN, VARIES = 3e-3, 0.1

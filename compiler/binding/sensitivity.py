@@ -24,16 +24,8 @@ from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel
-from sysdyn.dsl.model.expression import (
-    Node,
-    compare,
-    conditional,
-    const,
-    differential,
-    is_const,
-    mul,
-    topological,
-)
+from sysdyn.dsl.model.calculus import differential
+from sysdyn.dsl.model.expression import Node, compare, conditional, const, is_const, mul, topological
 from sysdyn.dsl.model.network import Parameter
 
 Array = NDArray[np.float64]

@@ -21,7 +21,8 @@ from sysdyn.compiler.forms.lowering import whole
 from sysdyn.compiler.forms.momenta import momentum, resolve
 from sysdyn.compiler.model.energies import EnergyModel, Family
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, param, sub, var, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, add, mul, neg, param, sub, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 

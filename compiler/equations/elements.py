@@ -17,7 +17,8 @@ from sysdyn.compiler.equations.book import Equation, Summed
 from sysdyn.compiler.equations.joining import joined
 from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Causality, conjugate, own
 from sysdyn.compiler.network.primal.slopes import Slopes
-from sysdyn.dsl.model.expression import Node, const, derivative, div, is_const, param, substitute, var, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, const, div, is_const, param, substitute, var, variables
 from sysdyn.dsl.model.network import Branch, Network
 
 EDGES = {"kinetic": "p-f", "potential": "q-e", "dissipator": "e-f"}

@@ -21,7 +21,8 @@ from sysdyn.compiler.equations.joining import joined, length, ordered, shortest,
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.dsl.model.expression import Node, add, const, derivative, neg, product, sub, substitute, var, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, add, const, neg, product, sub, substitute, var, variables
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 

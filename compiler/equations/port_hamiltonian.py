@@ -28,17 +28,16 @@ from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.forms.momenta import given
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.terms import local_variables, summands
+from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.expression import (
     Node,
     add,
     const,
-    derivative,
     div,
     is_const,
     mul,
     neg,
     scale,
-    signals_held,
     sub,
     substitute,
     var,

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 from sysdyn.compiler.forms.descriptor import BLOCKS, HOME, Block, Equations, Kernel, Summand
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, add, is_const, without_signals
+from sysdyn.dsl.model.calculus import without_signals
+from sysdyn.dsl.model.expression import Node, add, is_const
 from sysdyn.dsl.model.network import Loop
 
 _Bounds = tuple[tuple[Node, Node], ...]

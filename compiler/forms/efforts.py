@@ -19,7 +19,8 @@ from collections.abc import Callable, Iterator
 from sysdyn.compiler.forms.momenta import at_indices
 from sysdyn.compiler.model.energies import EnergyModel, Row, Virtual
 from sysdyn.compiler.model.terms import Nest, local_variables
-from sysdyn.dsl.model.expression import Node, add, derivative, mul, neg, signals_held, substitute, var, variables
+from sysdyn.dsl.model.calculus import derivative, signals_held
+from sysdyn.dsl.model.expression import Node, add, mul, neg, substitute, var, variables
 from sysdyn.values import dataclass
 
 PREFIX = "x:"

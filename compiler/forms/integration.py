@@ -12,20 +12,9 @@ from dataclasses import replace
 from sysdyn.compiler.model.energies import EnergyModel, Offset, Row
 from sysdyn.compiler.model.mirror import Mirror
 from sysdyn.compiler.model.terms import Nest, Term, local_variables
-from sysdyn.dsl.model.expression import (
-    Node,
-    add,
-    const,
-    derivative,
-    mul,
-    neg,
-    param,
-    substitute,
-    time,
-    to_text,
-    var,
-    variables,
-)
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, add, const, mul, neg, param, substitute, time, var, variables
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Diagnostic
 
 

@@ -19,20 +19,8 @@ from sysdyn.compiler.forms.lowering import total_rate
 from sysdyn.compiler.forms.speeds import Speeds, definition, kinematics, speeds_of
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
-from sysdyn.dsl.model.expression import (
-    Node,
-    add,
-    const,
-    derivative,
-    is_const,
-    mul,
-    neg,
-    signals_held,
-    substitute,
-    topological,
-    var,
-    variables,
-)
+from sysdyn.dsl.model.calculus import derivative, signals_held
+from sysdyn.dsl.model.expression import Node, add, const, is_const, mul, neg, substitute, topological, var, variables
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
 

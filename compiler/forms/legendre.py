@@ -22,19 +22,18 @@ from dataclasses import replace
 from sysdyn.compiler.forms.minors import Square, inverse
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.terms import Term, local_variables
+from sysdyn.dsl.model.calculus import derivative, time_derivative
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import (
     Node,
     add,
     const,
-    derivative,
-    evaluate,
     is_const,
     mul,
     neg,
     power,
     sub,
     substitute,
-    time_derivative,
     topological,
     var,
     variables,

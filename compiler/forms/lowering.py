@@ -24,23 +24,11 @@ from sysdyn.compiler.forms.meters.observing import add_initials, add_observation
 from sysdyn.compiler.forms.momenta import given, inertial, resolved
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
-from sysdyn.dsl.model.expression import (
-    Node,
-    add,
-    derivative,
-    differential,
-    evaluate,
-    gradient,
-    is_const,
-    neg,
-    ordered_variables,
-    substitute,
-    time_derivative,
-    to_text,
-    var,
-    variables,
-)
-from sysdyn.dsl.model.expression import rate as rate_of
+from sysdyn.dsl.model.calculus import derivative, differential, gradient, time_derivative
+from sysdyn.dsl.model.calculus import rate as rate_of
+from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.expression import Node, add, is_const, neg, ordered_variables, substitute, var, variables
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.terms import Nest, Term, local_variables, split, without_nested
+from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -18,12 +19,10 @@ from sysdyn.dsl.model.expression import (
     compare,
     conditional,
     const,
-    derivative,
     index,
     is_const,
     reduction,
     substitute,
-    time_derivative,
 )
 
 

@@ -16,11 +16,11 @@ from dataclasses import replace
 
 from sysdyn.compiler.model.energies import EnergyModel, Family, tangible
 from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
     const,
-    derivative,
     index,
     is_const,
     ordered_variables,

@@ -18,16 +18,15 @@ from itertools import combinations
 from sysdyn.compiler.forms.minors import determinant, inverse
 from sysdyn.compiler.model.energies import EnergyModel, Quantity
 from sysdyn.compiler.model.terms import local_variables
+from sysdyn.dsl.model.calculus import derivative, signals_held
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import (
     Node,
     add,
     const,
-    derivative,
-    evaluate,
     is_const,
     mul,
     neg,
-    signals_held,
     sub,
     substitute,
     topological,

@@ -16,8 +16,9 @@ from dataclasses import field, replace
 
 from sysdyn.compiler.model.mirror import PRIMAL, Mirror
 from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.dimensions import TIME
-from sysdyn.dsl.model.expression import Node, derivative, substitute, topological, var
+from sysdyn.dsl.model.expression import Node, substitute, topological, var
 from sysdyn.dsl.model.network import Loop, Network, Shape
 from sysdyn.dsl.model.units import multiply, si_text
 from sysdyn.dsl.text.diagnostics import Place

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from sysdyn.dsl.model.expression import Node, linear, to_text, topological
+from sysdyn.dsl.model.expression import Node, linear, topological
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
 

@@ -11,18 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from sysdyn.compiler.model.interpret import Lookup, Value, evaluate
-from sysdyn.dsl.model.expression import (
-    Node,
-    add,
-    call,
-    compare,
-    conditional,
-    const,
-    linear,
-    mul,
-    partials,
-    topological_unbound,
-)
+from sysdyn.dsl.model.calculus import partials
+from sysdyn.dsl.model.expression import Node, add, call, compare, conditional, const, linear, mul, topological_unbound
 
 EXACT = ("const", "param", "var", "time", "index", "reduce")
 """What `rounding` takes as it is."""

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import Value, evaluate, over
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
-from sysdyn.dsl.model.expression import Node, const, to_text, topological
+from sysdyn.dsl.model.expression import Node, const, topological
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import ElementSetting, Loop, Network, Parameter, Shape
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 

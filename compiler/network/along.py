@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Coupling, Network, NodeFamily, Terminal
 from sysdyn.dsl.model.rewriting import expressions, rewritten
@@ -35,7 +36,7 @@ def _combination(root: Node) -> Parts | None:
     unknowns = sorted(ex.variables(root), key=lambda n: n.number)
     if not unknowns or any(n.op != "var" or n.data[1] not in ("nq", "bq") or n.data[2] for n in unknowns):
         return None
-    parts = [(ex.derivative(root, n), n) for n in unknowns]
+    parts = [(derivative(root, n), n) for n in unknowns]
     rest = ex.substitute(root, {n: ex.const(0.0) for n in unknowns})
     constant = all(not ex.variables(c) for c, _ in parts) and ex.is_const(rest, 0.0)
     return parts if constant and not any(n.op == "reduce" for n in ex.topological([root])) else None

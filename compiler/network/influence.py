@@ -22,7 +22,8 @@ from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.model.terms import summands
-from sysdyn.dsl.model.expression import Node, index, signals_held, variables
+from sysdyn.dsl.model.calculus import signals_held
+from sysdyn.dsl.model.expression import Node, index, variables
 from sysdyn.dsl.model.network import Branch, Constraint, Coupling, Network, Shape
 from sysdyn.values import dataclass
 

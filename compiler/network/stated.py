@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.model.terms import summands, vanishes
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Domain, Energy, Network, Terminal
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
@@ -58,8 +59,8 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
     if not 1 <= len(used) <= 2 or any(n.data[1] != _AT_NODES[function.name] or n.data[2] for n in used):
         return None
     a, b = used[0], used[1] if len(used) == 2 else None
-    slope = ex.derivative(piece, a)
-    if b is not None and (function.name == "T" or not vanishes(slope, ex.derivative(piece, b))):
+    slope = derivative(piece, a)
+    if b is not None and (function.name == "T" or not vanishes(slope, derivative(piece, b))):
         return None
     at = tuple(ex.index(loop.index) for loop in energy.loops)
     own = ex.var(name, f"b{function.own}", *at)
@@ -154,7 +155,7 @@ def _with_law(branch: Branch, energies: list[Energy]) -> Branch:
     """The branch with the slope of its energies as law."""
     function = STATE_FUNCTIONS[energies[0].function]
     own = ex.var(branch.name, f"b{function.own}", *branch.at)
-    law = ex.add(*(ex.derivative(e.expression, own) for e in energies))
+    law = ex.add(*(derivative(e.expression, own) for e in energies))
     stated = any(len(_owners(e)) > 1 for e in energies)
     energy = None if stated else ex.add(*(e.expression for e in energies))
     return replace(branch, kind=function.edge, side=function.conjugate, law=law, stated=stated, energy=energy)

@@ -13,7 +13,8 @@ from typing import Any
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, Block, DescriptorForm, Kernel
 from sysdyn.compiler.model.integers import Index, Integers, Reference, Slot
 from sysdyn.compiler.model.terms import Nest, is_affine
-from sysdyn.dsl.model.expression import Node, derivative, is_const, linear, topological, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, is_const, linear, topological, variables
 from sysdyn.values import dataclass
 
 Operand = int | float  # the number of an assignment, or a constant

@@ -16,6 +16,7 @@ from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter, Switch
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
@@ -236,7 +237,7 @@ def sticking(
         sense = _sense(frame, f"{name} sense", at, loops, place)
         inner = node.args[0]
         mark = ex.var("#sign", "s")
-        bound = ex.derivative(ex.substitute(root, {node: mark}), mark)
+        bound = derivative(ex.substitute(root, {node: mark}), mark)
         if mark in ex.variables(bound):
             frame.report.error("E705", "setsign enters this law in another way than c*setsign(f)", place)
             return ex.substitute(root, {node: ex.const(0.0)})
@@ -254,7 +255,7 @@ def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], p
         if any(n.op == "reduce" and node in ex.topological([n.args[2]]) for n in ex.topological([root])):
             continue
         mark = ex.var("#abs", "s")
-        bound = ex.substitute(ex.derivative(ex.substitute(root, {node: mark}), mark), {mark: ex.const(0.0)})
+        bound = ex.substitute(derivative(ex.substitute(root, {node: mark}), mark), {mark: ex.const(0.0)})
         if bound.op == "const" and (bound.data == 0.0 or not math.isfinite(bound.data)):
             continue  # no corner at rest: abs(f)^3 is smooth
         name = f"content of line {place.start[0]}" + (f" ({len(frame.parts.drafts)})" if frame.parts.drafts else "")
@@ -291,7 +292,7 @@ def _stick_in_plane(
     value = ex.sub(along, ex.scale(0.5, node))
     draft = Draft(
         name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
-        rate=ex.time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
+        rate=time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
     )  # fmt: skip
     frame.parts.drafts.append(draft)
     frame.parts.drafts.append(Draft(labels[1], at, loops, "follows", place, unit, flows[1], multipliers[1]))
@@ -385,9 +386,9 @@ def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], k
     name = f"{draft.label}[{', '.join(map(str, at))}]" if at else draft.label
     guard = None if draft.guard is None else ex.conditional(draft.guard, ex.const(1.0), ex.const(0.0))
     value = watch(frame, of(draft.value), draft.unit.dimension, draft.place)
-    rate = watch(frame, of(draft.rate or ex.time_derivative(draft.value)), NONE, draft.place)
+    rate = watch(frame, of(draft.rate or time_derivative(draft.value)), NONE, draft.place)
     multiplier = watch(frame, of(draft.multiplier), NONE, draft.place)
-    twice = ex.time_derivative(ex.time_derivative(of(draft.value))) if draft.kind == "phi" else None
+    twice = time_derivative(time_derivative(of(draft.value))) if draft.kind == "phi" else None
     acceleration = None if twice is None else watch(frame, twice, NONE, draft.place)
     sense = None if draft.sense is None else of(draft.sense)
     restitution = None if draft.restitution is None else of(draft.restitution)

@@ -21,6 +21,7 @@ from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import LevelChoice
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS, own_variables
@@ -48,7 +49,7 @@ BUILTINS = (*ONE_PORTS, *TWO_PORTS)
 
 
 def _range_text(bounds: tuple[Node, Node]) -> str:
-    first, last = map(ex.to_text, bounds)
+    first, last = map(to_text, bounds)
     return first if first == last else f"{first}..{last}"
 
 

@@ -11,13 +11,14 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.habits import blamed
-from sysdyn.dsl.names.members import Located
+from sysdyn.dsl.names.paths import Located
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, SourceText
@@ -241,7 +242,7 @@ class SceneReader:
         if any(n.op in ("param", "var", "time") for n in ex.topological([node])):
             message = f"{what} changes which unknowns there are: it does not depend on values"
             raise self.resolver.fail("E405", message, value.span, help="true or false")
-        return ex.const(1.0 if ex.evaluate([node], dict[ex.Node, float]().__getitem__)[0] else 0.0)
+        return ex.const(1.0 if evaluate([node], dict[ex.Node, float]().__getitem__)[0] else 0.0)
 
     def _choice(self, word: syntax.Word, choices: tuple[str, ...], what: str) -> None:
         if word.name not in choices:

@@ -6,7 +6,8 @@ where w is, so a work along it is one work for each coordinate.
 
 from __future__ import annotations
 
-from sysdyn.dsl.model.expression import Node, derivative, topological, var, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, topological, var, variables
 
 _DISPLACEMENTS = {"f": "q", "nf": "nq", "bf": "bq", "q": "q", "nq": "nq", "bq": "bq"}
 _COEFFICIENTS = ("q", "nq", "bq", "s")

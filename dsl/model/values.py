@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Loop, Parameter
 
@@ -30,11 +31,11 @@ class Values:
         """The value of a node made of parameters and bound loop variables; NaN if it holds anything else."""
         if node.op == "param" and not node.args and not bound:
             return self._element(node.data, ())
-        return float(ex.evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
+        return float(evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
 
     def truth(self, node: Node, bound: Mapping[Node, float] | None = None) -> bool:
         """The value of a condition."""
-        return bool(ex.evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
+        return bool(evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
 
     def element(self, name: str, *at: int) -> float:
         """The value of a parameter, or of one element of an array."""

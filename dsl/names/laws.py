@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.context import Context
 from sysdyn.dsl.names.failures import Failed
-from sysdyn.dsl.names.members import branch_dimension
+from sysdyn.dsl.names.quantities import branch_dimension
 from sysdyn.dsl.names.symbols import BranchSymbol, Definition, Typed
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
@@ -160,7 +161,7 @@ def ratio_of(
     name = me.name.partition("#")[0]
     message = f"law of '{name}': {side} is in {dim.show(dimension)}, the law in {{}}"
     with context.virtually():
-        node, signals = ex.signals_held(context.wanted(value, dimension, "E208", message))
+        node, signals = signals_held(context.wanted(value, dimension, "E208", message))
     far = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == partner.family.name}
     near = [
         n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")
@@ -173,7 +174,7 @@ def ratio_of(
             message = f"{kind} '{name}' given as {side} against {wrong}{3 - number}: that is a {other}"
             raise context.fail("E316", message, span, help=f"'{other}({side} = ...)'")
         raise context.fail("E303", f"the law of '{name}' gives {side} from {expected}{3 - number}", span)
-    ratio = ex.derivative(node, far[expected])
+    ratio = derivative(node, far[expected])
     rest = ex.substitute(node, {far[expected]: ex.const(0.0)})
     own = [n for n in ex.variables(ratio) if n.op == "var" and n.data[0] in (me.family.name, partner.family.name)]
     flows = [n for n in own if n.data[1] in ("be", "bf")]

@@ -1,8 +1,6 @@
-"""Members: `x.f`, `R1.e`, `M.La.q`, `X[i].cell.e`, `rod.multiplier`, `audit.energy`, `rod.on(x)`.
+"""Members: `x.f`, `R1.e`, `rod.multiplier`, `audit.energy`, `rod.on(x)`.
 
-A path is followed from left to right through instances, bundles and ports to a symbol; a last name that is no symbol
-there is a quantity of what was reached.  An instance's inside is written with the loop variables of its label; from
-outside they are replaced by the indices given.
+A last name that is no symbol where its path leads (paths.py) is a quantity of what was reached (quantities.py).
 """
 
 from __future__ import annotations
@@ -13,25 +11,23 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Domain
-from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
+from sysdyn.dsl.model.paynter import EFFORT_CLASSES
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.context import Quadrature, Use, Value
-from sysdyn.dsl.names.failures import Failed, NotYetError, Part, SeveralError
-from sysdyn.dsl.names.names import Names
+from sysdyn.dsl.names.context import Value
+from sysdyn.dsl.names.failures import Failed, NotYetError
+from sysdyn.dsl.names.paths import Located
+from sysdyn.dsl.names.quantities import BRANCH, Quantities, branch_words
+from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
-    BundleNode,
     ConstraintSymbol,
     Definition,
-    DomainSymbol,
     End,
     InstanceSymbol,
     NodeSymbol,
     ParameterSymbol,
     PortSymbol,
-    Space,
-    Symbol,
     TwoPortSymbol,
     Typed,
     UnknownSymbol,
@@ -40,106 +36,11 @@ from sysdyn.dsl.names.symbols import (
     nearest,
 )
 from sysdyn.dsl.tree import syntax
-from sysdyn.values import dataclass
 
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE, "drift": NONE}
-RATES = ("dot", "der", "d", "dt", "prime")
-"""Members by which other languages write a rate."""
-BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
-
-
-def branch_words(domain: Domain) -> tuple[str, ...]:
-    """The members of a branch with their units: `e [V]`, `f [A]`, ..."""
-    units = {"e": domain.effort, "f": domain.flow, "q": domain.displacement, "p": domain.momentum}
-    return (*(f"{letter} [{unit.text}]" for letter, unit in units.items()), "power [W]", "energy [J]")
-
-
-@dataclass(frozen=True, slots=True)
-class Located:
-    """A symbol at the end of a path.
-
-    indices: own indices as written; change: loop variables of the instances on the way -> the indices given there.
-    """
-
-    symbol: Symbol
-    indices: tuple[syntax.Index, ...]
-    change: dict[Node, Node]
-
-
-class Members(Names):
-    """Paths and members."""
-
-    # -- paths ---------------------------------------------------------------------------------------------
-
-    def located(self, e: syntax.Expr) -> Located | None:
-        """The symbol that a path leads to; None where it leads to a quantity or is no path."""
-        match e:
-            case syntax.Name():
-                if e.name in self._bound:
-                    return None
-                symbol = self.scope.find(e.name)
-                return None if symbol is None else Located(symbol, (), {})
-            case syntax.Item():
-                base = self.located(e.base)
-                return None if base is None or base.indices else Located(base.symbol, e.indices, base.change)
-            case syntax.Member():
-                base = self.located(e.base)
-                return None if base is None else self._inside(base, e)
-        return None
-
-    def _inside(self, base: Located, e: syntax.Member) -> Located | None:
-        """What `base.name` stands for where base is a bundle or an instance; None where it has no such member."""
-        symbol = base.symbol
-        if isinstance(symbol, BundleNode):
-            member = symbol.members.get(e.name)
-            return None if member is None else Located(member, base.indices, base.change)
-        if isinstance(symbol, InstanceSymbol):
-            space, change = self.entered(symbol, base, e.base.span)
-            inner = space.scope.symbols.get(e.name)
-            return None if inner is None else Located(inner, (), change)
-        return None
-
-    def entered(self, symbol: InstanceSymbol, base: Located, span: syntax.Span) -> tuple[Space, dict[Node, Node]]:
-        """The space of an instance under the indices given."""
-        if not symbol.spaces:
-            self.awaken(symbol)
-        if not symbol.spaces:
-            raise Failed
-        count = len(symbol.spaces[0].around) - len(base.change)
-        if len(base.indices) != count:
-            raise self.index_count(symbol.name, count, len(base.indices), span)
-        at = tuple(self.index(i) for i in base.indices)
-        fitting = [s for s in symbol.spaces if _may_hold(s, at)]
-        if not fitting:
-            raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
-        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at)
-        self._remember(symbol, space, base, at, count)
-        own = space.prefix[len(space.prefix) - count :]
-        change = dict(base.change)
-        change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
-        return space, change
-
-    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...]) -> Space:
-        """The statement of a label that an element comes from; SeveralError where a loop runs over several."""
-        chosen = self.chosen.get((id(symbol), at))
-        if chosen is not None:
-            return chosen
-        for k, a in enumerate(at):
-            loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
-            ranges = [s.around[len(s.around) - len(at) + k] for s in spaces]
-            if loop is not None and len(set(ranges)) > 1:
-                offset = ex.sub(a, loop)
-                parts = (Part(s, *(ex.sub(b, offset) for b in r)) for s, r in zip(spaces, ranges, strict=True))
-                raise SeveralError(symbol.name, (id(symbol), at), loop.data, tuple(parts))
-        inside = [s for s in spaces if _holds(s, at)]
-        return (inside or spaces)[0]
-
-    def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
-        shape = space.around[len(space.around) - count :]
-        if len(symbol.spaces) == 1:
-            for node, bounds, index in zip(at, shape, base.indices, strict=True):
-                self.uses.append(Use(bounds, node, self.loops, symbol.name, self.place(index.span)))
+class Members(Quantities):
+    """Members of what a path leads to."""
 
     # -- elements ------------------------------------------------------------------------------------------
 
@@ -166,13 +67,6 @@ class Members(Names):
         if isinstance(index, syntax.Range):
             return self.slice(value, index)
         return self.element_of_list(value, self.index(index), index.span)
-
-    def _changed(self, value: Value, change: dict[Node, Node]) -> Value:
-        if not change:
-            return value
-        if isinstance(value, Vector):
-            return Vector(tuple(Typed(ex.substitute(v.node, change), v.dimension) for v in value.items), value.first)
-        return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
 
     # -- members -------------------------------------------------------------------------------------------
 
@@ -211,18 +105,6 @@ class Members(Names):
         unit = domain.displacement if domain.common == "effort" else domain.momentum
         given = self.balance(f"audit.{domain.name}", supplied, held, unit.dimension, e)
         return Typed(ex.sub(held, given), unit.dimension)
-
-    def _shown(self, e: syntax.Expr) -> str:
-        return " ".join(self.source.text[e.span.start : e.span.end].split())[:60]
-
-    def no_member(self, owner: str, e: syntax.Member, members: Iterable[str]) -> Failed:
-        """Report E102 with the members there are."""
-        names = list(members)
-        if e.name in RATES:
-            return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=f"{owner}'")
-        near = nearest(e.name, names)
-        help_ = f"nearest: '{near}'" if near else f"it has {', '.join(names[:20])}" if names else None
-        return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=help_)
 
     def _quantity_of(self, base: Located, e: syntax.Member) -> Value:
         """The quantity `e.name` of a coordinate, constraint, node, branch or instance."""
@@ -296,110 +178,6 @@ class Members(Names):
             raise self.no_member(symbol.name, e, ("q", "f", "p", "e", *(() if co else EFFORT_CLASSES)))
         kind, dimension = kinds[e.name]
         return self._changed(Typed(ex.var(family, kind, *at), dimension), base.change)
-
-    def _effort(self, family: str, kind: str, at: tuple[Node, ...], dimension: Dimension, e: syntax.Member) -> Typed:
-        """The effort of a class that acts on a displacement coordinate."""
-        return Typed(ex.var(family, f"{kind}:{e.name}", *at), dimension)
-
-    def node_quantity(self, end: End, e: syntax.Member) -> Typed:
-        """Member e of a common-effort node, q and f of a common-flow node."""
-        domain = end.domain
-        if domain.common == "effort":
-            if e.name != "e":
-                help_ = "a common-effort node has e; flows belong to elements"
-                raise self.fail("E102", f"node '{self._shown(e.base)}' has no member '{e.name}'", e.span, help=help_)
-            if end.node is None:
-                return Typed(ex.const(0.0), domain.effort.dimension)
-            return Typed(ex.var(end.node.family.name, "ne", *end.at), domain.effort.dimension)
-        kinds = {"q": ("nq", domain.displacement.dimension), "f": ("nf", domain.flow.dimension)}
-        kinds["p"] = ("np", domain.momentum.dimension)
-        kinds["e"] = ("np", domain.effort.dimension)  # p' = e
-        if e.name in EFFORT_CLASSES:
-            if end.node is None:
-                raise self.fail("E102", f"'{self._shown(e.base)}' stands still: no effort moves it", e.span)
-            return self._effort(end.node.family.name, "n", end.at, domain.effort.dimension, e)
-        if e.name not in kinds:
-            raise self.no_member(self._shown(e.base), e, (*kinds, *EFFORT_CLASSES))
-        kind, dimension = kinds[e.name]
-        if end.node is None:
-            return Typed(ex.const(0.0), dimension)
-        return Typed(ex.var(end.node.family.name, kind, *end.at, order=int(e.name == "e")), dimension)
-
-    def branch_quantity(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, e: syntax.Member) -> Typed:
-        """Members e f q p of a branch, and the power it absorbs."""
-        family, domain = symbol.family, symbol.domain
-        at = (*family.prefix, *at)
-        meant = habits.variable(domain.name, name)
-        if meant is not None and (name not in BRANCH or not self._is_store(symbol, name)):
-            shown = self._shown(e.base)
-            raise self.fail("E102", f"'{shown}' has no member '{name}'", e.span, help=f"write {shown}.{meant}")
-        if name not in BRANCH:
-            raise self.no_member(self._shown(e.base), e, BRANCH if nearest(name, BRANCH) else branch_words(domain))
-        power = multiply(domain.effort.dimension, domain.flow.dimension)
-        if name == "power":
-            return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
-        if name == "energy":
-            return Typed(self._absorbed(symbol, at, power, e), multiply(power, dim.TIME))
-        if name == "p" and self.complete and self._summed(symbol):
-            return Typed(self._impulse(symbol, at, e), branch_dimension(domain, "p"))
-        if name in MEMBERS:
-            return self._state_function(symbol, at, name, power, e)
-        return Typed(ex.var(family.name, f"b{name}", *at), branch_dimension(domain, name))
-
-    def _is_store(self, symbol: BranchSymbol, name: str) -> bool:
-        """Whether a branch has the state function `name`."""
-        law = self.laws.get(symbol.family.name)
-        return name in MEMBERS and law is not None and law.kind == MEMBERS[name].edge
-
-    def _summed(self, symbol: BranchSymbol) -> bool:
-        """Whether a branch has no momentum of its own: all but kinetic stores."""
-        law = self.laws.get(symbol.family.name)
-        return law is not None and law.kind != "kinetic"
-
-    def _impulse(self, symbol: BranchSymbol, at: tuple[Node, ...], e: syntax.Member) -> Node:
-        """The momentum of a branch without a kinetic store, p' = e: the integral of its effort since the start."""
-        family = symbol.family
-        counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
-        node, unit = ex.var(family.name, "be", *counters), symbol.domain.effort.dimension
-        return self.quadrature(f"{family.name}.p", node, family.whole, unit, at, e)
-
-    def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
-        """The energy that a branch has absorbed since the start: a quadrature."""
-        family = symbol.family
-        counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
-        node = ex.mul(ex.var(family.name, "be", *counters), ex.var(family.name, "bf", *counters))
-        return self.quadrature(f"{family.name}.energy", node, family.whole, power, at, e)
-
-    def quadrature(
-        self,
-        name: str,
-        power: Node,
-        shape: tuple[tuple[Node, Node], ...],
-        dimension: Dimension,
-        at: tuple[Node, ...],
-        e: syntax.Expr,
-    ) -> Node:
-        """The integral of a power (over the counters #e0, #e1, ... of its shape) at one element."""
-        found = Quadrature(power, shape, multiply(dimension, dim.TIME), self.place(e.span))
-        self.quadratures.setdefault(name, found)
-        return ex.var(name, "s", *at)
-
-    def balance(self, name: str, rate: Node, first: Node, dimension: Dimension, e: syntax.Expr) -> Node:
-        """The integral of a rate that starts at the initial value of `first`."""
-        self.quadratures.setdefault(name, Quadrature(rate, (), dimension, self.place(e.span), first))
-        return ex.var(name, "s")
-
-    def _state_function(
-        self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member
-    ) -> Typed:
-        """T, T*, V, V* of a store (J), D, G of a dissipator (W): what the compiler makes of its law."""
-        function = MEMBERS[name]
-        law = self.laws.get(symbol.family.name)
-        if law is None or law.kind != function.edge:
-            what = "a dissipator" if function.edge == "dissipator" else f"a {function.edge} store"
-            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{name}': it is not {what}", e.span)
-        dimension = power if function.edge == "dissipator" else multiply(power, dim.TIME)
-        return Typed(ex.var(symbol.family.name, f"b{function.name}", *at), dimension)
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
@@ -524,72 +302,6 @@ class Members(Names):
             raise self.fail("E203", "a constant has no displacement", e.args[0].span, help=help_)
         node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
         return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
-
-
-def _gaps(space: Space, at: tuple[Node, ...]) -> list[Node]:
-    """How far fixed indices lie behind the first and before the last element of a statement."""
-    ranges = space.around[len(space.around) - len(at) :]
-    found = []
-    for a, (first, last) in zip(at, ranges, strict=True):
-        if all(n.op != "index" for n in ex.topological([a])):
-            found += [ex.sub(a, first), ex.sub(last, a)]
-    return found
-
-
-def _may_hold(space: Space, at: tuple[Node, ...]) -> bool:
-    """Whether no index lies outside a statement's range for certain."""
-    own = space.prefix[len(space.prefix) - len(at) :]
-    fits = all(o.op == "index" or o is a or a.op != "const" for o, a in zip(own, at, strict=True))
-    return fits and not any(ex.is_const(gap) and gap.data < 0 for gap in _gaps(space, at))
-
-
-def _holds(space: Space, at: tuple[Node, ...]) -> bool:
-    """Whether every index lies inside a statement's range for certain."""
-    return all(ex.is_const(gap) and gap.data >= 0 for gap in _gaps(space, at))
-
-
-def branch_dimension(domain: DomainSymbol, letter: str) -> Dimension:
-    """Dimension of e, f, q or p in a domain."""
-    unit = {"e": domain.effort, "f": domain.flow, "q": domain.displacement, "p": domain.momentum}[letter]
-    return unit.dimension
-
-
-def ledger(domain: Domain, branches: Iterable[Branch]) -> tuple[Node, Node]:
-    """Content of the stores that a domain's ground holds, and what all other branches bring in from there.
-
-    At every node the flows (efforts, where nodes have a common flow) add up to zero, so those at ground do: the rate of
-    the first is the second.
-    """
-    content, through, kind = ("bq", "bf", "potential") if domain.common == "effort" else ("bp", "be", "kinetic")
-    held: list[Node] = []
-    supplied: list[Node] = []
-    for b in branches:
-        if b.domain.name != domain.name or b.plus is None or b.minus is None:
-            continue
-        sign = (b.minus.node is None) - (b.plus.node is None)  # +1: from a node to ground
-        if not sign:
-            continue
-        stores = b.kind == kind
-        node = ex.scale(float(sign if stores else -sign), ex.var(b.name, content if stores else through, *b.at))
-        for loop in reversed(b.loops):
-            node = ex.reduction("sum", loop.index, loop.first, loop.last, node)
-        (held if stores else supplied).append(node)
-    return ex.add(*held), ex.add(*supplied)
-
-
-_RATES = {"q": "f", "nq": "nf", "bq": "bf"}
-
-
-def reaction(residual: Node, holonomic: bool, target: Node, multiplier: Node) -> Node:
-    """Constraint effort along a displacement: -(d residual/dq) multiplier, projected on grad(target)."""
-    top: list[Node] = []
-    bottom: list[Node] = []
-    for node in sorted((n for n in ex.variables(target) if n.op == "var"), key=lambda n: n.number):
-        slope = ex.derivative(target, node)
-        held = node if holonomic else ex.var(node.data[0], _RATES.get(node.data[1], "f"), *node.args)
-        top.append(ex.mul(ex.derivative(residual, held), slope))
-        bottom.append(ex.mul(slope, slope))
-    return ex.neg(ex.div(ex.mul(multiplier, ex.add(*top)), ex.add(*bottom)))
 
 
 def _root(e: syntax.Expr) -> syntax.Name | None:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, known
 from sysdyn.dsl.names import habits
@@ -324,7 +325,7 @@ class Names(Context):
     def rate(self, node: Node, span: syntax.Span) -> Node:
         """The time derivative of a node."""
         try:
-            return ex.time_derivative(node)
+            return time_derivative(node)
         except ValueError as error:
             raise self.fail("E518", f"{error} has no time derivative among the variables", span) from None
 

@@ -12,6 +12,8 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative, signals_held
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (
     Branch,
@@ -48,7 +50,7 @@ def constraints(model: Elaborator, report: Report) -> None:
     """E501, E502, E503, E511, E518 on phi and psi."""
     for constraint in model.parts.constraints:
         what = f"{constraint.kind} {constraint.name}"
-        expression, _ = ex.signals_held(constraint.expression)
+        expression, _ = signals_held(constraint.expression)
         nodes = unknowns_of(expression)
         accelerations = [n for n in nodes if n.data[2]]
         if accelerations:
@@ -86,9 +88,9 @@ def _named(node: Node) -> str:
 def _nonlinear(expression: Node, flows: list[Node]) -> tuple[Node, Node] | None:
     """Two flows whose second derivative does not vanish (judged at sampled points where it is no constant)."""
     for k, a in enumerate(flows):
-        slope = ex.derivative(expression, a)
+        slope = derivative(expression, a)
         for b in flows[k:]:
-            second = ex.derivative(slope, b)
+            second = derivative(slope, b)
             if not ex.is_const(second, 0.0) and any(abs(v) > 1e-9 for v in samples(second)):
                 return a, b
     return None
@@ -155,7 +157,7 @@ def smoothness(model: Elaborator, report: Report) -> None:
         if energy.function != "D":
             continue
         for flow in unknowns_of(energy.expression, "f"):
-            slope = ex.derivative(energy.expression, flow)
+            slope = derivative(energy.expression, flow)
             if _jumps(slope, flow):
                 message = f"content D with a corner at {flow} = 0 is set-valued friction: not supported yet"
                 report.note("N608", f"{message} (planned: events and inequalities)", energy.place)
@@ -201,7 +203,7 @@ def _corner(node: Node, place: Place, report: Report) -> None:
     if not any(n.op == "call" and n.data in ("abs", "sign") for n in ex.topological([node])):
         return
     for flow in unknowns_of(node, "f"):
-        if _jumps(node, flow) or _jumps(ex.derivative(node, flow), flow):
+        if _jumps(node, flow) or _jumps(derivative(node, flow), flow):
             message = f"the law is not differentiable at {flow} = 0 and contains abs or sign"
             report.warning("W301", message, place, help="tanh to smooth; set-valued friction is content D with abs")
             return
@@ -213,7 +215,7 @@ def _jumps(node: Node, at: Node) -> bool:
     values = {n: 0.3 + ((k + 1) * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
 
     def side(x: float) -> float:
-        return ex.evaluate([node], lambda n: x if n is at else values.get(n, 0.5))[0]
+        return evaluate([node], lambda n: x if n is at else values.get(n, 0.5))[0]
 
     sides = [side(x) for x in (-1e-9, 1e-9, -1e-6, 1e-6, 1.0)]
     near, farther = abs(sides[1] - sides[0]), abs(sides[3] - sides[2])

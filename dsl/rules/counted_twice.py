@@ -6,6 +6,7 @@ A coupling, which vanishes where the other unknowns are zero (M f1 f2 beside two
 from __future__ import annotations
 
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
@@ -34,5 +35,5 @@ def counted_twice(network: Network, report: Report) -> None:
 def _alone(expression: Node, own: Node) -> bool:
     """Whether the expression changes with `own` while all other unknowns are zero."""
     others = {n: ex.const(0.0) for n in unknowns_of(expression) if n is not own and letter(n) != "s"}
-    slope = ex.derivative(ex.substitute(expression, others), own)
+    slope = derivative(ex.substitute(expression, others), own)
     return any(abs(value) > 0.0 for value in samples(slope))

@@ -12,6 +12,8 @@ from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Expectation, Observation
@@ -83,6 +85,6 @@ def _of_differences(expression: Node, efforts: Sequence[Node]) -> bool:
     """Whether a shift of all these efforts changes nothing: looked at where all that is read has some value."""
     leaves = [n for n in ex.topological([expression]) if n.op in ("var", "param", "time", "index", "table")]
     values = {n: 0.3 + ((k + 1) * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
-    slopes = ex.evaluate([ex.derivative(expression, n) for n in efforts], lambda n: values.get(n, 0.5))
+    slopes = evaluate([derivative(expression, n) for n in efforts], lambda n: values.get(n, 0.5))
     total = math.fsum(slopes)
     return not math.isfinite(total) or abs(total) <= SHARED * math.fsum(map(abs, slopes))

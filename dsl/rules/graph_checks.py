@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
@@ -194,7 +195,7 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
     own = [n for n in ex.variables(branch.law) if n.op == "var" and n.data[0] == branch.name and n.data[1][0] == "b"]
     if len(own) != 1 or _rises(branch.law, own[0], known):
         return
-    slope = ex.derivative(branch.law, own[0])
+    slope = derivative(branch.law, own[0])
     if slope.op == "const" and not slope.data < 0.0:
         return
     if slope.op != "param" and any(n.op in ("var", "time", "table") for n in ex.topological([slope])):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Domain, Network
 from sysdyn.dsl.model.paynter import REFLECTED
@@ -32,7 +33,7 @@ def samples(node: Node, held: Mapping[Node, float] | None = None) -> Iterable[fl
     for seed in (1.0, 2.0, 3.0):
         values = {n: 0.3 + ((k + 1) * seed * 0.6180339887) % 1.0 for k, n in enumerate(leaves)}
         values |= held or {}
-        value = ex.evaluate([node], lambda n, v=values: v.get(n, 0.5))[0]  # type: ignore[misc]
+        value = evaluate([node], lambda n, v=values: v.get(n, 0.5))[0]  # type: ignore[misc]
         if math.isfinite(value):
             yield value
 

@@ -10,6 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.evaluation import evaluate_along
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.dsl.model.signs import ALL, Reals, reals
@@ -79,7 +81,7 @@ def _like(nodes: Sequence[Node], own: Node, laws: _Laws) -> _Law:
     if shape not in laws:
         law, params = nodes[-1], tuple(n for n in nodes if n.op == "param")
         through = ex.is_const(ex.substitute(law, {own: ex.const(0.0)}), 0.0)
-        laws[shape] = _Law(law, own, params, ex.derivative(law, own), through)
+        laws[shape] = _Law(law, own, params, derivative(law, own), through)
     return laws[shape]
 
 
@@ -111,7 +113,7 @@ def _active(law: Node, own: Node, held: Mapping[Node, float]) -> tuple[float, fl
     if any(math.isnan(v) for v in held.values()):
         return None
     largest: Sequence[float] = (0.0, 0.0)
-    for x, value in zip(DECADES, ex.evaluate_along(law, own, DECADES, lambda n: held.get(n, math.nan)), strict=True):
+    for x, value in zip(DECADES, evaluate_along(law, own, DECADES, lambda n: held.get(n, math.nan)), strict=True):
         if not math.isfinite(value):
             continue
         if x * value < 0.0 and abs(value) > ROUND_OFF * largest[0]:

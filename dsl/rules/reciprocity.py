@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.dsl.model.values import Values
@@ -60,7 +61,7 @@ def _pairs(stores: dict[str, list[Branch]]) -> Iterator[tuple[Branch, Branch, No
             done.add(pair)
             assert other.law is not None
             mine = ex.var(one.name, node.data[1], *one.at)
-            yield one, other, ex.sub(ex.derivative(one.law, node), ex.derivative(other.law, mine))
+            yield one, other, ex.sub(derivative(one.law, node), derivative(other.law, mine))
 
 
 def _lost(branch: Branch, report: Report) -> None:

@@ -1,7 +1,6 @@
 """A form of a model without what can be eliminated, as the core's steppers and the settling see it.
 
-The system of core/system/condensed.h: kept unknowns z, kept rows, e = c + T z for the others.  Stretches of families
-whose sums read stretches of families become one loop each, whatever their number.
+The system of core/system/condensed.h: kept unknowns z, kept rows, e = c + T z for the others (sums.py).
 """
 
 from __future__ import annotations
@@ -13,8 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.composition import Composition, composed, ranges
+from sysdyn.runtime.condense.composition import Composition, ranges
 from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask, definable, eliminate, steady
+from sysdyn.runtime.condense.settled_rows import settled_rows
+from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of, sums
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
@@ -23,7 +24,6 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import SMALL, Order, any_order, paired_order, with_pairs
-from sysdyn.runtime.numerics.points import distinct
 from sysdyn.values import dataclass
 
 LEAST, STEEP = 12, 50
@@ -33,56 +33,9 @@ Between steep laws small matrices may leave columns open (numerics/ordering.py),
 a circuit of diodes of less than 20 unknowns crawled."""
 GAIN = 0.7
 """Part of the unknowns that may be left."""
-LONG, MOST_ALIKE = 64, 2
-"""Unknowns of a stretch that is asked whether each of its terms, so many at most, has one factor."""
 DEFINED = "leaves runs: a constant sum of others"
 UNREAD = "leaves runs: nothing reads it"
 OBSERVING = ("observe", "observe_rate", "audit", "ledger")
-RATE_OF = {"phi_acceleration": "phi_rate", "psi_rate": "psi", "gamma_rate": "gamma", "momentum_rate": "momentum"}
-"""Group of rows -> group of which they are the time derivative."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sums:
-    """e = c + T z of one set of numbers.  place, constant [eliminated]; start, source, factor: the terms of each, of
-    unknowns kept or before it; kept: places of z; unread: of what is neither.
-    """
-
-    place: Longs
-    constant: Floats
-    start: Longs
-    source: Longs
-    factor: Floats
-    kept: Ints
-    unread: Longs
-
-    def composed(self, unknowns: int) -> Composition:
-        """T by rows, of z."""
-        number, later = _numbers(unknowns, self.kept), _numbers(unknowns, self.place)
-        return composed(self.start, number[self.source], later[self.source])
-
-    def same(self, other: Sums) -> bool:
-        """Whether the numbers are those of another one of the same structure, bit for bit."""
-        return bool((self.factor == other.factor).all() and (self.constant == other.constant).all())
-
-
-def sums(system: System, found: Elimination, jy: Floats, constant: Floats) -> Sums:
-    """The numbers of an elimination: jy [entries]; constant [rows]: the rows where all unknowns are zero."""
-    pivot = jy[found.pivot]
-    rest = constant[found.row]
-    factor = -jy[found.entry] / np.repeat(pivot, np.diff(found.start))
-    left = np.ones(system.unknowns, dtype=bool)
-    left[found.place] = left[found.unread] = False
-    source = system.pattern.columns_of()[found.entry].astype(np.int64)
-    kept = np.flatnonzero(left).astype(np.int32)
-    return Sums(found.place, -rest / pivot, found.start, source, factor, kept, found.unread)
-
-
-def _numbers(size: int, places: NDArray[np.integer]) -> Ints:
-    """Of each place its number among these [size]; -1 elsewhere."""
-    found = np.full(size, -1, dtype=np.int32)
-    found[places] = np.arange(places.size, dtype=np.int32)
-    return found
 
 
 def _spans(full: NDArray[np.integer]) -> tuple[NDArray[np.integer], Longs, Longs]:
@@ -100,63 +53,6 @@ class Room:
         self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
         self.r = np.zeros(max(system.rows for system in systems) + 1)
         self.slope = np.zeros(entries)
-
-
-class Straights:
-    """Stretches of eliminated unknowns whose terms read stretches, as the core has them: array, number."""
-
-    def __init__(self, found: Sums) -> None:
-        count, number = np.diff(found.start), found.place.size
-        same = np.diff(found.place) == 1
-        same &= np.diff(count) == 0
-        # within a stretch each term reads one further than the term above it
-        inner = np.repeat(np.concatenate([[False], same]), count)
-        above = np.arange(found.source.size) - np.repeat(np.concatenate([[0], count[:-1]]), count)
-        steps = np.ones(found.source.size, dtype=bool)
-        steps[inner] = found.source[inner] == found.source[above[inner]] + 1
-        broken = np.zeros(number, dtype=bool)
-        broken[np.repeat(np.arange(number), count)[~steps]] = True
-        begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
-        ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
-        made = (lib.Straight * max(begin.size, 1))()
-        order = np.arange(found.factor.size)
-        for low, high in zip(begin.tolist(), ends.tolist(), strict=True):
-            terms, entry = int(count[low]), int(found.start[low])
-            block = order[entry : entry + terms * (high - low)]
-            block[:] = block.reshape(high - low, terms).T.ravel()
-        self._begin, self._order, self._some = begin, order, np.zeros(begin.size, dtype=bool)
-        self._factors, self._constants = np.zeros(order.size), np.zeros(number)
-        terms_of, offset = count[begin], np.cumsum(count[begin]) - count[begin]
-        self._source = found.source[ranges(found.start[begin], terms_of)].astype(np.int32)
-        at, first = lib.pointer(self._factors), lib.pointer(self._source)
-        assert at is not None
-        assert first is not None
-        for k, (low, high, source) in enumerate(zip(begin.tolist(), ends.tolist(), offset.tolist(), strict=True)):
-            place, entry = int(found.place[low]), int(found.start[low])
-            made[k] = lib.Straight(place, high - low, int(count[low]), 0, first + 4 * source, at + 8 * entry, None)
-        self.array, self.number = made, int(begin.size)
-        long = np.flatnonzero((ends - begin >= LONG) & (terms_of > 0) & (terms_of <= MOST_ALIKE))
-        sizes = (ends - begin)[long] * terms_of[long]
-        entries = found.start[begin[long]]
-        self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
-
-    def renew(self, found: Sums) -> None:
-        """Takes the numbers of other sums of the same structure."""
-        self._factors[:] = found.factor[self._order]
-        self._constants[:] = found.constant
-        base = lib.pointer(self._constants)
-        assert base is not None
-        some = np.logical_or.reduceat(found.constant != 0.0, self._begin) if self._begin.size else self._some
-        for k in np.flatnonzero(some != self._some):
-            self.array[int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
-        self._some = some
-        for number, entry, size in self._long:
-            factor = self._factors[entry : entry + size].reshape(self.array[number].terms, -1)
-            self.array[number].alike = int((factor == factor[:, :1]).all())
-
-    def fix(self) -> None:
-        """Lets go of what only other numbers would need."""
-        self._order = self._order[:0].copy()
 
 
 class Condensed:
@@ -188,7 +84,7 @@ class Condensed:
         False where there is none, and the order stays.
         """
         form, columns, rows = self.whole.form, self.whole.pattern.columns_of(), self.whole.pattern.row
-        row_at, at = _numbers(self.whole.rows, self.kept_rows), _numbers(self.whole.unknowns, self.kept)
+        row_at, at = numbers_of(self.whole.rows, self.kept_rows), numbers_of(self.whole.unknowns, self.kept)
         moving = self.whole.structural()[1]
         row = row_at[np.concatenate([form.k_row, rows[moving]])]
         column = at[np.concatenate([form.k_q, columns[moving]])]
@@ -221,7 +117,7 @@ class Condensed:
         """Which entries of the whole matrix add to this one with what factor; the column of each such product."""
         system, found, terms = self.whole, self.sums, self._composition
         columns = system.pattern.columns_of()
-        at, place = _numbers(system.unknowns, self.kept)[columns], _numbers(system.unknowns, found.place)[columns]
+        at, place = numbers_of(system.unknowns, self.kept)[columns], numbers_of(system.unknowns, found.place)[columns]
         kept = np.zeros(system.rows, dtype=bool)
         kept[self.kept_rows] = True
         entry = np.flatnonzero(kept[system.pattern.row] & ((at >= 0) | (place >= 0))).astype(np.int32)
@@ -240,7 +136,7 @@ class Condensed:
 
     def _lay_out(self, column: Ints) -> None:
         """The pattern of the products, and the place of each in it."""
-        row = _numbers(self.whole.rows, self.kept_rows)[self.whole.pattern.row[self._from]]
+        row = numbers_of(self.whole.rows, self.kept_rows)[self.whole.pattern.row[self._from]]
         self.pattern: Pattern
         self.pattern, (self._to,) = compress(self.rows, self.unknowns, [Places(row, column)])
 
@@ -446,7 +342,7 @@ class _Condenser:
         rows = np.ones(whole.rows, dtype=bool)
         rows[found.row] = False
         rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
-        kept = _settled_rows(whole, self.settled, ~rows, numbers)
+        kept = settled_rows(whole, self.settled, ~rows, numbers)
         if kept is None:
             return None
         places = np.flatnonzero(rows), np.flatnonzero(kept)
@@ -483,41 +379,3 @@ def departures(system: System) -> list[tuple[str, str]]:
         for places, why in parts
         for k, number in zip(*np.unique(system.family_of[places], return_counts=True), strict=True)
     ]
-
-
-def _defining(rows: Ints, columns: Ints) -> bool:
-    """Whether each of the rows can be told for a column of its own, by their entries."""
-    own, each = distinct(rows), distinct(columns)
-    pattern, _ = compress(own.size, each.size, [Places(np.searchsorted(own, rows), np.searchsorted(each, columns))])
-    return int((matched(pattern) >= 0).sum()) == own.size
-
-
-def _settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:
-    """Rows of the settled form that are left [rows]; None where the others say more than what leaves moves by: what
-    balances it would be open, or rates that observers read.
-    """
-    description = settled.description
-    first = {(group, family): at for group, family, at in stepped.form.groups}
-    kept = np.ones(settled.rows, dtype=bool)
-    for group, family, at in settled.form.groups:
-        home, size = first.get((RATE_OF.get(group, group), family)), description.rows[family].size
-        if home is not None:
-            kept[at : at + size] = ~gone[home : home + size]
-    columns, rows = settled.pattern.columns_of(), settled.pattern.row
-    lost = np.zeros(settled.unknowns, dtype=bool)
-    lost[numbers.unread] = True
-    kept[rows[lost[columns]]] = False
-    derived = np.zeros(settled.unknowns, dtype=bool)
-    derived[numbers.place] = True
-    moving = settled.structural()[1]
-    dropped = np.zeros(settled.rows, dtype=bool)
-    dropped[rows[moving & derived[columns]]] = True
-    dropped &= kept
-    rates = moving & derived[columns] & dropped[rows]
-    if not _defining(rows[rates], columns[rates]):
-        return None
-    read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.rates or ()}
-    open_ = columns[moving & dropped[rows] & ~derived[columns]]
-    if read & set(settled.family_of[open_].tolist()):
-        return None
-    return kept & ~dropped

@@ -1,18 +1,14 @@
-"""Which of the constraints that hold at times hold: complementarity over all of them at once.
+"""What each constraint that holds at times asks for, and whether it stands as it may.
 
     phi, psi     value >= 0,  multiplier >= 0,  their product 0
     friction     abs(multiplier) <= bound where value = 0;  else the effort bound*sense, sense = sign(value)
 
-A guess of the active set gives flows (impulses in the metric of the inertia where they must jump) and, by the settled
-rows, rates and multipliers; the first condition that does not hold, in the order written, changes its member, and so on
-(Murty's least-index principal pivoting, which ends for a positive definite matrix and is watched for cycles).  Gaps
-that close are struck before (impacts.py).
+Sets that fit are found by pivoting.py; gaps that close are struck before (impacts.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import chain, combinations, islice
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,28 +20,10 @@ from sysdyn.runtime.model.system import System
 
 FAINT = 1e-3
 """Of the magnitude of an unknown."""
-NEAR, BESIDE = 3, 60
-"""Members that change at once, and trials, where an active set contradicts itself."""
-MANY = 2
-"""Diodes that change at once, at least: fewer are turned one by one."""
 BODIES = 4.0
 """Inertias that a contact may stop at once, of the one that its largest multiplier and rate tell."""
 UNTOLD = 1e-9
 """Change of a bound by reactions of one that is round-off."""
-TRIALS = 20
-"""Trials a contact, beside TRIALS for all."""
-
-Settle = Callable[[float, Floats, Floats], tuple[Floats, Floats, Floats] | None]
-"""t, y, yd -> y, yd consistent with the active set and the impulses [unknowns] that took the flows there; None: no
-such point was found."""
-
-
-class NoActiveSetError(Exception):
-    """No set of constraints fits; names: of those that kept changing."""
-
-    def __init__(self, names: tuple[str, ...]) -> None:
-        super().__init__(", ".join(names))
-        self.names = names
 
 
 class Contacts:
@@ -61,10 +39,8 @@ class Contacts:
         self.active: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self.barred: NDArray[np.bool_] = np.zeros(len(contacts), dtype=bool)
         self._finite: frozenset[int] | None = None
-        # wrong open and closed: zero of its value is none of its multiplier, so that any value above zero is open
-        self._open: frozenset[int] = frozenset()
-        self.singular: Callable[[float, Floats, Floats], bool] | None = None
-        self._contradicts: set[tuple[bool, ...]] = set()
+        # wrong open and closed (pivoting.py): zero of its value is none of its multiplier, any value above zero is open
+        self.open: frozenset[int] = frozenset()
         self.time = 0.0
         places = self.switches.places
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
@@ -163,13 +139,13 @@ class Contacts:
 
     def wrong(self, values: Floats, impulses: Floats) -> int:
         """The first contact whose condition does not hold; -1 where all do."""
-        return next(self._wrongs(values, impulses), -1)
+        return next(self.wrongs(values, impulses), -1)
 
     def fits(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> bool:
         """Whether every condition holds at what was found (y, yd, impulses) behind y."""
         return self.wrong(self.observer(t, *found[:2]), found[2]) < 0 and not self.backwards(t, y, found)
 
-    def _wrongs(self, values: Floats, impulses: Floats) -> Iterator[int]:
+    def wrongs(self, values: Floats, impulses: Floats) -> Iterator[int]:
         """Contacts whose condition does not hold."""
         for k, contact in enumerate(self.contacts):
             test = _TESTS.get(contact.kind, Contacts._unilateral)
@@ -200,7 +176,7 @@ class Contacts:
         zero = self.observer.zero
         if self.active[k]:
             return bool(impulse < -self.impulse(c) or values[c.multiplier] < -zero(c.multiplier))
-        if values[c.value] > (0.0 if k in self._open else zero(c.value)):
+        if values[c.value] > (0.0 if k in self.open else zero(c.value)):
             return False
         if c.kind == "psi":
             return bool(values[c.value] < -zero(c.value) or values[c.rate] < -zero(c.rate))
@@ -259,76 +235,7 @@ class Contacts:
             return bool(values[c.value] < 0.0)
         return bool(values[c.rate] < -zero(c.rate))
 
-    # -- pivoting ------------------------------------------------------------------------------------------------
-
-    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
-        """A consistent point whose active set fits, from the present one; NoActiveSetError."""
-        before, turned = (self.active.copy(), self.p.copy()), dict[int, set[bool]]()
-        try:
-            return self._pivoted(t, y, yd, settle, turned)
-        except NoActiveSetError:
-            self._open = frozenset(k for k, ways in turned.items() if len(ways) > 1)
-            if not self._open:
-                raise
-        self.active[:], self.p[:] = before
-        try:
-            return self._pivoted(t, y, yd, settle, turned)
-        finally:
-            self._open = frozenset()
-
-    def _pivoted(
-        self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]]
-    ) -> tuple[Floats, Floats]:
-        """The same; turned: those that were turned, and whether they held."""
-        seen: set[tuple[float, ...]] = set()
-        changed: list[int] = []
-        fewest = len(self.contacts)
-        block: tuple[NDArray[np.bool_], int, Floats] | None = None
-        self.finite(t, y, yd)
-        for _ in range(TRIALS * (1 + len(self.contacts))):
-            self.apply()
-            state = self.state()
-            again = state in seen
-            seen.add(state)
-            found = self._settled_by(t, y, yd, settle)
-            if found is None and block is not None:  # sources that they short: one of them alone
-                self.active[:], (_, first, values), block, fewest = block[0], block, None, 0
-                self.turn(first, values)
-                continue
-            found = found or self._beside(t, y, yd, settle, seen)
-            if found is None:
-                break
-            values = self.observer(t, found[0], found[1])
-            wrong = sorted({*self._wrongs(values, found[2]), *self.backwards(t, y, found)})
-            if not wrong:
-                return found[0], found[1]
-            if again and self._done(t, wrong, y, found):  # from behind their impulses on
-                y, yd = found[:2]
-                seen.clear()
-            # diodes all at once while they become fewer (Judice and Pires 1994), else the first
-            several = MANY < len(wrong) < fewest and all(self.contacts[k].kind == "psi" for k in wrong)
-            block = (self.active.copy(), wrong[0], values) if several else None
-            fewest = min(fewest, len(wrong))
-            for k in wrong if several else wrong[:1]:
-                turned.setdefault(k, set()).add(bool(self.active[k]))
-                changed.append(k)
-                self.turn(k, values)
-        names = dict.fromkeys(self.contacts[k].name for k in changed[-6:] or range(min(len(self.contacts), 6)))
-        raise NoActiveSetError(tuple(names))
-
-    def _done(self, t: float, wrong: Sequence[int], y: Floats, found: tuple[Floats, Floats, Floats]) -> bool:
-        """Whether impulses have done what these inequalities are wrong by: one of effort has stopped what closed, and
-        nothing holds it afterwards; one of flow has passed, and nothing goes on.
-        """
-        if any(self.contacts[k].kind != "psi" for k in wrong):
-            return False
-        held = [k for k in wrong if self.active[k]]
-        if any(found[2][self.multiplier[k]] <= 0.0 for k in held):
-            return False
-        passed = self._passed(t, y, found)
-        return all(passed[k] > 0.0 for k in wrong if not self.active[k])
-
-    def _passed(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
+    def passed(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
         """Impulses of flow [contacts]: what passed inequalities of flows where displacements jumped; none at a start,
         where they are sought.
         """
@@ -346,57 +253,9 @@ class Contacts:
 
     def backwards(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> list[int]:
         """Open inequalities of flows through which an impulse went backwards."""
-        passed, zero = self._passed(t, y, found), self.observer.zero
+        passed, zero = self.passed(t, y, found), self.observer.zero
         least = [-zero(c.value) * self.time for c in self.contacts]
         return [int(k) for k in np.flatnonzero((passed < least) & ~self.active & ~self.barred)]
-
-    def _beside(
-        self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]
-    ) -> tuple[Floats, Floats, Floats] | None:
-        """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen
-        yet, that does not: the first that fits, else the first; the active set then is that.
-        """
-        before, first, singular = self.active.copy(), None, self.singular
-        for turned in self._near(before):
-            self.active[:] = before
-            self.active[list(turned)] = ~before[list(turned)]
-            self.apply()
-            open_ = singular is not None and len(turned) <= NEAR and singular(t, y, yd)
-            if open_ or self.state() in seen:
-                continue
-            found = self._settled_by(t, y, yd, settle)
-            if found is not None and self.fits(t, y, found):
-                return found
-            if found is not None and first is None:
-                first = found, self.active.copy()
-        if first is None:
-            return None
-        self.active[:] = first[1]
-        self.apply()
-        seen.add(self.state())
-        return first[0]
-
-    def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
-        """Which inequalities to turn, the fewest first, those that do not hold before those that do; where none holds,
-        all of them before.
-        """
-        free = [k for k, c in enumerate(self.contacts) if c.kind in ("phi", "psi") and k not in self.frozen]
-        rest = [k for k in free if not before[k]]
-        order = rest + [k for k in free if before[k]]
-        nearest = (c for number in range(1, NEAR + 1) for c in combinations(order, number))
-        if rest == free:
-            return islice(chain([rest], nearest), BESIDE)
-        return chain(islice(nearest, BESIDE), [rest] if rest else [])
-
-    def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
-        """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
-        key = tuple(self.active.tolist())
-        if key in self._contradicts:
-            return None
-        found = settle(t, y, yd)
-        if found is None and self.singular is not None and self.singular(t, y, yd):
-            self._contradicts.add(key)
-        return found
 
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""

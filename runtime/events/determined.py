@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
-from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError, Settle
+from sysdyn.runtime.events.contacts import Contacts
+from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
@@ -37,7 +38,7 @@ class Determined:
 
     def __init__(self, contacts: Contacts) -> None:
         self.contacts = contacts
-        contacts.singular = self._singular
+        self._pivoting = Pivoting(contacts, self._singular)
         self._regular: dict[tuple[bool, ...], tuple[int, Floats]] = {}
 
     @cached_property
@@ -78,10 +79,10 @@ class Determined:
         return self._regular[key]
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle, turned: Sequence[int] = ()) -> Point:
-        """As Contacts.fit, of a set that leaves as little open as one can; turned: what has just changed changes back
+        """As Pivoting.fit, of a set that leaves as little open as one can; turned: what has just changed changes back
         last.
         """
-        found = self.contacts.fit(t, y, yd, settle)
+        found = self._pivoting.fit(t, y, yd, settle)
         if self._system.unknowns > DENSE:
             return found
         open_ = self.nullity(t, *found)
@@ -132,7 +133,7 @@ class Determined:
         """The point of the present active set where that fits, or with pivots of one that fits; None without."""
         if pivots:
             try:
-                return self.contacts.fit(t, *point, settle)
+                return self._pivoting.fit(t, *point, settle)
             except NoActiveSetError:
                 return None
         found = settle(t, *point)

@@ -13,20 +13,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.events.bounces import Bounce, thrown
+from sysdyn.runtime.events.conditions import Round, holds, with_momenta
+from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
-from sysdyn.runtime.events.impacts import UNSEEN, Impacts
 from sysdyn.runtime.events.kinks import Kinks, NoBranchError
 from sysdyn.runtime.events.locate import Dense, crossing
 from sysdyn.runtime.events.observer import Observer
-from sysdyn.runtime.events.plan import Assignment, Condition, Happened, Plan
+from sysdyn.runtime.events.pivoting import NoActiveSetError
+from sysdyn.runtime.events.plan import Assignment, Happened, Plan
+from sysdyn.runtime.events.succession import Point, Succession
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.values import dataclass
+
+__all__ = ["Handler", "Point", "Watched"]
 
 CASCADE = 100
 """Rounds of events at one instant: more will never end."""
@@ -36,10 +40,7 @@ NOTHING = 1e-12
 """Of the span: no time."""
 FALLEN = 1e-4
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
-AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
-"""Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
 
-Point = tuple[Floats, Floats]
 Standing = tuple[Floats, NDArray[np.bool_]]
 """Parameters, and which of the constraints that may hold do."""
 
@@ -55,25 +56,6 @@ class Watched:
     kink: int = -1
 
 
-@dataclass(frozen=True, slots=True)
-class Round:
-    """One round of assignments, event by event, and the sides [relations] behind it."""
-
-    groups: tuple[tuple[Assignment, ...], ...]
-    sides: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class Bounce:
-    """A gap that an impact opened, in free flight: its value there, which is zero but for round-off (level <= 0), what
-    it rises to (height), and the time until it closes again (flight, s; both infinite where nothing pulls it back).
-    """
-
-    level: float
-    height: float
-    flight: float
-
-
 class Handler:
     """Events of one run.  system: as the stepper sees it; restart: consistent points of it."""
 
@@ -82,25 +64,30 @@ class Handler:
     ) -> None:
         self.plan, self.system, self.span = plan, system, span
         self.p, self.nothing = system.description.p, NOTHING * (span[1] - span[0])
-        self.restart: Restart | None = None
         self.observer = Observer(system, rtol)
         self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
-        self.impacts = Impacts(self.contacts, plan.rest)
+        self.succession = Succession(plan, self.contacts, self.determined)
         self.kinks = Kinks(plan.kinks, self.observer, self.p)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
         self.bounces: dict[int, Bounce] = {}
         self.happened: list[Happened] = []
-        self._follows: dict[tuple[tuple[float, ...], tuple[int, ...]], tuple[float, ...]] = {}
-        self._impacts = any(c.kind in ("phi", "planar") for c in plan.contacts)
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
         self._stalled, self.last = 0, -np.inf
         self.simple, self.rounds = False, list[Round]()
-        self.blow = False
         self._exact: list[int] = []
         self.back(begin)
         self.before = self.now()
+
+    @property
+    def restart(self) -> Restart | None:
+        """Consistent points of the run; told once it has any."""
+        return self.succession.restart
+
+    @restart.setter
+    def restart(self, restart: Restart | None) -> None:
+        self.succession.restart = restart
 
     # -- what stands ---------------------------------------------------------------------------------------------
 
@@ -162,7 +149,7 @@ class Handler:
         values = self.observer(t, y, yd)
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], 1.0)
-        self.truth = [self._holds(w.condition, ()) for w in self.plan.whens]
+        self.truth = self._true()
         due, anew = self.due(t), self.kinks.begin(values)
         if due:
             return self.fire(t, y, yd, due)
@@ -270,8 +257,8 @@ class Handler:
         else:
             raise SolverFailure("chatter", t, 0.0, self._names())
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
-        self.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
-        self.simple &= not self.blow and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
+        self.succession.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
+        self.simple &= not self.succession.blow and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
         if not (changed or touched):
             return None
@@ -321,153 +308,30 @@ class Handler:
     ) -> Point:
         """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
         assert self.restart is not None
-        restart = self.restart
         if not self.plan.contacts:
-            found = restart.across(t, y, yd)
+            found = self.restart.across(t, y, yd)
             if found is None:
                 raise SolverFailure("newton", t, 0.0)
             self._renew(t, *found)
             return found
         try:
-            self._guards(t, y, yd)
-            stood = self.contacts.state()
-            known = self._remembered(t, (y, yd), (stood, tuple(touched)))
-            if known is not None:
-                self._renew(t, *known)
-                self._note(t, said, touched)
-                return known
-            y, self.blow = self.impacts.after(t, y, yd, self._strike, blow=self.blow), False
-            values = self.observer(t, y, yd)
-            for k in touched:
-                if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
-                    self.contacts.turn(k, values)
-            self.contacts.apply()
-            found = self.determined.fit(t, y, yd, restart.struck, touched)
-            if self._tied(t, found, touched if self.contacts.state() == stood else ()):
-                found = self._ahead(t, found, self.contacts.state()) or found
-            if not self._impacts:
-                self._follows[stood, tuple(touched)] = self.contacts.state()
+            found, anew = self.succession.after(t, y, yd, touched, stalled=self._stalled > 0)
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
-        found = self._closed(t, found)
         self._renew(t, *found)
-        self._bounce(t, *found)
+        if anew:
+            self._bounce(t, *found)
         self._note(t, said, touched)
         return found
-
-    def _closed(self, t: float, point: Point) -> Point:
-        """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""
-        assert self.restart is not None
-        values = self.observer(t, *point)
-        gaps = [c.value for k, c in enumerate(self.plan.contacts) if c.kind == "phi" and self.contacts.active[k]]
-        if not any(abs(values[gap]) > UNSEEN * self.observer.terms[gap] for gap in gaps):
-            return point
-        y, yd, done = self.restart.settler.moved(t, *point)
-        return (y, yd) if done else point
-
-    def _remembered(self, t: float, point: Point, key: tuple[tuple[float, ...], tuple[int, ...]]) -> Point | None:
-        """The point with the active set that followed when this happened before, where it fits; None where not."""
-        after = self._follows.get(key)
-        if after is None or self._stalled:
-            return None
-        assert self.restart is not None
-        before = self.contacts.active.copy(), self.p.copy()
-        self.contacts.become(after)
-        found = self.restart.struck(t, *point)
-        if found is not None:
-            fits = self.contacts.fits(t, point[0], found)
-            fits = fits and (bool(key[1]) or self._decided(before[0], self.observer(t, *found[:2])))
-            if fits and self.determined.leaves(t, *found[:2]) == 0:
-                return found[0], found[1]
-        self.contacts.active[:], self.p[:] = before
-        self.contacts.apply()
-        return None
-
-    def _decided(self, before: NDArray[np.bool_], values: Floats) -> bool:
-        """Whether the inequalities that turned could not have stayed as they were `before`: what would hold and open
-        alike at this instant (a diode that conducts beside a capacitor) stays where nothing touched it.
-        """
-        active, zero = self.contacts.active, self.observer.zero
-        turned = [k for k in np.flatnonzero(active != before) if self.plan.contacts[k].kind in ("phi", "psi")]
-        held = [self.plan.contacts[k] for k in turned if active[k]]
-        open_ = [self.plan.contacts[k] for k in turned if not active[k]]
-        return all(values[c.multiplier] > zero(c.multiplier) for c in held) and all(
-            values[c.value] > zero(c.value) or values[c.rate] > zero(c.rate) for c in open_
-        )
-
-    def _tied(self, t: float, point: Point, touched: Sequence[int]) -> bool:
-        """Whether something touched may hold or not at this instant, but a gap that has bounced; or friction that is
-        at its bound while others hold what it joins.
-        """
-        values, zero = self.observer(t, *point), self.observer.zero
-        contacts = [self.contacts.contacts[k] for k in touched]
-        stick = self.contacts.active
-        slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
-        idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)
-        return idle or any(c.kind != "phi" or abs(values[c.rate]) <= zero(c.rate) for c in contacts)
 
     def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
         """The gaps that an impact opened."""
         values = self.observer(t, y, yd)
         self.bounces = {
-            c.value: self._thrown(float(values[c.value]), float(values[c.rate]), -float(values[c.acceleration]))
+            c.value: thrown(float(values[c.value]), float(values[c.rate]), -float(values[c.acceleration]))
             for k, c in enumerate(self.plan.contacts)
             if c.kind == "phi" and not self.contacts.active[k] and abs(values[c.value]) <= self.observer.zero(c.value)
         }
-
-    @staticmethod
-    def _thrown(value: float, speed: float, pull: float) -> Bounce:
-        back = speed > 0.0 and pull > 0.0
-        height, flight = (0.5 * speed * speed / pull, 2.0 * speed / pull) if back else (np.inf, np.inf)
-        return Bounce(min(value, 0.0), height, flight)
-
-    def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
-        """The point with the active set that fits a little later, None where none differs.
-
-        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.  A set that leaves
-        something open (both arms of a bridge) is one that nothing has told apart yet: it is taken where none is better.
-        """
-        y, yd = point
-        kept, open_ = (self.contacts.active.copy(), self.p.copy()), None
-        for later in AHEAD:
-            time = later * self.contacts.time
-            found = self._later(t, time, (y, yd), stood)
-            if found is not None and self.determined.leaves(t, *found) == 0:
-                return found
-            if found is not None and open_ is None:
-                open_ = found, self.contacts.active.copy(), self.p.copy()
-            self.contacts.active[:], self.p[:] = kept
-            self.contacts.apply()
-        if open_ is None:
-            return None
-        self.contacts.active[:], self.p[:] = open_[1:]
-        self.contacts.apply()
-        return open_[0]
-
-    def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...]) -> Point | None:
-        """The point at t with the active set that fits `time` (s) later; None where that is the one that stood."""
-        assert self.restart is not None
-        y, yd = point
-        try:
-            self.determined.fit(t + time, y + time * yd, yd, self.restart.struck)
-        except NoActiveSetError:
-            return None
-        found = self.restart.struck(t, y, yd) if self.contacts.state() != stood else None
-        return None if found is None else (found[0], found[1])
-
-    def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
-        assert self.restart is not None
-        try:
-            return self.restart.instant.flows(t, y, yd, self.restart.magnitude(y.size), aims)
-        except NotFiniteError as error:
-            raise SolverFailure("nonfinite", t, 0.0) from error
-
-    def _guards(self, t: float, y: Floats, yd: Floats) -> None:
-        values = self.observer(t, y, yd)
-        for k, contact in enumerate(self.plan.contacts):
-            if contact.kind == "guarded":
-                self.contacts.active[k] = bool(values[contact.guard])
-        self.contacts.apply()
 
     def _note(self, t: float, said: list[str], touched: Sequence[int]) -> None:
         for k, contact in enumerate(self.plan.contacts):
@@ -481,27 +345,14 @@ class Handler:
 
     # -- conditions and assignments ------------------------------------------------------------------------------
 
-    def _holds(self, condition: Condition, crossed: Sequence[int]) -> bool:
-        match condition[0]:
-            case "and":
-                return all(self._holds(c, crossed) for c in condition[1:])
-            case "or":
-                return any(self._holds(c, crossed) for c in condition[1:])
-            case "not":
-                return not self._holds(condition[1], crossed)
-        _, k, operator = condition
-        side = self.side[k]
-        if operator in ("==", "!=") and self.plan.relations[k].moves:
-            return bool((k in crossed) == (operator == "=="))  # equal at the instant of a crossing alone
-        if operator in ("==", "!="):
-            return bool((side == 0.0) == (operator == "=="))
-        strict = {">": side > 0.0, "<": side < 0.0, ">=": side >= 0.0, "<=": side <= 0.0}
-        return bool(strict[operator])
+    def _true(self, crossed: Sequence[int] = ()) -> list[bool]:
+        """Which conditions hold."""
+        return [holds(w.condition, self.side, self.plan.relations, crossed) for w in self.plan.whens]
 
     def _risen(self, crossed: Sequence[int]) -> list[int]:
-        now = [self._holds(w.condition, crossed) for w in self.plan.whens]
+        now = self._true(crossed)
         fired = [k for k, (was, is_) in enumerate(zip(self.truth, now, strict=True)) if is_ and not was]
-        self.truth = [self._holds(w.condition, ()) for w in self.plan.whens]
+        self.truth = self._true()
         return fired
 
     def _assign(
@@ -523,19 +374,8 @@ class Handler:
             element = assignments[0].name.rpartition(".")[0] if assignments else ""
             self.happened.append(Happened(t, name, element, ", ".join(said), ", ".join(now)))
         if any(a.kind == "flow" for _, assignments in events for a in assignments):
-            y = self._momenta(t, y, yd)
-        return y
-
-    def _momenta(self, t: float, y: Floats, yd: Floats) -> Floats:
-        """Momenta that follow from flows that were assigned: the rows of block momentum, solved for p."""
-        settled = self.restart.instant.system if self.restart else self.system
-        rows = np.flatnonzero(settled.of_groups("momentum"))
-        p = np.flatnonzero(settled.kinds == "p")
-        for _ in range(3 if rows.size else 0):
-            jy, _ = settled.jacobian(t, y, yd)
-            matrix = settled.dense(jy)[np.ix_(rows, p)]
-            y = y.copy()
-            y[p] -= least_squares(matrix, settled.residual(t, y, yd)[rows])
+            settled = self.restart.instant.system if self.restart else self.system
+            y = with_momenta(settled, t, y, yd)
         return y
 
     def _renew(self, t: float, y: Floats, yd: Floats) -> None:

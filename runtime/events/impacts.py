@@ -16,7 +16,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from sysdyn.runtime.events.contacts import TRIALS, Contacts, NoActiveSetError
+from sysdyn.runtime.events.contacts import Contacts
+from sysdyn.runtime.events.pivoting import TRIALS, NoActiveSetError
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.system import System

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.runtime.events.contacts import Contacts, NoActiveSetError
+from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.observer import Observer
+from sysdyn.runtime.events.pivoting import NoActiveSetError
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart

@@ -5,7 +5,7 @@
 with f = 0 of every coordinate whose displacement something depends on, time held; where all rows depend on differences
 of displacements alone (shafts that turn together), f may lie along the directions V in which none changes:
 (1 - V V^T) f = 0.  Newton's method (least change, see
-numerics/least_change.py) from the guesses and from seeded random points around them.
+numerics/gauss_newton.py) from the guesses and from seeded random points around them.
 Receives a System and what of it is tangible.  Hands on states of rest, each once.
 """
 
@@ -21,7 +21,8 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.least_change import DENSE, FOLDS, Problem, Work, solve
+from sysdyn.runtime.numerics.gauss_newton import FOLDS, Problem, Work, solve
+from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.rank import least_squares, null_space
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter

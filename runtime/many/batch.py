@@ -16,34 +16,28 @@ from numpy.typing import NDArray
 from sysdyn.runtime.integrate import pairs
 from sysdyn.runtime.integrate.accuracy import DRAFT, FEW_STEPS, Achieved, Law
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options, choose_method
+from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
 from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs, Way
 from sysdyn.runtime.judgement import allowed, judge
 from sysdyn.runtime.many.anchors import anchors, guesses
+from sysdyn.runtime.many.asked import DONE, END, ROWS, TRACES, WHY, Claim, NotApplicableError, Results, obstacle
+from sysdyn.runtime.many.mass_matrix import mass_matrix
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.scales import confirmed, sizing
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import net_order_of
-from sysdyn.runtime.simulate import alternatives, close, counted, form_name, formed
+from sysdyn.runtime.simulate import close
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.rates import determined
-from sysdyn.runtime.structure.structure import DENSE, Structure
 from sysdyn.runtime.trace.keeping import Held
 from sysdyn.runtime.trace.trace import Parameter, Trace
-from sysdyn.values import dataclass
 
 MOST = 48
 """Instants of comparison that are taken of a run's steps, at most twice that (core/run/many.c)."""
-DONE = 0
-WHY = ("", "start", "structure", "stopped", "accuracy", "energy", "claim")
-"""What kept a run from a result, by its state."""
-END, EXTREMA, TRACES, ROWS = 0, 1, 2, 3
-"""What is kept of a run: end values alone, least and largest too, some rows of its trace too; all rows of the last one,
-which is then handed back as a trace."""
 COUNTS = 1e-9
 """Of the largest entry of a row: what is less is round-off, or may as well vanish."""
 MARGIN, LOOSER = 0.1, 3.0
@@ -53,73 +47,6 @@ COUNTED = ("steps", "rejected_steps", "newton_failures")
 underlying equation."""
 FREELY = 0.25
 """Longest step as part of the span where nothing in the rows depends on time: no event of a source can be missed."""
-
-
-class NotApplicableError(Exception):
-    """Why runs of a model cannot be made this way: a sentence."""
-
-
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """An expectation on observed quantities: names of its sides (within None: nothing is granted); operator; moment
-    always, finally, or at an instant [s].
-    """
-
-    left: str
-    right: str
-    within: str | None
-    operator: str
-    moment: str
-    at: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Results:
-    """Of runs [k]: state (DONE, or what `WHY` names), steps, estimate (relative), cpu [s]; end, least, most [k,
-    quantities]; traces [k, quantities, rows kept].
-    """
-
-    state: Ints
-    steps: Ints
-    estimate: Floats
-    cpu: Floats
-    end: Floats
-    least: Floats
-    most: Floats
-    traces: Floats
-
-
-def way_of(
-    written: System, start: ConsistentState, facts: Structure, options: Options, method: str
-) -> tuple[Way, ConsistentState]:
-    """The way with the method that a nominal run took, and the start in its layout."""
-    written, start, facts = counted(written, start, facts, options)
-    system, index, _ = formed(written, start, facts, options)
-    first = Way(choose_method(options), system, index, form_name(system, facts))
-    ways = (first,) if options.method != "auto" else alternatives(first, written, start, options)
-    found = next((way for way in ways if way.method == method), None)
-    if found is None:
-        raise NotApplicableError(f"the nominal run took method {method}")
-    return found, start
-
-
-def obstacle(options: Options) -> str | None:
-    """Why runs with these options are made one by one; None where nothing is in the way."""
-    if options.accuracy is None and not options.accuracy_on:
-        return "the solver's own tolerances are given: there is no accuracy to be controlled"
-    if options.rtol is not None or options.atol is not None or options.method == "euler":
-        return "the solver's own tolerances are given: there is no accuracy to be controlled"
-    if options.events:
-        return "the model has events"
-    if options.stops is not None and np.isfinite(np.asarray(options.stops)).any():
-        return "the text jumps or has kinks in time"
-    if options.redundancy == "minimum_norm":
-        return "redundancy minimum_norm"
-    if options.accuracy_check:
-        return "a second opinion is asked for"
-    if options.max_wall is not None:
-        return "the wall time of a run is limited"
-    return None
 
 
 class Batch:
@@ -337,38 +264,13 @@ class Batch:
         return found
 
     def _inertia(self, settled: System) -> None:
-        """Where the entries of M stand (structure/inertia.py)."""
-        many, form = self.core, settled.form
-        n = form.written
-        flows = np.flatnonzero(settled.kinds[:n] == "f")
-        if flows.size > DENSE:
-            raise NotApplicableError(f"more than {DENSE} flows")
-        place = np.full(max(settled.unknowns, 1), -1, dtype=np.int64)
-        place[flows] = np.arange(flows.size)
-        families = {f.owner: k for k, f in enumerate(settled.description.families) if f.kind == "f"}
-        columns = settled.pattern.columns_of()
-        parts: list[tuple[Any, Any, Any, int, float]] = []
-        for group, family, first in form.groups:
-            row = settled.description.rows[family]
-            owner = families.get(row.owner)
-            if group not in ("dynamics", "momentum") or owner is None:
-                continue
-            here = (settled.pattern.row >= first) & (settled.pattern.row < first + row.size)
-            entries = np.flatnonzero(here & (place[columns] >= 0))
-            number = place[form.at[owner] + (settled.pattern.row[entries] - first)]
-            dynamic = group == "dynamics"
-            parts.append((number, place[columns[entries]], entries, int(dynamic), 1.0 if dynamic else -1.0))
-        sizes = [len(part[2]) for part in parts]
-
-        def joined_(k: int) -> Any:
-            return np.concatenate([np.zeros(0), *(np.asarray(part[k]) for part in parts)]).astype(np.int32)
-
-        many.flows, many.inertias = flows.size, sum(sizes)
-        many.inertia_row, many.inertia_column, many.inertia_entry = (self._kept(joined_(k)) for k in range(3))
-        rate = np.repeat(np.array([p[3] for p in parts], dtype=np.int32), sizes)
-        many.inertia_rate = self._kept(rate)
-        many.inertia_sign = self._kept(np.repeat(np.array([p[4] for p in parts], dtype=float), sizes))
-        many.inertia = self._kept(np.zeros(flows.size**2 + 1))
+        """Where the entries of M stand."""
+        many, found = self.core, mass_matrix(settled)
+        many.flows, many.inertias = found.flows, found.entry.size
+        places = found.row, found.column, found.entry
+        many.inertia_row, many.inertia_column, many.inertia_entry = map(self._kept, places)
+        many.inertia_rate, many.inertia_sign = self._kept(found.rate), self._kept(found.sign)
+        many.inertia = self._kept(np.zeros(found.flows**2 + 1))
 
     def _measure(self, longest: float, law: Any, draft: float, fine: float) -> None:
         """Magnitudes, quantities, accuracy and room."""
@@ -451,7 +353,6 @@ class Batch:
         self.system.description.p[:] = before
         self.system.failure.check()
         return found
-
 
     def trace(self, p: Floats, anchor: Floats, parameters: tuple[Parameter, ...]) -> Trace | None:
         """One run with its numbers p [parameters] and initial values anchor [written], as `simulate` hands back its

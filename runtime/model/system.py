@@ -1,4 +1,4 @@
-"""One index form of a compiled model: residual F(t, y, yd), Jacobian, observed quantities, names.
+"""One index form of a compiled model: residual F(t, y, yd), Jacobian, observed quantities.
 
 Made of a `Description`, a carrier and the name of a form (forms.py); evaluated by the core's assembly.c, so that
 what Python sees is what the stepper integrates.
@@ -8,53 +8,29 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Callable, Hashable, Mapping
-from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.carrier import Carrier, Extent, Failure, LibraryCarrier, Tables
 from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, describe
-from sysdyn.runtime.model.failures import RowLabel
-from sysdyn.runtime.model.forms import Form, Planned, plan, unknown_name
-from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
-from sysdyn.runtime.model.patterns import Pattern, Places, compress, joined, places, read_only, spared
-from sysdyn.values import dataclass
+from sysdyn.runtime.model.facts import Facts, Found, Mask
+from sysdyn.runtime.model.forms import Form, plan
+from sysdyn.runtime.model.held_rows import LeftOut
+from sysdyn.runtime.model.layout import Layout, laid_out
+from sysdyn.runtime.model.patterns import Pattern, read_only, spared
 
-Mask = NDArray[np.bool_]
-Found = TypeVar("Found")
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """What of a form depends on the structure alone.  slots: of each part of the matrix in the pattern; entries: of the
-    largest part; may_hold: rows, unknowns, slots, switches (-1: always) of the rows that may read "multiplier = 0",
-    reads_rate: which of them read its rate.
-    """
-
-    pattern: Pattern
-    slots: tuple[Ints, ...]
-    entries: int
-    may_hold: tuple[Ints, Ints, Ints, NDArray[np.int64]]
-    reads_rate: Ints
-
-
-KEPT = 1000
-"""Unknowns up to which what is as long as they are, and quickly made, is kept."""
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
 HUGE = 1_000_000
 """Unknowns beyond which pages that a stage left go back to the machine: it asks for them again for the next one, which
 costs a line of 500000 unknowns a tenth of its CPU time to the first step, and saves it a sixth of its memory."""
-DEAR = ("order", "sets")
-"""Names of what is long to find and short to keep."""
 _NOWHERE: Callable[[int], int | None] = lambda _: None  # noqa: E731
 SETS = 4096
 """Active sets whose rows are kept."""
 
 
-class System:
+class System(Facts):
     """A model in one index form.  y, yd [unknowns], r [rows]; all in SI units."""
 
     def __init__(
@@ -107,39 +83,6 @@ class System:
         self._slots: list[Ints] = []
         self._assemble()
 
-    def once(self, name: Hashable, make: Callable[[], Found]) -> Found:
-        """What follows from the structure of this form alone: made once for all runs of a text with these sizes."""
-        key = "once", name, self.form.name, self.left_out
-        if key not in self.description.layouts:
-            self.description.layouts[key] = make()
-        return self.description.layouts[key]  # type: ignore[no-any-return]
-
-    def once_if_small(self, name: Hashable, make: Callable[[], Found]) -> Found:
-        """The same where keeping it costs no room to speak of; else made anew."""
-        return self.once(name, make) if self.unknowns <= KEPT else make()
-
-    def forget(self) -> None:
-        """Lets go of what follows from this form's structure, where no other run has it: found again if asked."""
-        if self.description.systems is None:
-            layouts = self.description.layouts
-            for key in [k for k in layouts if isinstance(k, tuple) and self.form.name in (k[0], k[1], *k[2:3])]:
-                del layouts[key]
-
-    def spare(self) -> None:
-        """Lets go of all that was made once for any form but orders of elimination, where no other run has it: what is
-        in use stays with those who use it, the rest is found again if asked.
-        """
-        if self.description.systems is None:
-            layouts = self.description.layouts
-            made = [k for k in layouts if isinstance(k, tuple) and k[0] == "once"]
-            for key in [k for k in made if k[1] not in DEAR and k[1][0] not in DEAR]:
-                del layouts[key]
-
-    def forget_once(self, name: Hashable) -> None:
-        """The same of one thing that was made once."""
-        if self.description.systems is None:
-            self.description.layouts.pop(("once", name, self.form.name, self.left_out), None)
-
     def trim(self) -> None:
         """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again."""
         if self.unknowns > HUGE:
@@ -164,57 +107,18 @@ class System:
             self._own[name] = make()
         return self._own[name]  # type: ignore[no-any-return]
 
-    @property
-    def unknowns(self) -> int:
-        """Length of y."""
-        return self.form.unknowns
-
-    @property
-    def rows(self) -> int:
-        """Length of r."""
-        return self.form.rows
-
     # --- the core's structure -------------------------------------------------------------------------------
-
-    def _places(self, call: Planned) -> tuple[Places, Places]:
-        """Where the entries of one call stand: dy, dyd."""
-        kernels = self.description.blocks[call.block]
-        shapes = (
-            [row.shape for row in self.description.rows],
-            [item.shape for item in self.description.families],
-        )
-        dy, dyd = (
-            places(kernels, which, self.description.ix, shapes, (call.to, call.at)) for which in ("dy", "dyd")
-        )
-        return dy, dyd
 
     def _laid_out(self) -> Layout:
         """Pattern and slots of the form, found once a description."""
         key = self._layout_key
         if key not in self.description.layouts:
-            self.description.layouts[key] = self._found_layout()
+            self.description.layouts[key] = laid_out(self.description, self.form, self.left_out)
         return self.description.layouts[key]  # type: ignore[no-any-return]
 
     @property
     def _layout_key(self) -> tuple[str, LeftOut]:
         return self.form.name, self.left_out
-
-    def _found_layout(self) -> Layout:
-        form = self.form
-        parts = [Places(form.k_row, form.k_q), Places(form.k_row, form.k_f)]
-        for call in form.calls:
-            parts += self._places(call)
-        held = held_rows(self.description, form, self.left_out)
-        times = switch_rows(self.description, form)
-        parts.append(Places(np.concatenate([held[0], times[0]]), np.concatenate([held[1], times[1]])))
-        last, sizes = parts[-1], [part.row.size for part in parts]
-        parts = [joined(parts)]  # of a large one the room counts
-        pattern, (number,) = compress(form.rows, form.unknowns, parts)
-        slots = [np.ascontiguousarray(piece) for piece in np.split(number, np.cumsum(sizes)[:-1])]
-        place = np.concatenate([np.full(held[0].size, -1), times[2]])
-        reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
-        at_times = last.row.astype(np.int32), last.column.astype(np.int32), slots[-1].copy(), place
-        return Layout(pattern, tuple(slots), max([*sizes, 1]), at_times, reads_rate)
 
     def _assemble(self) -> None:
         form, layout = self.form, self._laid_out()
@@ -484,75 +388,6 @@ class System:
     def _audited(self, t: float, y: Floats, yd: Floats) -> Floats:
         buffers = (self._buffer(item[: self.form.written]) for item in (y, yd))
         return self._evaluate("audit", t, *buffers)
-
-    # --- facts about the unknowns ---------------------------------------------------------------------------
-
-    @cached_property
-    def unknown_names(self) -> tuple[str, ...]:
-        """Name of each unknown."""
-        return tuple(unknown_name(self.description, self.form, k) for k in range(self.unknowns))
-
-    def name(self, place: int) -> str:
-        """Name of one unknown."""
-        return unknown_name(self.description, self.form, place)
-
-    def row_label(self, row: int) -> RowLabel:
-        """Label of one row."""
-        return self.form.row_label(self.description, row)
-
-    @property
-    def kinds(self) -> NDArray[np.str_]:
-        """Kind of each unknown: q f p s e kappa mu nu; read-only."""
-        return self.once("kinds", lambda: read_only(self._kinds()))
-
-    def _kinds(self) -> NDArray[np.str_]:
-        kinds, numbers = zip(*self.form.kind, strict=True) if self.form.kind else ((), ())
-        return np.repeat(np.array(kinds, dtype="<U5"), np.array(numbers, dtype=np.int64))
-
-    def are(self, *kinds: str) -> Mask:
-        """Unknowns of these kinds [unknowns]; read-only."""
-        return self.once(("are", kinds), lambda: read_only(self._are(kinds)))
-
-    def _are(self, kinds: tuple[str, ...]) -> Mask:
-        mask = np.zeros(self.unknowns, dtype=bool)
-        for family, first in zip(self.description.families, self.form.at, strict=True):
-            if family.kind in kinds and 0 <= first < self.unknowns and family.kind != "audit":
-                mask[first : first + family.size] = True
-        if self.form.name != "start":
-            mask[self.form.written :] = "nu" in kinds
-        return mask
-
-    def of_groups(self, *names: str) -> Mask:
-        """Rows of these groups [rows]; read-only."""
-        return self.once(("groups", names), lambda: read_only(self._of_groups(names)))
-
-    def _of_groups(self, names: tuple[str, ...]) -> Mask:
-        mask = np.zeros(self.rows, dtype=bool)
-        for group, family, first in self.form.groups:
-            if group in names:
-                mask[first : first + self.description.rows[family].size] = True
-        return mask
-
-    @property
-    def family_of(self) -> Ints:
-        """Number of the family of each unknown (nu: -1); read-only."""
-        return self.once("family_of", self._family_of)
-
-    def _family_of(self) -> Ints:
-        found = np.full(self.unknowns, -1, dtype=np.int32)
-        for k, family in enumerate(self.description.families):
-            if self.form.at[k] >= 0 and family.kind != "audit":
-                found[self.form.at[k] : self.form.at[k] + family.size] = k
-        return read_only(found)
-
-    @property
-    def nominal(self) -> Floats:
-        """Nominal magnitudes from the manifest; 0 where it names none; read-only."""
-        return self.once("nominal", self._nominal)
-
-    def _nominal(self) -> Floats:
-        values = [0.0 if family.nominal is None else family.nominal for family in self.description.families]
-        return read_only(np.append(np.array(values, dtype=np.float64), 0.0)[self.family_of])
 
     def differential(self, jyd: Floats) -> Mask:
         """Unknowns whose derivative occurs with a nonzero coefficient."""

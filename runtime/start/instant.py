@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.system import Mask, System
+from sysdyn.runtime.model.facts import Mask
+from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.tall import free_unknowns

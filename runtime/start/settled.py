@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.layout import entries_of
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import column_order, tall_order
@@ -45,7 +46,7 @@ def _rates(settled: System) -> Ints:
     used = np.zeros(settled.unknowns, dtype=bool)
     pattern = settled.pattern
     for call in settled.form.calls:
-        used[settled._places(call)[1].column] = True
+        used[entries_of(settled.description, call)[1].column] = True
     assert pattern.unknowns == settled.unknowns
     return np.flatnonzero(used).astype(np.int32)
 

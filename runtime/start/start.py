@@ -14,9 +14,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.least_change import (
-    DENSE,
-    SINGULAR_VALUES,
+from sysdyn.runtime.numerics.gauss_newton import (
     OutOfTimeError,
     Solution,
     Work,
@@ -25,6 +23,7 @@ from sysdyn.runtime.numerics.least_change import (
     solve,
     stepped,
 )
+from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, STRATEGIES, first, rescaled

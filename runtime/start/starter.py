@@ -24,7 +24,8 @@ from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.least_change import DENSE, Problem, Work, least_norm
+from sysdyn.runtime.numerics.gauss_newton import Problem, Work
+from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.values import dataclass

@@ -1,6 +1,6 @@
 """Globalisation: what is tried, in the order of STRATEGIES, until all rows of a start hold.
 
-Each strategy is a generator of solutions, found by Gauss-Newton steps (numerics/least_change.py) on all rows or some.
+Each strategy is a generator of solutions, found by Gauss-Newton steps (numerics/gauss_newton.py) on all rows or some.
 Magnitudes that prove wrong on the way are taken anew.
 """
 
@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.least_change import FOLDS, Solution, solve
+from sysdyn.runtime.numerics.gauss_newton import FOLDS, Solution, solve
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)

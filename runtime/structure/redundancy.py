@@ -19,7 +19,7 @@ from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
-from sysdyn.runtime.numerics.least_change import solve
+from sysdyn.runtime.numerics.gauss_newton import solve
 from sysdyn.runtime.numerics.points import normal, uniform
 from sysdyn.runtime.numerics.rank import TOLERANCE
 from sysdyn.runtime.start.start import ConsistentState

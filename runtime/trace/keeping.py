@@ -16,8 +16,9 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.trace.claim import claimed
-from sysdyn.runtime.trace.trace import Met, Quantity, Trace, TraceWriter
+from sysdyn.runtime.trace.trace import Quantity, Trace
 from sysdyn.runtime.trace.trace_store import BEFORE, Layout, clear
+from sysdyn.runtime.trace.writing import Met, TraceWriter
 
 Attributes = Mapping[str, str | float | int]
 

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.running import Request, options_of, ready, stops
+from sysdyn.cli.run.asked import Request, options_of, stops
+from sysdyn.cli.run.running import ready
 from sysdyn.cli.run.sizes import sizes
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl.model import expression as ex

@@ -13,11 +13,11 @@ import time
 from pathlib import Path
 
 import numpy as np
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.loaded import Loaded
-from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep.in_core import Cases
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.many.batch import NotApplicableError
+from sysdyn.runtime.many.asked import NotApplicableError
 
 SEED = Path(__file__).parents[2] / "models" / "seed"
 MODELS = (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import BLOCKS, classes, equations
 from sysdyn.compiler.equations.elements import elements
@@ -17,6 +17,8 @@ from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import pieces
 from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative, without_signals
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.text.diagnostics import Report
 from texts import ROOT, run_json, write
 
@@ -256,7 +258,7 @@ class Values:
         return self.known[node]
 
     def of(self, node):
-        return ex.evaluate([ex.without_signals(node)], self)[0]
+        return evaluate([without_signals(node)], self)[0]
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -304,7 +306,7 @@ def test_the_underlying_equations_solve_the_rows(name, formulation):
         kinds = (("f", 1), ("p", 1), ("kappa", 0), ("mu", 0))
         wanted = [n for kind, order in kinds for n in unknowns(form, kind, order)]
         values = Values(3)
-        matrix = np.array([[values.of(ex.derivative(row.expression, n)) for n in wanted] for row in rows])
+        matrix = np.array([[values.of(derivative(row.expression, n)) for n in wanted] for row in rows])
         still = dict.fromkeys(wanted, ex.const(0.0))
         right = np.array([-values.of(ex.substitute(row.expression, still)) for row in rows])
         solution = dict(zip(wanted, np.linalg.solve(matrix, right), strict=True))
@@ -330,13 +332,13 @@ def test_the_canonical_equations_are_derivatives_of_h(name):
         rates = {e.owner: ex.add(*(t.expression for t in e.right)) for e in found if e.kind == "kinematic"}
         for owner in carriers:
             if owner in rates:
-                slope = ex.derivative(h, ex.var(owner, "p"))
+                slope = derivative(h, ex.var(owner, "p"))
                 assert values.of(rates[owner]) == pytest.approx(values.of(slope), rel=1e-9), owner
             (row,) = (e for e in found if e.kind == "dynamics" and e.owner == owner)
-            conservative = ex.derivative(h, ex.var(owner, "q"))
+            conservative = derivative(h, ex.var(owner, "q"))
             rest = ex.add(*(t.expression for t in row.right), conservative)
             dependent = [n for n in ex.variables(rest) if n.op == "var" and n.data[1] == "p"]
-            slopes = [values.of(ex.derivative(rest, n)) for n in dependent]
+            slopes = [values.of(derivative(rest, n)) for n in dependent]
             dissipated = any(t.expression is not None for t in made.energies.function("D"))
             assert dissipated or slopes == pytest.approx([0.0] * len(slopes), abs=1e-9), owner
 
@@ -430,13 +432,13 @@ def test_a_law_that_is_not_linear_has_its_content_by_the_legendre_transform(caps
         _, prepared = compiled(Request(str(SEED / "diode_circuit.sd"), backend="numpy"), Report())
         found = {e.left[0].expression.data: e for e in elements(Algebra(Order()), prepared.network)}
         values = {ex.param("Is"): 0.3, ex.param("a"): 1.7, ex.param("e_diode"): 0.8}
-        of = lambda name: ex.evaluate(  # noqa: E731
+        of = lambda name: evaluate(  # noqa: E731
             [ex.add(*(t.expression for t in found[name].right))], values.__getitem__
         )[0]
         values[ex.param("f_diode")] = of("f_diode")
         assert of("D_diode") + of("G_diode") == pytest.approx(0.8 * values[ex.param("f_diode")], rel=1e-14)
         g = ex.add(*(t.expression for t in found["G_diode"].right))
-        slope = ex.evaluate([ex.derivative(g, ex.param("e_diode"))], values.__getitem__)[0]
+        slope = evaluate([derivative(g, ex.param("e_diode"))], values.__getitem__)[0]
         assert slope == pytest.approx(values[ex.param("f_diode")], rel=1e-14)
 
 

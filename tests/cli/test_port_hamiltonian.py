@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 from sysdyn.compiler.equations.matrices import NoSuchEquations, rows_of
 from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian
 from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.compiler.model.interpret import evaluate
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.text.diagnostics import Report
 from texts import ROOT, write
 
@@ -46,7 +47,7 @@ class Point:
     def solve(self, row, unknown):
         """A value of an unknown in which a row is linear."""
         self.values[unknown] = 0.0
-        self.values[unknown] = -self(row) / self(ex.derivative(row, unknown))
+        self.values[unknown] = -self(row) / self(derivative(row, unknown))
 
     def _leaf(self, node, args):
         if node.op in {"var", "time"}:
@@ -117,9 +118,9 @@ def gradient(view, model, k, point):
     if node.data[1] == "q" and any(z.data[1] == "p" and z.data[0] not in stores(model) for z in view.z):
         # at fixed p: -dT*/dq + dV/dq
         parts = [(-1.0, "T*"), (1.0, "T"), (1.0, "V")]
-        total = (c * point(ex.derivative(t.expression, node)) for c, f in parts for t in model.energies.function(f))
+        total = (c * point(derivative(t.expression, node)) for c, f in parts for t in model.energies.function(f))
         return sum(total)
-    return point(ex.derivative(view.energy, node))
+    return point(derivative(view.energy, node))
 
 
 def row_of(model, node):

@@ -25,13 +25,13 @@ DAMAGED = 1000 if LONG else 20
 
 WATCHED = """
 import sys, time
-from sysdyn.runtime.trace import trace
-flush = trace.TraceWriter._turn
+from sysdyn.runtime.trace import writing
+flush = writing.TraceWriter._turn
 def turn(self, *given):
     flush(self, *given)
     rows = self._visible._length if self._visible is not None else 0
     print(rows, flush=True)
-trace.TraceWriter._turn = turn
+writing.TraceWriter._turn = turn
 from sysdyn.cli.main import main
 main(sys.argv[1:])
 """

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.axes import Axis, axis
 from sysdyn.cli.sweep.journal import Journal

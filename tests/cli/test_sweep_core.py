@@ -9,12 +9,12 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
+from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.loaded import Loaded
-from sysdyn.cli.run.running import Request
 from sysdyn.cli.sweep.in_core import Cases
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.many.batch import NotApplicableError
+from sysdyn.runtime.many.asked import NotApplicableError
 
 MODELS = Path(__file__).parents[2] / "models"
 SEEDS = {

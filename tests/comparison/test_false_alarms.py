@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 from sysdyn.cli.compare.diffing import common, differences, headline
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.running import Ran, Request, run
+from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.run.sizes import sizes
 from sysdyn.cli.verify.twins import free_quantities
 from sysdyn.cli.verify.verification import METHODS, REFUSALS, TIMES

@@ -9,6 +9,8 @@ from chains import blank, parameter
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import (
     Branch,
     Coupling,
@@ -320,7 +322,7 @@ def unrolled(net, **sizes):
     found = Tableau()
 
     def number(root, at):
-        return x.evaluate([root], lambda n: at[n.data] if n.op == "index" else sizes[n.data])[0]
+        return evaluate([root], lambda n: at[n.data] if n.op == "index" else sizes[n.data])[0]
 
     def whole(nodes, at):
         return ",".join(str(round(number(n, at))) for n in nodes)
@@ -337,7 +339,7 @@ def unrolled(net, **sizes):
         value = 0.0
         slope = None
         if (b.kind, b.side) in OWN:
-            slope = x.derivative(b.law, x.var(b.name, OWN[b.kind, b.side], *b.at))
+            slope = derivative(b.law, x.var(b.name, OWN[b.kind, b.side], *b.at))
         for at in places(b.loops, {}):
             value = 0.0 if slope is None else number(slope, at)
             ends = [None if t.node is None else f"{t.node}[{whole(t.at, at)}]" for t in (b.plus, b.minus)]

@@ -3,6 +3,7 @@
 import numpy as np
 from networks import ELECTRICAL, ROTATION, TRANSLATION, Net, Tableau, unrolled
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 
 
 class Sketch:
@@ -145,7 +146,7 @@ class Arrays:
 
     def numeric(self, node, at):
         look = {**self.sizes, **at}
-        return round(x.evaluate([node if isinstance(node, x.Node) else x.const(node)], lambda n: look[n.data])[0])
+        return round(evaluate([node if isinstance(node, x.Node) else x.const(node)], lambda n: look[n.data])[0])
 
     def statement(self, number):
         """One branch statement that stays inside its node families."""

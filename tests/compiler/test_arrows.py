@@ -12,6 +12,7 @@ from sysdyn.compiler.network.skeleton import filled, shaped
 from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Dynamic, Energy, State
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -26,7 +27,7 @@ def named(network):
 
 
 def value(node, **known):
-    return x.evaluate([node], lambda leaf: known[".".join(leaf.data[:2])])[0]
+    return evaluate([node], lambda leaf: known[".".join(leaf.data[:2])])[0]
 
 
 # -- elements along displacements ----------------------------------------------------------------------------

@@ -9,6 +9,8 @@ from sysdyn.compiler.forms.descriptor import BLOCKS as ALL_BLOCKS
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.calculus import differential, time_derivative
+from sysdyn.dsl.model.evaluation import evaluate
 
 CATALOGUE, VALUES = load("catalogue.json"), load("descriptor_values.json")
 WITHOUT_VALUES = "redundant_pendulum|lagrangian|0"  # its multipliers are not determined
@@ -106,7 +108,7 @@ def stored_rate(form, oracle, t, y, yd):
     kernels = tuple(
         replace(
             kernel,
-            rows=tuple(replace(s, expression=x.time_derivative(s.expression)) for s in kernel.rows if s.row in rows),
+            rows=tuple(replace(s, expression=time_derivative(s.expression)) for s in kernel.rows if s.row in rows),
         )
         for kernel in (block.kernels if block else ())
     )
@@ -192,7 +194,7 @@ def test_rates_of_states_are_those_of_the_reduced_system(which):
             for s, text in zip(model["s"], model["s_map"], strict=True):
                 map_ = convert(text, names)
                 moving = {n: rates[n] for n in sorted(x.variables(map_), key=lambda n: n.number)}
-                (expected,) = x.evaluate([x.differential(map_, moving)], at.__getitem__)
+                (expected,) = evaluate([differential(map_, moving)], at.__getitem__)
                 family = next(i for i, f in enumerate(compiled.form.families) if (f.owner, f.kind) == (s, "s"))
                 scale = oracle.magnitudes("lambda", t, y, yd).max()
                 assert yd[oracle.at[family]] == pytest.approx(expected, rel=1e-10, abs=1e-12 * scale)

@@ -13,6 +13,7 @@ from sysdyn.compiler.network.primal.contents import held_at
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.series import series
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Loop
 
@@ -84,10 +85,10 @@ def test_what_a_store_holds_at_an_effort_or_flow():
     net.L("L", 0.25, "a", "b")
     branches = {b.name: b for b in net.network().branches}
     value = x.const(3.0)
-    assert x.evaluate([held_at(branches["C"], "be", value)], float) == [1.5]
-    assert x.evaluate([held_at(branches["L"], "bf", value)], float) == [0.75]
+    assert evaluate([held_at(branches["C"], "be", value)], float) == [1.5]
+    assert evaluate([held_at(branches["L"], "bf", value)], float) == [0.75]
     turned = replace(branches["C"], side="be", law=x.linear(1.0, ((2.0, x.var("C", "bq")),)))
-    assert x.evaluate([held_at(turned, "be", value)], float) == [1.0]
+    assert evaluate([held_at(turned, "be", value)], float) == [1.0]
     bent = replace(turned, law=x.power(x.var("C", "bq"), x.const(2.0)))
     assert held_at(bent, "be", value) is None
     assert held_at(branches["C"], "bq", value) is value

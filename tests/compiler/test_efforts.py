@@ -8,6 +8,7 @@ from chains import blank, coordinate
 from sysdyn.compiler.forms.efforts import effort, efforts
 from sysdyn.compiler.model.energies import energies
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Constraint, Energy, Work
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -53,12 +54,12 @@ EXPECTED = {
 @pytest.mark.parametrize(("name", "owner"), EXPECTED)
 def test_each_class_is_its_force(name, owner):
     found = effort(bead(), x.var(owner, f"x:{name}"))
-    assert x.evaluate([found], lambda n: VALUES[n.data]) == pytest.approx([EXPECTED[name, owner]], rel=1e-14)
+    assert evaluate([found], lambda n: VALUES[n.data]) == pytest.approx([EXPECTED[name, owner]], rel=1e-14)
 
 
 def test_the_balance_of_a_coordinate_is_the_sum_of_its_classes():
     model = bead()
     for owner in ("r", "th"):
         summed = x.add(*(e.value for e in efforts(model, owner)))
-        value = x.evaluate([summed], lambda n: VALUES[n.data])[0] + VALUES[owner, "p", 1]
+        value = evaluate([summed], lambda n: VALUES[n.data])[0] + VALUES[owner, "p", 1]
         assert value == pytest.approx(-sum(v for (_, own), v in EXPECTED.items() if own == owner), rel=1e-14)

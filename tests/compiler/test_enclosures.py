@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from sysdyn.compiler.binding.enclosures import enclose, enclose_over
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.expression_text import to_text
 
 INF = math.inf
 V, W, N = x.var("v", "bf"), x.var("w", "bf"), x.param("n")
 
 
 def bounds(root, v=(0.0, 0.0), w=(0.0, 0.0), n=2.0):
-    return enclose_over(root, {V: v, W: w}, lambda node: x.evaluate([node], lambda _: n)[0])
+    return enclose_over(root, {V: v, W: w}, lambda node: evaluate([node], lambda _: n)[0])
 
 
 def called(name, *args):
@@ -136,12 +138,12 @@ def test_no_value_lies_outside(seed):
     for k in range(60):
         v, w = (r[k % 2] if k < 4 else random.uniform(*r) for r in ranges)
         try:
-            value = x.evaluate([root], lambda n, v=v, w=w: {V: v, W: w, N: 2.0}[n])[0]
+            value = evaluate([root], lambda n, v=v, w=w: {V: v, W: w, N: 2.0}[n])[0]
         except (ValueError, ZeroDivisionError, OverflowError, TypeError):
             continue
         if not isinstance(value, complex) and math.isfinite(value):
             room = 1e-12 * max(1.0, abs(value))
-            assert low - room <= value <= high + room, (x.to_text(root), v, w)
+            assert low - room <= value <= high + room, (to_text(root), v, w)
 
 
 def test_bounds_shrink_to_the_values_as_intervals_do():

@@ -7,6 +7,7 @@ from sysdyn.compiler.network.primal.bounds import Sizes
 from sysdyn.compiler.network.primal.fields import field_quantities
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -18,7 +19,7 @@ def quantities(net, **written):
 
 
 def at(node, values):
-    return x.evaluate([node], lambda n: values[n])[0]
+    return evaluate([node], lambda n: values[n])[0]
 
 
 def test_an_oscillator_written_as_energies():
@@ -54,6 +55,6 @@ def test_every_iteration_that_reads_an_element_counts():
         root = x.substitute(effort, {x.index("i"): x.const(i)})
         sums = {n: x.add(*(x.substitute(n.args[2], {x.index(n.data[1]): x.const(k)}) for k in (1, 2, 3)))
                 for n in x.topological([root]) if n.op == "reduce"}
-        return x.evaluate([x.substitute(root, sums)], lambda n: held.get(n.args[0].data, 0.0))[0]
+        return evaluate([x.substitute(root, sums)], lambda n: held.get(n.args[0].data, 0.0))[0]
 
     assert [own(i) for i in range(1, 5)] == [-1.0, 1.0 - 4.0, 4.0 - 2.0, 2.0]

@@ -7,6 +7,7 @@ from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.model.energies import energies
 from sysdyn.compiler.network.primal import primal
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 
 pytestmark = pytest.mark.usefixtures("fresh")
 FRICTION = 3.0
@@ -33,7 +34,7 @@ def rows(form, block):
 
 def read(row, *, branch=LIVE, f=0.0, rate=0.0, sense=0.0):
     values = {("a", "f", 0): f, ("a", "f", 1): rate, ("#sense 0", "e", 0): sense, "#branch 0": branch}
-    return x.evaluate([row], lambda n: values[n.data])[0]
+    return evaluate([row], lambda n: values[n.data])[0]
 
 
 def sign_of(f):
@@ -42,7 +43,7 @@ def sign_of(f):
 
 def test_dry_friction_reads_its_branch_and_lies_between_while_it_slides():
     form, parameters = frozen(*lowered(sign_of))
-    assert [(p.name, x.evaluate(list(p.values), {}.get)) for p in parameters] == [("#branch 0", [LIVE])]
+    assert [(p.name, evaluate(list(p.values), {}.get)) for p in parameters] == [("#branch 0", [LIVE])]
     (row,) = rows(form, "dynamics")
     inertia = read(row, rate=1.0, branch=ABOVE) - read(row, branch=ABOVE)
     assert abs(inertia) == 2.0

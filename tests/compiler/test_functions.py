@@ -11,6 +11,8 @@ from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import BLOCKS, WITHOUT_ENTRIES
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.functions import FUNCTIONS
 from sysdyn.dsl.model.network import Constraint, Dynamic, Energy, Observation, State, Unknown, Work
 from test_verifiers import random_expression
 
@@ -27,7 +29,7 @@ def f(name):
 
 def expressions():
     a, b = q("a"), q("b")
-    for name in sorted(set(x.FUNCTIONS) - {"setsign"}):  # set-valued: events take it out of laws
+    for name in sorted(set(FUNCTIONS) - {"setsign"}):  # set-valued: events take it out of laws
         two = name in ("atan2", "hypot", "min", "max", "mod")
         yield name, x.call(name, a, b) if two else x.call(name, a)
     for e in (-3.0, -2.0, -1.0, -0.5, 0.5, 1.5, 2.0, 3.0, 4.0, 7.0, 63.0, 64.0, 65.0, 0.3, -2.5):
@@ -71,7 +73,7 @@ def test_functions_conditions_and_powers(tmp_path):
                 values = {q("a"): a, q("b"): b}
                 y = np.zeros(carriers[0].at[-1])
                 y[:2] = a, b
-                expected = x.evaluate(list(found.values()), values.__getitem__)
+                expected = evaluate(list(found.values()), values.__getitem__)
                 seen = [c.rows("observe", 0.0, y, y) for c in carriers]
                 for name, value in zip(found, expected, strict=True):
                     got = [s[carriers[0].to[rows[name]]] for s in seen]

@@ -8,6 +8,8 @@ from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.joining import joined, shorter
 from sysdyn.compiler.equations.order import Order
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.expression_text import to_text
 
 PARAMETERS = ("m", "l", "J")
 
@@ -24,11 +26,11 @@ def leaves():
 
 
 def value(node, numbers):
-    return x.evaluate([node], lambda leaf: numbers[leaf])[0]
+    return evaluate([node], lambda leaf: numbers[leaf])[0]
 
 
 def texts(terms):
-    return [x.to_text(t) for t in terms]
+    return [to_text(t) for t in terms]
 
 
 def test_inertias_of_one_rate_are_one():
@@ -96,4 +98,4 @@ def test_the_terms_are_worth_what_was_joined(seed, arrow):
         if isinstance(exact, complex) or not math.isfinite(exact):
             continue
         parts = [value(t, numbers) for t in terms]
-        assert sum(parts) == pytest.approx(exact, rel=1e-8, abs=1e-9 * sum(map(abs, parts))), x.to_text(root)
+        assert sum(parts) == pytest.approx(exact, rel=1e-8, abs=1e-9 * sum(map(abs, parts))), to_text(root)

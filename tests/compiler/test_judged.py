@@ -23,6 +23,7 @@ from sysdyn.compiler.network.primal.unspecified import measured
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program.rolled import skeleton
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Constraint, Energy, Initial, Loop, Unknown, Work
 from sysdyn.dsl.text.diagnostics import ModelError, SourceText
 
@@ -63,7 +64,7 @@ def test_the_audit_of_an_oscillator_is_its_energies_and_powers():
     at = {var("a", "q"): 2.0, var("a", "f"): 4.0}
     found = {}
     for row in (row for block in made.blocks() for kernel in block.kernels for row in kernel.rows):
-        found[made.rows[row.row].owner] = x.evaluate([row.expression], at.get)[0]
+        found[made.rows[row.row].owner] = evaluate([row.expression], at.get)[0]
     assert {name: found[name] for name in ("kinetic", "potential", "dissipated", "supplied")} == {
         "kinetic": 24.0,
         "potential": 10.0,
@@ -83,7 +84,7 @@ def rows_of(form, at):
     for block in form.blocks:
         if block.name in ("dynamics", "momentum"):
             for row in (row for kernel in block.kernels for row in kernel.rows):
-                found[block.name] = found.get(block.name, 0.0) + x.evaluate([row.expression], at.get)[0]
+                found[block.name] = found.get(block.name, 0.0) + evaluate([row.expression], at.get)[0]
     return found
 
 
@@ -200,7 +201,7 @@ def test_a_statement_is_cut_where_what_it_reads_changes():
     reader, i = two_pieces(), x.index("k")
     cut = reader.cut((Loop("k", x.const(1.0), x.const(5.0)),), PLACE, lambda ranges: reader.piece("R", (i,), ranges))
     found = [(loops[0].first, loops[0].last, piece.box[0].first.value) for loops, piece in cut]
-    ends = [(x.evaluate([a, b], lambda n: n), first) for a, b, first in found]
+    ends = [(evaluate([a, b], lambda n: n), first) for a, b, first in found]
     assert ends == [([1.0, 3.0], 1), ([4.0, 5.0], 4)]
     whole = list(reader.cut((Loop("k", x.const(1.0), x.const(2.0)),), PLACE, lambda r: reader.piece("R", (i,), r).box))
     assert len(whole) == 1
@@ -213,7 +214,7 @@ def test_a_sum_over_pieces_is_a_sum_of_sums():
     assert touches_network(total)
     found = two_pieces().scalar(total, PLACE)
     assert not touches_network(found)
-    assert x.evaluate([found], lambda n: n) == [18.0]
+    assert evaluate([found], lambda n: n) == [18.0]
 
 
 def test_an_index_outside_all_pieces_is_said():

@@ -6,6 +6,7 @@ from sysdyn.compiler.forms.corners.broken import broken
 from sysdyn.compiler.forms.corners.kinks import JUMPS, KINK, SMOOTH, side, smoothness
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Table
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -101,7 +102,7 @@ def test_a_table_in_pieces_reads_as_the_table(method, outside, order):
     def leaf(node, at):
         return known(at, node.data[1]) if node.op == "table" else at
 
-    found = [x.evaluate([root], lambda node, at=at: leaf(node, at))[0] for at in places]
+    found = [evaluate([root], lambda node, at=at: leaf(node, at))[0] for at in places]
     assert found == pytest.approx([known(at, order) for at in places], rel=1e-13, abs=1e-13)
     if (method, outside, order) == ("linear", "clamp", 0):
         assert found == pytest.approx(np.interp(BESIDE, POINTS, VALUES))

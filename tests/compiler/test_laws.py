@@ -16,6 +16,7 @@ from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.laws import laws
 from sysdyn.compiler.network.primal.potentials import Potentials
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.text.diagnostics import ModelError
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -35,7 +36,7 @@ def value(node, **own):
         name, kind, order = n.data
         return own[f"{name}_{kind}" + "_rate" * order]
 
-    return x.evaluate([node], lookup)[0]
+    return evaluate([node], lookup)[0]
 
 
 def integral(law, end):
@@ -163,7 +164,7 @@ def test_the_effort_of_a_merged_node_is_summed_along_its_class(place):
 
 
 def span(node):
-    first, last = (int(x.evaluate([a], lambda n: float("nan"))[0]) for a in node.args[:2])
+    first, last = (int(evaluate([a], lambda n: float("nan"))[0]) for a in node.args[:2])
     return range(first, last + 1)
 
 

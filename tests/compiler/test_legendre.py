@@ -8,6 +8,8 @@ from sysdyn.compiler.model.energies import energies
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl import load as dsl
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.calculus import derivative, time_derivative
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.text.diagnostics import Report
 
 CATALOGUE = load("catalogue.json")
@@ -57,9 +59,9 @@ def test_the_energy_is_that_of_the_catalogue(key, k):
             return known[node]
 
         unknowns = sorted((n for n in x.variables(wanted) if n.op == "var"), key=lambda n: n.number)
-        pairs = [(found, wanted), *((x.derivative(found, n), x.derivative(wanted, n)) for n in unknowns)]
+        pairs = [(found, wanted), *((derivative(found, n), derivative(wanted, n)) for n in unknowns)]
         for ours, theirs in pairs:
-            a, b = x.evaluate([ours, theirs], value)
+            a, b = evaluate([ours, theirs], value)
             assert a == pytest.approx(b, rel=1e-12, abs=1e-14)
 
 
@@ -87,13 +89,13 @@ def test_the_pull_of_a_magnet_does_not_depend_on_its_gap():
             for kernel in block.kernels:
                 for s in kernel.rows:
                     rows[block.name, form.rows[s.row].owner] = s.expression
-        pull = x.derivative(rows["dynamics", "x1"], p2)
+        pull = derivative(rows["dynamics", "x1"], p2)
         at = {p2: 0.7, q1: 0.3} | {x.param(n): float(v) for n, v in entry["parameters"].items()}
-        assert x.evaluate([pull], at.__getitem__)[0] == pytest.approx(0.7 / at[x.param("b0")], rel=1e-14)
-        gap = x.derivative(x.derivative(pull, q1), p2)
-        assert x.evaluate([gap], at.__getitem__)[0] == pytest.approx(0.0, abs=1e-15)
-        slope = x.derivative(rows["momentum", "x2"], x.var("x2", "f"))
-        assert abs(x.evaluate([slope], at.__getitem__)[0]) == 1.0
+        assert evaluate([pull], at.__getitem__)[0] == pytest.approx(0.7 / at[x.param("b0")], rel=1e-14)
+        gap = derivative(derivative(pull, q1), p2)
+        assert evaluate([gap], at.__getitem__)[0] == pytest.approx(0.0, abs=1e-15)
+        slope = derivative(rows["momentum", "x2"], x.var("x2", "f"))
+        assert abs(evaluate([slope], at.__getitem__)[0]) == 1.0
 
 
 CHAIN = """model chain {
@@ -142,27 +144,27 @@ def test_inertias_that_move_and_join_coordinates(tmp_path, n):
         rows = rows_of(compile_network(net, "hamiltonian").form)
         names = [c.name for c in net.coordinates]
         q, f, p = ([x.var(name, kind) for name in names] for kind in "qfp")
-        inertia = [x.derivative(x.derivative(whole, a), b) for a in f for b in f]
+        inertia = [derivative(derivative(whole, a), b) for a in f for b in f]
         random = np.random.default_rng(n)
         at = dict(zip(q, random.uniform(-3.0, 3.0, n), strict=True)) | {x.param("m"): 1.3, x.param("l"): 0.5}
-        matrix = np.reshape(x.evaluate(inertia, at.__getitem__), (n, n))
+        matrix = np.reshape(evaluate(inertia, at.__getitem__), (n, n))
         momenta = random.normal(size=n)
         flows = np.linalg.solve(matrix, momenta)
         at |= dict(zip(f, flows, strict=True)) | dict(zip(p, momenta, strict=True))
-        slopes = x.evaluate([x.derivative(rows["momentum", a], b) for a in names for b in f], at.__getitem__)
+        slopes = evaluate([derivative(rows["momentum", a], b) for a in names for b in f], at.__getitem__)
         solved = n <= COUPLED
         assert np.reshape(slopes, (n, n)) == pytest.approx(-np.eye(n) if solved else -matrix, abs=1e-13)
-        assert x.evaluate([rows["momentum", a] for a in names], at.__getitem__) == pytest.approx([0.0] * n, abs=1e-12)
+        assert evaluate([rows["momentum", a] for a in names], at.__getitem__) == pytest.approx([0.0] * n, abs=1e-12)
         pull = [x.sub(x.var(a, "p", order=1), rows["dynamics", a]) for a in names]
-        wanted = [x.add(x.derivative(whole, a), x.derivative(potential(net), a)) for a in q]
+        wanted = [x.add(derivative(whole, a), derivative(potential(net), a)) for a in q]
         still = dict.fromkeys((x.var(a, "p", order=1) for a in names), 0.0)
-        found = x.evaluate(pull, (at | still).__getitem__)
-        assert found == pytest.approx(x.evaluate(wanted, at.__getitem__), rel=1e-11)
+        found = evaluate(pull, (at | still).__getitem__)
+        assert found == pytest.approx(evaluate(wanted, at.__getitem__), rel=1e-11)
         rates = {x.var(a, k, order=1): v for k in "fp" for a, v in zip(names, random.normal(size=n), strict=True)}
         moving = at | rates | {x.var(a, "q", order=1): v for a, v in zip(names, flows, strict=True)}
-        total = [x.time_derivative(rows["momentum", a]) for a in names]
-        given = x.evaluate([rows["momentum_rate", a] for a in names], moving.__getitem__)
-        assert given == pytest.approx(x.evaluate(total, moving.__getitem__), rel=1e-10, abs=1e-11)
+        total = [time_derivative(rows["momentum", a]) for a in names]
+        given = evaluate([rows["momentum_rate", a] for a in names], moving.__getitem__)
+        assert given == pytest.approx(evaluate(total, moving.__getitem__), rel=1e-10, abs=1e-11)
 
 
 def potential(net):
@@ -177,4 +179,4 @@ def test_an_inertia_that_a_binding_makes_singular_is_guarded(tmp_path):
         _, rests = transformed(energies(net), net.parameters)
         assert [r.name for r in rests] == ["a0", "a1", "a2"]
         at = {x.param("m"): 1.0, x.param("l"): 0.5}
-        assert all(value != 0.0 for value in x.evaluate([r.expression for r in rests], at.__getitem__))
+        assert all(value != 0.0 for value in evaluate([r.expression for r in rests], at.__getitem__))

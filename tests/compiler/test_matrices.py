@@ -13,6 +13,7 @@ from sysdyn.compiler.forms.speeds import speeds_of
 from sysdyn.compiler.model.energies import Quantity, energies
 from sysdyn.compiler.network.primal.symbolic import Algebra
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Constraint, Energy
 from sysdyn.dsl.text.diagnostics import ModelError
 
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def value(node, **known):
-    return x.evaluate([node], lambda leaf: known[leaf.data if leaf.op == "param" else leaf.data[0]])[0]
+    return evaluate([node], lambda leaf: known[leaf.data if leaf.op == "param" else leaf.data[0]])[0]
 
 
 def matrix(rows):

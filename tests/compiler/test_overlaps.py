@@ -6,6 +6,7 @@ from chains import blank
 from sysdyn.compiler.network.primal.bounds import Sizes
 from sysdyn.compiler.network.primal.overlaps import initially, meeting, narrowed, ranges_of, untold
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Initial, Loop
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -29,7 +30,7 @@ def test_a_value_holds_where_its_elements_are_and_zero_elsewhere():
     statements = [said([i], x.mul(x.const(2), i), over("i", 3, 5)), said([x.const(8)], x.const(7))]
     at = [x.add(k, x.const(1))]
     found = initially(statements, at, within, sizes)
-    values = [x.evaluate([found], {k: float(here)}.get)[0] for here in range(10)]
+    values = [evaluate([found], {k: float(here)}.get)[0] for here in range(10)]
     assert values == [0, 0, 6, 8, 10, 0, 0, 7, 0, 0]
     assert [whole(rest)["k"] for rest in untold(statements, at, within, sizes)] == [(0, 1), (5, 6), (8, 9)]
     assert initially(statements, [x.add(k, x.const(20))], within, sizes) is None

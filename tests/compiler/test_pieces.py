@@ -20,6 +20,7 @@ from sysdyn.compiler.network.primal import primal
 from sysdyn.compiler.network.primal.account import Step
 from sysdyn.compiler.program.formulas import canonical
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Energy, Initial, Loop, Observation
 from sysdyn.dsl.model.rewriting import TRACED, expressions, nodes_read, rewritten
 from sysdyn.dsl.text.diagnostics import Diagnostic, SourceText
@@ -100,7 +101,7 @@ def test_a_guess_misses_what_its_row_does_not_meet():
     add_initials(made, model(), frozenset(), (written, content, held))
     rows = [row.expression for block in made.blocks() for row in block.kernels[0].rows]
     at = {var("a", "f"): 1.0, var("b", "f"): 3.0, var("#init 0", "slack"): 2.0, var("#init 1", "unsaid"): 3.5}
-    assert x.evaluate(rows, at.get) == [0.0, 0.5, 4.0]
+    assert evaluate(rows, at.get) == [0.0, 0.5, 4.0]
     assert [(r.label, r.content) for r in made.rows] == [("initial", False), ("C", True), ("initial", False)]
 
 
@@ -112,7 +113,7 @@ def test_the_total_rate_takes_rates_of_multipliers_along():
     q, f, kappa = var("a", "q"), var("a", "f"), var("rod", "kappa")
     found = total_rate(x.add(x.mul(q, f), kappa))
     at = {q: 2.0, f: 3.0, var("a", "f", 1): 5.0, var("rod", "kappa", 1): 7.0}
-    assert x.evaluate([found], at.get) == [26.0]
+    assert evaluate([found], at.get) == [26.0]
 
 
 def test_a_family_as_a_whole():
@@ -135,7 +136,7 @@ def test_a_flow_constraint_of_constant_coefficients_on_a_tangible_coordinate_is_
     (row,), (offset,) = found.rows, found.offsets
     assert (row.kind, offset.label) == ("phi", "gear")
     at = {var("a", "q"): 5.0, var("b", "q"): 1.0, x.time(): 2.0, x.param("#offset gear"): 8.0}
-    assert x.evaluate([x.add(*(t.expression for t in row.terms))], at.get) == [1.0]
+    assert evaluate([x.add(*(t.expression for t in row.terms))], at.get) == [1.0]
     assert note.code == "N501"
 
 

@@ -8,6 +8,7 @@ from networks import TRANSLATION, Net, of
 from sysdyn.compiler.network.positions import from_stores, with_positions
 from sysdyn.compiler.network.quadratures import with_quadratures
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Initial
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -31,7 +32,7 @@ def rows(*said, **parts):
     told = [(i.target.data[0], i.fixed, i.value.data) for i in found.initials if not i.store]
 
     def missed(**at):
-        return x.evaluate(apart, lambda n: at[n.data[0].partition(".")[0]])
+        return evaluate(apart, lambda n: at[n.data[0].partition(".")[0]])
 
     return [p.name for p in found.positions], missed, told
 
@@ -77,10 +78,10 @@ def test_a_quadrature_begins_at_its_position():
     network, wanted = with_quadratures(triangle(observe={"b": of("b", "nq")}))
     found = with_positions(network, wanted)
     (row,) = (i.target for i in found.initials if i.store == "b")
-    assert x.evaluate([row], {of("b.q", "s"): 2.0, x.var("b.start", "start"): 1.5}.get) == [0.5]
+    assert evaluate([row], {of("b.q", "s"): 2.0, x.var("b.start", "start"): 1.5}.get) == [0.5]
 
 
 def test_a_traced_position_is_that_of_springs_to_the_ground():
     """By s and t as well as by u: the first springs make the forest."""
     read = from_stores(triangle(observe={"b": of("b", "nq")})).observations[0].expression
-    assert x.evaluate([read], {of("s", "bq"): 1.0, of("t", "bq"): 0.5, of("u", "bq"): 1.5}.get) == [1.5]
+    assert evaluate([read], {of("s", "bq"): 1.0, of("t", "bq"): 0.5, of("u", "bq"): 1.5}.get) == [1.5]

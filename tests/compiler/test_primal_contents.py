@@ -5,6 +5,7 @@ import pytest
 from networks import ELECTRICAL, HYDRAULIC, TRANSLATION, Net, compiled, of, solve
 from sysdyn.compiler.network.primal import primal
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Loop
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -39,7 +40,7 @@ def said(network):
 
 
 def number(node, **values):
-    return x.evaluate([node], lambda n: values[n.data])[0]
+    return evaluate([node], lambda n: values[n.data])[0]
 
 
 def test_stores_in_series_keep_their_own_contents(tmp_path):

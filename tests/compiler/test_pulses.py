@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.running import Request, ready
+from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.running import ready
 from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report

@@ -7,6 +7,7 @@ from sysdyn.compiler.forms.conjugates import signed
 from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates
 from sysdyn.compiler.model.energies import energies
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Energy
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -38,7 +39,7 @@ def model(**functions):
 def value(made, name, **known):
     """The sum of a state function's terms."""
     roots = [t.expression for t in made.function(name)]
-    return sum(x.evaluate(roots, lambda leaf: known[leaf.data[1] + leaf.data[0]]))
+    return sum(evaluate(roots, lambda leaf: known[leaf.data[1] + leaf.data[0]]))
 
 
 TIED = quadratic((2.0, f("a"), f("b")), (3.0, f("b"), f("c")))

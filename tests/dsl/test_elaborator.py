@@ -10,6 +10,7 @@ from sysdyn.dsl.elaborate.instances import BUILTINS
 from sysdyn.dsl.elaborate.parts import NetworkBuilder, declared, flatten
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
 from sysdyn.dsl.names.symbols import NodeSymbol, ParameterSymbol
 from sysdyn.dsl.text.diagnostics import Report
@@ -69,7 +70,7 @@ def test_elements_make_branches_between_the_ends_that_the_text_says():
         assert (b.plus.node, b.minus.node) == ("x", None)
     assert said == []
     # the component's own parameter stands under the instance
-    assert ex.to_text(elaborator.parts.parameters["K.k"].values[0]) == "4"
+    assert to_text(elaborator.parts.parameters["K.k"].values[0]) == "4"
     assert branches["K"].law is ex.mul(ex.param("K.k"), ex.var("K", "bq"))
 
 

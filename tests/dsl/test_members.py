@@ -7,12 +7,14 @@ import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Energy
 from sysdyn.dsl.model.units import NONE
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
-from sysdyn.dsl.names.members import Members, ledger, reaction
+from sysdyn.dsl.names.members import Members
 from sysdyn.dsl.names.names import STATICS, Names, pick
+from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import Typed, Vector
 from sysdyn.dsl.rules import laws
 from sysdyn.dsl.text.diagnostics import Report, SourceText
@@ -184,7 +186,7 @@ def test_a_list_has_the_elements_between_its_bounds(read):
     assert read("w[1] + 2*w[2]") == ("w[1] + 2*w[2]", "dimensionless")
     vector = Vector(tuple(Typed(ex.const(v), NONE) for v in (10.0, 20.0, 30.0)), 2)
     picked = pick(vector, (ex.index("i"),)).node
-    assert [ex.evaluate([picked], lambda _, k=k: k)[0] for k in (2.0, 3.0, 4.0)] == [10.0, 20.0, 30.0]
+    assert [evaluate([picked], lambda _, k=k: k)[0] for k in (2.0, 3.0, 4.0)] == [10.0, 20.0, 30.0]
 
 
 def test_a_unit_that_looks_like_a_division_is_told(read):
@@ -230,7 +232,7 @@ def test_the_effort_of_a_constraint_along_a_displacement(read, residual, holonom
         row, along = (read.context.resolve(item.expr).node for item in scene.body[0].items)
     found = reaction(row, holonomic, along, ex.param("multiplier"))
     at = {"x": 3.0, "y": 7.0}
-    value = ex.evaluate([found], lambda n: 11.0 if n.op == "param" else at[n.data[0]])[0]
+    value = evaluate([found], lambda n: 11.0 if n.op == "param" else at[n.data[0]])[0]
     assert value == pytest.approx(expected, rel=1e-15)
 
 

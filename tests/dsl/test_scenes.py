@@ -9,6 +9,7 @@ from sysdyn.dsl.elaborate.scenes import SceneReader
 from sysdyn.dsl.elaborate.unit_variables import _solved
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.units import NONE, known, multiply, raised
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
@@ -46,7 +47,7 @@ def read(body):
 def test_instants_and_steps_are_in_seconds():
     scene, _, said = read("time 500 ms to 2 min\ntrace x.q every 10 ms\nsolver bdf(order = 3, step = 1 ms)")
     assert said == []
-    assert [ex.evaluate([n], {}.__getitem__)[0] for n in (scene.start, scene.end, scene.every)] == [0.5, 120.0, 0.01]
+    assert [evaluate([n], {}.__getitem__)[0] for n in (scene.start, scene.end, scene.every)] == [0.5, 120.0, 0.01]
     assert (scene.solver, [(name, n.data) for name, n in scene.solver_options]) == (
         "bdf", [("order", 3.0), ("step", 1e-3)],
     )  # fmt: skip
@@ -68,7 +69,7 @@ def test_a_quantity_is_traced_in_its_unit_under_its_name():
     at = {ex.var("x", "nq"): 2.0, ex.var("x", "nf"): 10.0, ex.var("S", "be"): 6.0}
     found = {o.name: (o.unit.text, o.expression) for o in reader.observations}
     assert {name: unit for name, (unit, _) in found.items()} == {"x.q": "m", "v": "km/h", "power": "kW"}
-    shown = ex.evaluate([node for _, node in found.values()], lambda n: at[n])
+    shown = evaluate([node for _, node in found.values()], lambda n: at[n])
     assert shown == pytest.approx([2.0, 36.0, 0.06], rel=1e-15)
 
 

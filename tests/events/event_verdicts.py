@@ -9,7 +9,8 @@ import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from sysdyn.cli.run.running import Request, run
+from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 
 LONGEST = 60

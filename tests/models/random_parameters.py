@@ -18,6 +18,7 @@ from sysdyn.cli.run import targets
 from sysdyn.cli.run.sizes import sizes
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -50,7 +51,7 @@ def drawn(network: Network, name: str, number: int) -> tuple[str, ...]:
         own = len(p.values) == 1 and not p.shape and not ex.variables(p.values[0])
         if not own or p.whole or any(n.op == "param" for n in ex.topological(p.values)):
             continue
-        (value,) = ex.evaluate([p.values[0]], lambda node: math.nan)
+        (value,) = evaluate([p.values[0]], lambda node: math.nan)
         if value and math.isfinite(value):
             factor = math.exp(draw.uniform(math.log(LEAST), math.log(MOST)))
             found.append(f"{p.name}={value * factor!r}")

@@ -13,12 +13,14 @@ from model_runs import trace_of
 from reduced import ROOT, load
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
-from sysdyn.cli.run.running import Request
+from sysdyn.cli.run.asked import Request
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import BESIDE
 from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.dimensions import ENERGY, POWER
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.units import multiply
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.structure.structure import structure
@@ -151,8 +153,8 @@ def test_08_legendre_transformation():
     energy = ex.add(*(t.expression for t in hamilton.functions.function("T")))
     look = {repr(k): v for k, v in at.items()}
     x = ex.var("q2", "q")
-    roots = [coenergy, energy, ex.derivative(coenergy, _own(coenergy, x)), ex.derivative(energy, _own(energy, x))]
-    tstar, t, pull, back = ex.evaluate(roots, lambda n: look[repr(n)])
+    roots = [coenergy, energy, derivative(coenergy, _own(coenergy, x)), derivative(energy, _own(energy, x))]
+    tstar, t, pull, back = evaluate(roots, lambda n: look[repr(n)])
     assert tstar + t == pytest.approx(sum(values[f"p{k}"] * values[f"f{k}"] for k in (1, 2)), rel=1e-12)
     assert pull == pytest.approx(-back, rel=1e-12)
 

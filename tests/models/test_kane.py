@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from reduced import ROOT, load
 from sysdyn.cli.main import run as main
-from sysdyn.cli.run.running import Request, run
+from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
 

@@ -19,8 +19,9 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.cli.run import module_check, running, targets
+from sysdyn.cli.run.asked import Request, options_of
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Request, integrate, options_of, ready
+from sysdyn.cli.run.running import integrate, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.program import build
 from sysdyn.dsl.model import expression as ex

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from sysdyn.runtime.condense.composition import composed
+from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -33,3 +34,35 @@ def test_no_sums_at_all():
     found = composed(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     assert found.start.tolist() == [0]
     assert not found.values(np.zeros(0)).size
+
+
+def numbers(factor):
+    """e0 = 1 + 2 z0, e1 = 3 e0 - z1 of the unknowns (z0, e0, z1, e1), with the factor in place of 3."""
+    return Sums(
+        place=np.array([1, 3]),
+        constant=np.array([1.0, 0.0]),
+        start=np.array([0, 1, 3]),
+        source=np.array([0, 1, 2]),
+        factor=np.array([2.0, factor, -1.0]),
+        kept=np.array([0, 2], dtype=np.int32),
+        unread=np.zeros(0, dtype=np.int64),
+    )
+
+
+def test_numbers_of_sums_are_composed_of_what_is_kept():
+    """e1 = 3 (1 + 2 z0) - z1: by z, 6 and -1."""
+    of = numbers(3.0)
+    found = of.composed(4)
+    full = np.zeros((2, 2))
+    full[np.repeat([0, 1], np.diff(found.start)), found.source] = found.values(of.factor)
+    assert full.tolist() == [[2.0, 0.0], [6.0, -1.0]]
+    assert of.same(numbers(3.0))
+    assert not of.same(numbers(np.nextafter(3.0, 4.0)))
+    assert numbers_of(4, of.kept).tolist() == [0, -1, 1, -1]
+
+
+def test_stretches_of_sums_are_renewed_with_their_numbers():
+    """Two sums of unlike numbers of terms are two stretches; a constant that vanishes is not added."""
+    made = Straights(numbers(3.0))
+    made.renew(numbers(3.0))
+    assert [(s.place, s.number, s.terms, bool(s.constant)) for s in made.array] == [(1, 1, 1, True), (3, 1, 2, False)]

@@ -15,7 +15,8 @@ from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.trace.trace import Column, Layout, Parameter, Trace, TraceWriter
+from sysdyn.runtime.trace.trace import Column, Layout, Parameter, Trace
+from sysdyn.runtime.trace.writing import TraceWriter
 
 HERE = Path(__file__).parent
 
@@ -80,7 +81,8 @@ LIMITED = """
 import resource, signal, sys
 import numpy as np
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.trace import Column, Layout, TraceWriter
+from sysdyn.runtime.trace.trace import Column, Layout
+from sysdyn.runtime.trace.writing import TraceWriter
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 writer = TraceWriter(sys.argv[1], Layout((Column("x", 0, "m", "x", False),), 1, {"model": "m"}, ()))
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
@@ -121,11 +123,11 @@ ENDLESS = """
 import sys
 sys.path.insert(0, {here!r})
 import small_models as models
-from sysdyn.runtime.trace import trace
+from sysdyn.runtime.trace import writing
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.simulate import simulate
-trace.FLUSH_SECONDS = {flush}
+writing.FLUSH_SECONDS = {flush}
 manifest, binding, module = models.mass_spring()
 print("begin", flush=True)
 simulate(manifest, binding, load(module), Options({path!r}, 0.0, 1e9, every=None, rtol=1e-6))

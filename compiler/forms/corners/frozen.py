@@ -30,6 +30,7 @@ from sysdyn.compiler.forms.descriptor import (
 )
 from sysdyn.compiler.forms.steepness import magnitude
 from sysdyn.compiler.model.mirror import lettered
+from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -37,7 +38,6 @@ from sysdyn.dsl.model.expression import (
     compare,
     conditional,
     const,
-    derivative,
     either,
     is_const,
     linear,
@@ -46,7 +46,6 @@ from sysdyn.dsl.model.expression import (
     param,
     rebuild,
     sub,
-    time_derivative,
     topological,
     var,
 )

@@ -19,18 +19,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.dsl.model.expression import (
-    Node,
-    compare,
-    const,
-    derivative,
-    evaluate,
-    neg,
-    rebuild,
-    sub,
-    topological,
-    variables,
-)
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.expression import Node, compare, const, neg, rebuild, sub, topological, variables
 from sysdyn.values import dataclass
 
 JUDGED = ("dynamics", "phi_reaction", "psi_reaction", "momentum", "phi", "psi", "gamma", "lambda")

@@ -22,19 +22,16 @@ from sysdyn.compiler.forms.meters.ledgers import POWERS, STORED, Element, Entry,
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.magnitudes import rounding
 from sysdyn.compiler.model.terms import Term, counter, local_variables
+from sysdyn.dsl.model.calculus import derivative, differential, rate, signals_held
 from sysdyn.dsl.model.expression import (
     Node,
     add,
     call,
     const,
-    derivative,
-    differential,
     is_const,
     mul,
     neg,
-    rate,
     scale,
-    signals_held,
     sub,
     substitute,
     topological,

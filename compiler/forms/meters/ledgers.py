@@ -19,7 +19,8 @@ from typing import TypeVar
 from sysdyn.compiler.forms.efforts import Effort
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, local_variables, summands
-from sysdyn.dsl.model.expression import Node, add, const, derivative, is_const, scale, var, variables
+from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.expression import Node, add, const, is_const, scale, var, variables
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass

@@ -14,7 +14,8 @@ from sysdyn.compiler.forms.efforts import acting, effort
 from sysdyn.compiler.forms.momenta import resolve
 from sysdyn.compiler.model.energies import EnergyModel, Target
 from sysdyn.compiler.model.terms import counter, local_variables, split, without_nested
-from sysdyn.dsl.model.expression import Node, add, call, const, sub, substitute, time_derivative, var, variables
+from sysdyn.dsl.model.calculus import time_derivative
+from sysdyn.dsl.model.expression import Node, add, call, const, sub, substitute, var, variables
 from sysdyn.values import dataclass
 
 TURNED = ("kinetic", "potential", "dissipated", "supplied")

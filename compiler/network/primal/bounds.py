@@ -9,7 +9,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterator, Sequence
 
-from sysdyn.dsl.model.expression import Node, add, const, evaluate, index, param, sub, substitute, to_text
+from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.expression import Node, add, const, index, param, sub, substitute
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Network, Parameter, Shape
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 from sysdyn.values import dataclass

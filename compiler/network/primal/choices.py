@@ -12,19 +12,8 @@ import numpy as np
 from sysdyn.compiler.network.primal.integrals import Rests, antiderivative, line, polynomial
 from sysdyn.compiler.network.primal.inverses import Inverse, inverse
 from sysdyn.compiler.network.primal.slopes import Slopes
-from sysdyn.dsl.model.expression import (
-    Node,
-    const,
-    is_const,
-    mul,
-    param,
-    sub,
-    substitute,
-    to_text,
-    topological,
-    var,
-    variables,
-)
+from sysdyn.dsl.model.expression import Node, const, is_const, mul, param, sub, substitute, topological, var, variables
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Branch, Table
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError

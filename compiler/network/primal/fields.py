@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.model.terms import counter, terms
 from sysdyn.compiler.network.primal.incidence import Element
+from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -19,14 +20,12 @@ from sysdyn.dsl.model.expression import (
     compare,
     conditional,
     const,
-    derivative,
     index,
     is_const,
     mul,
     neg,
     reduction,
     substitute,
-    time_derivative,
     var,
     variables,
 )

@@ -26,12 +26,12 @@ from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import Value, evaluate
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
 from sysdyn.compiler.network.primal.slopes import Slopes
+from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
     call,
     const,
-    derivative,
     div,
     is_const,
     linear,

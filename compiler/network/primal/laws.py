@@ -23,21 +23,9 @@ from sysdyn.compiler.network.primal.fields import field_quantities
 from sysdyn.compiler.network.primal.incidence import Element
 from sysdyn.compiler.network.primal.reading import FUNCTIONS
 from sysdyn.compiler.network.primal.slopes import Slopes
+from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.dimensions import ENERGY as ENERGY_DIMENSION
-from sysdyn.dsl.model.expression import (
-    Node,
-    add,
-    const,
-    derivative,
-    index,
-    mul,
-    neg,
-    sub,
-    substitute,
-    time_derivative,
-    var,
-    variables,
-)
+from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, sub, substitute, var, variables
 from sysdyn.dsl.model.network import (
     Constraint,
     Coupling,

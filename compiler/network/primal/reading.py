@@ -15,6 +15,7 @@ from typing import TypeVar
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Picked, Sizes, box_holds
 from sysdyn.compiler.network.primal.incidence import Contact, Element, unrolled
 from sysdyn.compiler.network.primal.series import Member
+from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -29,13 +30,12 @@ from sysdyn.dsl.model.expression import (
     scale,
     sub,
     substitute,
-    time_derivative,
-    to_text,
     topological,
     topological_unbound,
     var,
     variables,
 )
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES, STATE_FUNCTIONS
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place

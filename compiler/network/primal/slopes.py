@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import over
 from sysdyn.compiler.model.parameters import Parameters
-from sysdyn.dsl.model.expression import Node, is_const, to_text, variables
+from sysdyn.dsl.model.expression import Node, is_const, variables
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Branch, Network, Slope
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 

@@ -1,0 +1,206 @@
+"""Derivatives of expressions: by unknowns, along directions, by time.
+
+Forward over the nodes in topological order, d f(a, b, ...) = f_a da + f_b db + ...; nothing recurses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    call,
+    compare,
+    conditional,
+    const,
+    div,
+    linear,
+    mul,
+    neg,
+    ordered_variables,
+    param,
+    power,
+    product,
+    rebuild,
+    reduction,
+    sub,
+    substitute,
+    table,
+    topological,
+    var,
+    variables,
+)
+from sysdyn.dsl.model.expression_text import to_text
+
+_ONE_ARGUMENT: Mapping[str, Callable[[Node], Node]] = {
+    "signal": lambda x: const(1.0),
+    "sin": lambda x: call("cos", x),
+    "cos": lambda x: neg(call("sin", x)),
+    "tan": lambda x: linear(1.0, ((1.0, product(1.0, ((2.0, call("tan", x)),))),)),
+    "asin": lambda x: product(1.0, ((-0.5, sub(const(1.0), mul(x, x))),)),
+    "acos": lambda x: product(-1.0, ((-0.5, sub(const(1.0), mul(x, x))),)),
+    "atan": lambda x: product(1.0, ((-1.0, add(const(1.0), mul(x, x))),)),
+    "sinh": lambda x: call("cosh", x),
+    "cosh": lambda x: call("sinh", x),
+    "tanh": lambda x: sub(const(1.0), product(1.0, ((2.0, call("tanh", x)),))),
+    "asinh": lambda x: product(1.0, ((-0.5, add(const(1.0), mul(x, x))),)),
+    "acosh": lambda x: product(1.0, ((-0.5, sub(mul(x, x), const(1.0))),)),
+    "atanh": lambda x: product(1.0, ((-1.0, sub(const(1.0), mul(x, x))),)),
+    "exp": lambda x: call("exp", x),
+    "ln": lambda x: product(1.0, ((-1.0, x),)),
+    "log10": lambda x: product(1.0 / math.log(10.0), ((-1.0, x),)),
+    "abs": lambda x: call("sign", x),
+    "sign": lambda x: const(0.0),
+    "setsign": lambda x: const(0.0),
+    "floor": lambda x: const(0.0),
+    "ceil": lambda x: const(0.0),
+    "step": lambda x: const(0.0),
+}
+
+
+def _call_partials(node: Node) -> tuple[Node, ...]:
+    """Partial derivatives of a call by each argument."""
+    name, args = node.data, node.args
+    if name in _ONE_ARGUMENT:
+        return (_ONE_ARGUMENT[name](args[0]),)
+    a, b = args
+    match name:
+        case "atan2":
+            square = add(mul(a, a), mul(b, b))
+            return div(b, square), neg(div(a, square))
+        case "hypot":
+            return div(a, node), div(b, node)
+        case "mod":
+            return const(1.0), neg(call("floor", div(a, b)))
+        case "min" | "max":
+            first = compare("<=" if name == "min" else ">=", a, b)
+            return conditional(first, const(1.0), const(0.0)), conditional(first, const(0.0), const(1.0))
+    raise AssertionError(name)
+
+
+def _chain(node: Node, dots: Sequence[Node]) -> Node:
+    """The differential of a node from those of its arguments (some are zero)."""
+    zero = const(0.0)
+    match node.op:
+        case "sum":
+            return linear(0.0, zip(node.data[1], dots, strict=True))
+        case "mul":
+            parts: list[tuple[float, Node]] = []
+            for k, dot in enumerate(dots):
+                if dot is not zero:
+                    factors = [(e - (j == k), a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True))]
+                    parts.append((node.data[k], product(1.0, [*factors, (1.0, dot)])))
+            return linear(0.0, parts)
+        case "pow":
+            base, exponent = node.args
+            return add(
+                mul(exponent, power(base, linear(-1.0, ((1.0, exponent),))), dots[0]) if dots[0] is not zero else zero,
+                mul(node, call("ln", base), dots[1]) if dots[1] is not zero else zero,
+            )
+        case "call":
+            return add(*(mul(p, d) for p, d in zip(_call_partials(node), dots, strict=True) if d is not zero))
+        case "cond":
+            return conditional(node.args[0], dots[1], dots[2])
+        case "table":
+            if len(node.args) > 1:
+                orders = node.data[1] or (0,) * len(node.args)
+                return add(
+                    *(
+                        mul(table(node.data[0], *node.args, order=_raised(orders, k)), d)
+                        for k, d in enumerate(dots)
+                        if d is not zero
+                    )
+                )
+            return mul(table(node.data[0], *node.args, order=node.data[1] + 1), dots[0])
+        case "reduce":
+            operator, name = node.data
+            if operator == "sum":
+                return reduction("sum", name, node.args[0], node.args[1], dots[2])
+            raise ValueError(f"the derivative of {operator}(... in ...) is not defined")
+    raise AssertionError(node.op)
+
+
+def _raised(orders: tuple[int, ...], k: int) -> tuple[int, ...]:
+    return tuple(o + (j == k) for j, o in enumerate(orders))
+
+
+def differential(root: Node, seeds: Mapping[Node, Node]) -> Node:
+    """Directional derivative of root: each key of seeds (a var, param, index or time node) moves at its value."""
+    zero = const(0.0)
+    wanted = frozenset(seeds)
+    dots: dict[Node, Node] = {}
+    variables(root)
+    for node in topological([root]):
+        if node in wanted:
+            dots[node] = seeds[node]
+        elif not node.args or node.op in ("var", "param", "cmp", "and", "or", "not"):
+            dots[node] = zero
+        else:
+            inner = [dots[a] for a in node.args]
+            dots[node] = zero if all(d is zero for d in inner) else _chain(node, inner)
+    return dots[root]
+
+
+def partials(node: Node) -> tuple[Node, ...]:
+    """Derivatives of a node by each of its arguments."""
+    one, zero = const(1.0), const(0.0)
+    return tuple(_chain(node, [one if j == k else zero for j in range(len(node.args))]) for k in range(len(node.args)))
+
+
+def derivative(root: Node, by: Node) -> Node:
+    """Partial derivative of root by one node, all other unknowns held."""
+    if by not in variables(root) and by.op in ("var", "time"):
+        return const(0.0)
+    if root.op == "sum" and by in root.args and not any(a.args for a in root.args):
+        return const(root.data[1][root.args.index(by)])
+    if root.op == "mul" and by in root.args and not any(a.args for a in root.args):
+        return _chain(root, [const(1.0 if a is by else 0.0) for a in root.args])
+    return differential(root, {by: const(1.0)})
+
+
+def gradient(root: Node, by: Sequence[Node]) -> tuple[Node, ...]:
+    """Partial derivatives of root by each of the nodes."""
+    return tuple(derivative(root, b) for b in by)
+
+
+def rate(node: Node) -> Node | None:
+    """What an unknown's time derivative is called: q' = f, others yd; None where it has none (multipliers)."""
+    if node.op == "time":
+        return const(1.0)
+    family, kind, order = node.data
+    if order or kind in ("kappa", "mu", "audit", "ne"):
+        return None
+    if kind in ("q", "nq", "bq"):  # coordinates, nodes, branches: the rate of a displacement is the flow
+        return var(family, kind[:-1] + "f", *node.args)
+    return var(family, kind, *node.args, order=1)
+
+
+def time_derivative(root: Node) -> Node:
+    """Total derivative by t; ValueError names an unknown whose derivative is not among the variables."""
+    seeds: dict[Node, Node] = {}
+    for node in ordered_variables(root):
+        dot = rate(node)
+        if dot is None:
+            raise ValueError(to_text(node))
+        seeds[node] = dot
+    return differential(root, seeds)
+
+
+def signals_held(root: Node) -> tuple[Node, dict[Node, Node]]:
+    """Root with an opaque parameter for each signal, and what puts the signals back."""
+    found = [n for n in topological([root]) if n.op == "call" and n.data == "signal"]
+    change = {node: param(f"#signal {k}") for k, node in enumerate(found)}
+    return (substitute(root, change), {new: old for old, new in change.items()}) if found else (root, {})
+
+
+def without_signals(root: Node) -> Node:
+    """Root with signals as plain values."""
+    done: dict[Node, Node] = {}
+    if not any(n.op == "call" and n.data == "signal" for n in topological([root])):
+        return root
+    for node in topological([root]):
+        marked = node.op == "call" and node.data == "signal"
+        done[node] = done[node.args[0]] if marked else rebuild(node, tuple(done[a] for a in node.args))
+    return done[root]

@@ -1,0 +1,130 @@
+"""Paths: `x.f`, `M.La.q`, `X[i].cell.e` are followed from left to right through instances, bundles and ports.
+
+An instance's inside is written with the loop variables of its label; from outside they are replaced by the indices
+given.
+"""
+
+from __future__ import annotations
+
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.names.context import Use, Value
+from sysdyn.dsl.names.failures import Failed, Part, SeveralError
+from sysdyn.dsl.names.names import Names
+from sysdyn.dsl.names.symbols import BundleNode, InstanceSymbol, Space, Symbol, Typed, Vector
+from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A symbol at the end of a path.
+
+    indices: own indices as written; change: loop variables of the instances on the way -> the indices given there.
+    """
+
+    symbol: Symbol
+    indices: tuple[syntax.Index, ...]
+    change: dict[Node, Node]
+
+
+class Paths(Names):
+    """What a path leads to, and values of what lies inside instances."""
+
+    def located(self, e: syntax.Expr) -> Located | None:
+        """The symbol that a path leads to; None where it leads to a quantity or is no path."""
+        match e:
+            case syntax.Name():
+                if e.name in self._bound:
+                    return None
+                symbol = self.scope.find(e.name)
+                return None if symbol is None else Located(symbol, (), {})
+            case syntax.Item():
+                base = self.located(e.base)
+                return None if base is None or base.indices else Located(base.symbol, e.indices, base.change)
+            case syntax.Member():
+                base = self.located(e.base)
+                return None if base is None else self._inside(base, e)
+        return None
+
+    def _inside(self, base: Located, e: syntax.Member) -> Located | None:
+        """What `base.name` stands for where base is a bundle or an instance; None where it has no such member."""
+        symbol = base.symbol
+        if isinstance(symbol, BundleNode):
+            member = symbol.members.get(e.name)
+            return None if member is None else Located(member, base.indices, base.change)
+        if isinstance(symbol, InstanceSymbol):
+            space, change = self.entered(symbol, base, e.base.span)
+            inner = space.scope.symbols.get(e.name)
+            return None if inner is None else Located(inner, (), change)
+        return None
+
+    def entered(self, symbol: InstanceSymbol, base: Located, span: syntax.Span) -> tuple[Space, dict[Node, Node]]:
+        """The space of an instance under the indices given."""
+        if not symbol.spaces:
+            self.awaken(symbol)
+        if not symbol.spaces:
+            raise Failed
+        count = len(symbol.spaces[0].around) - len(base.change)
+        if len(base.indices) != count:
+            raise self.index_count(symbol.name, count, len(base.indices), span)
+        at = tuple(self.index(i) for i in base.indices)
+        fitting = [s for s in symbol.spaces if _may_hold(s, at)]
+        if not fitting:
+            raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
+        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at)
+        self._remember(symbol, space, base, at, count)
+        own = space.prefix[len(space.prefix) - count :]
+        change = dict(base.change)
+        change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
+        return space, change
+
+    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...]) -> Space:
+        """The statement of a label that an element comes from; SeveralError where a loop runs over several."""
+        chosen = self.chosen.get((id(symbol), at))
+        if chosen is not None:
+            return chosen
+        for k, a in enumerate(at):
+            loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
+            ranges = [s.around[len(s.around) - len(at) + k] for s in spaces]
+            if loop is not None and len(set(ranges)) > 1:
+                offset = ex.sub(a, loop)
+                parts = (Part(s, *(ex.sub(b, offset) for b in r)) for s, r in zip(spaces, ranges, strict=True))
+                raise SeveralError(symbol.name, (id(symbol), at), loop.data, tuple(parts))
+        inside = [s for s in spaces if _holds(s, at)]
+        return (inside or spaces)[0]
+
+    def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
+        shape = space.around[len(space.around) - count :]
+        if len(symbol.spaces) == 1:
+            for node, bounds, index in zip(at, shape, base.indices, strict=True):
+                self.uses.append(Use(bounds, node, self.loops, symbol.name, self.place(index.span)))
+
+    def _changed(self, value: Value, change: dict[Node, Node]) -> Value:
+        if not change:
+            return value
+        if isinstance(value, Vector):
+            return Vector(tuple(Typed(ex.substitute(v.node, change), v.dimension) for v in value.items), value.first)
+        return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
+
+
+def _gaps(space: Space, at: tuple[Node, ...]) -> list[Node]:
+    """How far fixed indices lie behind the first and before the last element of a statement."""
+    ranges = space.around[len(space.around) - len(at) :]
+    found = []
+    for a, (first, last) in zip(at, ranges, strict=True):
+        if all(n.op != "index" for n in ex.topological([a])):
+            found += [ex.sub(a, first), ex.sub(last, a)]
+    return found
+
+
+def _may_hold(space: Space, at: tuple[Node, ...]) -> bool:
+    """Whether no index lies outside a statement's range for certain."""
+    own = space.prefix[len(space.prefix) - len(at) :]
+    fits = all(o.op == "index" or o is a or a.op != "const" for o, a in zip(own, at, strict=True))
+    return fits and not any(ex.is_const(gap) and gap.data < 0 for gap in _gaps(space, at))
+
+
+def _holds(space: Space, at: tuple[Node, ...]) -> bool:
+    """Whether every index lies inside a statement's range for certain."""
+    return all(ex.is_const(gap) and gap.data >= 0 for gap in _gaps(space, at))

@@ -1,0 +1,154 @@
+"""Quantities of a node or a branch: efforts, flows, contents, powers, state functions, and integrals of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Domain
+from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
+from sysdyn.dsl.model.units import Dimension, multiply
+from sysdyn.dsl.names import habits
+from sysdyn.dsl.names.context import Quadrature
+from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.paths import Paths
+from sysdyn.dsl.names.symbols import BranchSymbol, DomainSymbol, End, Typed, nearest
+from sysdyn.dsl.tree import syntax
+
+RATES = ("dot", "der", "d", "dt", "prime")
+"""Members by which other languages write a rate."""
+BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
+
+
+def branch_words(domain: Domain) -> tuple[str, ...]:
+    """The members of a branch with their units: `e [V]`, `f [A]`, ..."""
+    units = {"e": domain.effort, "f": domain.flow, "q": domain.displacement, "p": domain.momentum}
+    return (*(f"{letter} [{unit.text}]" for letter, unit in units.items()), "power [W]", "energy [J]")
+
+
+class Quantities(Paths):
+    """What the members of nodes and branches are."""
+
+    def _shown(self, e: syntax.Expr) -> str:
+        return " ".join(self.source.text[e.span.start : e.span.end].split())[:60]
+
+    def no_member(self, owner: str, e: syntax.Member, members: Iterable[str]) -> Failed:
+        """Report E102 with the members there are."""
+        names = list(members)
+        if e.name in RATES:
+            return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=f"{owner}'")
+        near = nearest(e.name, names)
+        help_ = f"nearest: '{near}'" if near else f"it has {', '.join(names[:20])}" if names else None
+        return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=help_)
+
+    def _effort(self, family: str, kind: str, at: tuple[Node, ...], dimension: Dimension, e: syntax.Member) -> Typed:
+        """The effort of a class that acts on a displacement coordinate."""
+        return Typed(ex.var(family, f"{kind}:{e.name}", *at), dimension)
+
+    def node_quantity(self, end: End, e: syntax.Member) -> Typed:
+        """Member e of a common-effort node, q and f of a common-flow node."""
+        domain = end.domain
+        if domain.common == "effort":
+            if e.name != "e":
+                help_ = "a common-effort node has e; flows belong to elements"
+                raise self.fail("E102", f"node '{self._shown(e.base)}' has no member '{e.name}'", e.span, help=help_)
+            if end.node is None:
+                return Typed(ex.const(0.0), domain.effort.dimension)
+            return Typed(ex.var(end.node.family.name, "ne", *end.at), domain.effort.dimension)
+        kinds = {"q": ("nq", domain.displacement.dimension), "f": ("nf", domain.flow.dimension)}
+        kinds["p"] = ("np", domain.momentum.dimension)
+        kinds["e"] = ("np", domain.effort.dimension)  # p' = e
+        if e.name in EFFORT_CLASSES:
+            if end.node is None:
+                raise self.fail("E102", f"'{self._shown(e.base)}' stands still: no effort moves it", e.span)
+            return self._effort(end.node.family.name, "n", end.at, domain.effort.dimension, e)
+        if e.name not in kinds:
+            raise self.no_member(self._shown(e.base), e, (*kinds, *EFFORT_CLASSES))
+        kind, dimension = kinds[e.name]
+        if end.node is None:
+            return Typed(ex.const(0.0), dimension)
+        return Typed(ex.var(end.node.family.name, kind, *end.at, order=int(e.name == "e")), dimension)
+
+    def branch_quantity(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, e: syntax.Member) -> Typed:
+        """Members e f q p of a branch, and the power it absorbs."""
+        family, domain = symbol.family, symbol.domain
+        at = (*family.prefix, *at)
+        meant = habits.variable(domain.name, name)
+        if meant is not None and (name not in BRANCH or not self._is_store(symbol, name)):
+            shown = self._shown(e.base)
+            raise self.fail("E102", f"'{shown}' has no member '{name}'", e.span, help=f"write {shown}.{meant}")
+        if name not in BRANCH:
+            raise self.no_member(self._shown(e.base), e, BRANCH if nearest(name, BRANCH) else branch_words(domain))
+        power = multiply(domain.effort.dimension, domain.flow.dimension)
+        if name == "power":
+            return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
+        if name == "energy":
+            return Typed(self._absorbed(symbol, at, power, e), multiply(power, dim.TIME))
+        if name == "p" and self.complete and self._summed(symbol):
+            return Typed(self._impulse(symbol, at, e), branch_dimension(domain, "p"))
+        if name in MEMBERS:
+            return self._state_function(symbol, at, name, power, e)
+        return Typed(ex.var(family.name, f"b{name}", *at), branch_dimension(domain, name))
+
+    def _is_store(self, symbol: BranchSymbol, name: str) -> bool:
+        """Whether a branch has the state function `name`."""
+        law = self.laws.get(symbol.family.name)
+        return name in MEMBERS and law is not None and law.kind == MEMBERS[name].edge
+
+    def _summed(self, symbol: BranchSymbol) -> bool:
+        """Whether a branch has no momentum of its own: all but kinetic stores."""
+        law = self.laws.get(symbol.family.name)
+        return law is not None and law.kind != "kinetic"
+
+    def _impulse(self, symbol: BranchSymbol, at: tuple[Node, ...], e: syntax.Member) -> Node:
+        """The momentum of a branch without a kinetic store, p' = e: the integral of its effort since the start."""
+        family = symbol.family
+        counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
+        node, unit = ex.var(family.name, "be", *counters), symbol.domain.effort.dimension
+        return self.quadrature(f"{family.name}.p", node, family.whole, unit, at, e)
+
+    def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
+        """The energy that a branch has absorbed since the start: a quadrature."""
+        family = symbol.family
+        counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
+        node = ex.mul(ex.var(family.name, "be", *counters), ex.var(family.name, "bf", *counters))
+        return self.quadrature(f"{family.name}.energy", node, family.whole, power, at, e)
+
+    def quadrature(
+        self,
+        name: str,
+        power: Node,
+        shape: tuple[tuple[Node, Node], ...],
+        dimension: Dimension,
+        at: tuple[Node, ...],
+        e: syntax.Expr,
+    ) -> Node:
+        """The integral of a power (over the counters #e0, #e1, ... of its shape) at one element."""
+        found = Quadrature(power, shape, multiply(dimension, dim.TIME), self.place(e.span))
+        self.quadratures.setdefault(name, found)
+        return ex.var(name, "s", *at)
+
+    def balance(self, name: str, rate: Node, first: Node, dimension: Dimension, e: syntax.Expr) -> Node:
+        """The integral of a rate that starts at the initial value of `first`."""
+        self.quadratures.setdefault(name, Quadrature(rate, (), dimension, self.place(e.span), first))
+        return ex.var(name, "s")
+
+    def _state_function(
+        self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, power: Dimension, e: syntax.Member
+    ) -> Typed:
+        """T, T*, V, V* of a store (J), D, G of a dissipator (W): what the compiler makes of its law."""
+        function = MEMBERS[name]
+        law = self.laws.get(symbol.family.name)
+        if law is None or law.kind != function.edge:
+            what = "a dissipator" if function.edge == "dissipator" else f"a {function.edge} store"
+            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{name}': it is not {what}", e.span)
+        dimension = power if function.edge == "dissipator" else multiply(power, dim.TIME)
+        return Typed(ex.var(symbol.family.name, f"b{function.name}", *at), dimension)
+
+
+def branch_dimension(domain: DomainSymbol, letter: str) -> Dimension:
+    """Dimension of e, f, q or p in a domain."""
+    unit = {"e": domain.effort, "f": domain.flow, "q": domain.displacement, "p": domain.momentum}[letter]
+    return unit.dimension

@@ -1,0 +1,53 @@
+"""Which rows of the settled form are left where unknowns leave the runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.condense.elimination import Mask
+from sysdyn.runtime.condense.sums import Sums
+from sysdyn.runtime.model.description import Ints
+from sysdyn.runtime.model.patterns import Places, compress
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.points import distinct
+
+RATE_OF = {"phi_acceleration": "phi_rate", "psi_rate": "psi", "gamma_rate": "gamma", "momentum_rate": "momentum"}
+"""Group of rows -> group of which they are the time derivative."""
+
+
+def _defining(rows: Ints, columns: Ints) -> bool:
+    """Whether each of the rows can be told for a column of its own, by their entries."""
+    own, each = distinct(rows), distinct(columns)
+    pattern, _ = compress(own.size, each.size, [Places(np.searchsorted(own, rows), np.searchsorted(each, columns))])
+    return int((matched(pattern) >= 0).sum()) == own.size
+
+
+def settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:
+    """Rows of the settled form that are left [rows]; None where the others say more than what leaves moves by: what
+    balances it would be open, or rates that observers read.
+    """
+    description = settled.description
+    first = {(group, family): at for group, family, at in stepped.form.groups}
+    kept = np.ones(settled.rows, dtype=bool)
+    for group, family, at in settled.form.groups:
+        home, size = first.get((RATE_OF.get(group, group), family)), description.rows[family].size
+        if home is not None:
+            kept[at : at + size] = ~gone[home : home + size]
+    columns, rows = settled.pattern.columns_of(), settled.pattern.row
+    lost = np.zeros(settled.unknowns, dtype=bool)
+    lost[numbers.unread] = True
+    kept[rows[lost[columns]]] = False
+    derived = np.zeros(settled.unknowns, dtype=bool)
+    derived[numbers.place] = True
+    moving = settled.structural()[1]
+    dropped = np.zeros(settled.rows, dtype=bool)
+    dropped[rows[moving & derived[columns]]] = True
+    dropped &= kept
+    rates = moving & derived[columns] & dropped[rows]
+    if not _defining(rows[rates], columns[rates]):
+        return None
+    read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.rates or ()}
+    open_ = columns[moving & dropped[rows] & ~derived[columns]]
+    if read & set(settled.family_of[open_].tolist()):
+        return None
+    return kept & ~dropped

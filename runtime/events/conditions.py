@@ -1,0 +1,53 @@
+"""What a condition says of relations, what is assigned where it becomes true, and what follows of that at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from sysdyn.runtime.events.plan import Assignment, Condition, Relation
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.rank import least_squares
+from sysdyn.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """One round of assignments, event by event, and the sides [relations] behind it."""
+
+    groups: tuple[tuple[Assignment, ...], ...]
+    sides: Floats
+
+
+def holds(condition: Condition, sides: Floats, relations: Sequence[Relation], crossed: Sequence[int]) -> bool:
+    """Whether a condition holds where relations stand on these sides [relations] of zero; crossed: those that are zero
+    at this instant alone.
+    """
+    match condition[0]:
+        case "and":
+            return all(holds(c, sides, relations, crossed) for c in condition[1:])
+        case "or":
+            return any(holds(c, sides, relations, crossed) for c in condition[1:])
+        case "not":
+            return not holds(condition[1], sides, relations, crossed)
+    _, k, operator = condition
+    side = sides[k]
+    if operator in ("==", "!=") and relations[k].moves:
+        return bool((k in crossed) == (operator == "=="))  # equal at the instant of a crossing alone
+    if operator in ("==", "!="):
+        return bool((side == 0.0) == (operator == "=="))
+    strict = {">": side > 0.0, "<": side < 0.0, ">=": side >= 0.0, "<=": side <= 0.0}
+    return bool(strict[operator])
+
+
+def with_momenta(settled: System, t: float, y: Floats, yd: Floats) -> Floats:
+    """Y with the momenta that follow from flows that were assigned: the rows of block momentum, solved for p."""
+    rows = np.flatnonzero(settled.of_groups("momentum"))
+    p = np.flatnonzero(settled.kinds == "p")
+    for _ in range(3 if rows.size else 0):
+        jy, _ = settled.jacobian(t, y, yd)
+        matrix = settled.dense(jy)[np.ix_(rows, p)]
+        y = y.copy()
+        y[p] -= least_squares(matrix, settled.residual(t, y, yd)[rows])
+    return y

@@ -1,0 +1,161 @@
+"""An active set that fits: complementarity over all constraints that hold at times at once.
+
+A guess of the active set gives flows (impulses in the metric of the inertia where they must jump) and, by the settled
+rows, rates and multipliers; the first condition that does not hold (contacts.py), in the order written, changes its
+member, and so on (Murty's least-index principal pivoting, which ends for a positive definite matrix and is watched for
+cycles).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, combinations, islice
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.events.contacts import Contacts
+from sysdyn.runtime.model.description import Floats
+
+NEAR, BESIDE = 3, 60
+"""Members that change at once, and trials, where an active set contradicts itself."""
+MANY = 2
+"""Diodes that change at once, at least: fewer are turned one by one."""
+TRIALS = 20
+"""Trials a contact, beside TRIALS for all."""
+
+Settle = Callable[[float, Floats, Floats], tuple[Floats, Floats, Floats] | None]
+"""t, y, yd -> y, yd consistent with the active set and the impulses [unknowns] that took the flows there; None: no
+such point was found."""
+
+
+class NoActiveSetError(Exception):
+    """No set of constraints fits; names: of those that kept changing."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        super().__init__(", ".join(names))
+        self.names = names
+
+
+class Pivoting:
+    """Of a model's contacts.  singular: whether the equations with the present active set depend on each other."""
+
+    def __init__(self, contacts: Contacts, singular: Callable[[float, Floats, Floats], bool]) -> None:
+        self.contacts, self.singular = contacts, singular
+        self._contradicts: set[tuple[bool, ...]] = set()
+
+    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
+        """A consistent point whose active set fits, from the present one; NoActiveSetError."""
+        before, turned = (self.contacts.active.copy(), self.contacts.p.copy()), dict[int, set[bool]]()
+        try:
+            return self._pivoted(t, y, yd, settle, turned)
+        except NoActiveSetError:
+            self.contacts.open = frozenset(k for k, ways in turned.items() if len(ways) > 1)
+            if not self.contacts.open:
+                raise
+        self.contacts.active[:], self.contacts.p[:] = before
+        try:
+            return self._pivoted(t, y, yd, settle, turned)
+        finally:
+            self.contacts.open = frozenset()
+
+    def _pivoted(
+        self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]]
+    ) -> tuple[Floats, Floats]:
+        """The same; turned: those that were turned, and whether they held."""
+        seen: set[tuple[float, ...]] = set()
+        changed: list[int] = []
+        fewest = len(self.contacts.contacts)
+        block: tuple[NDArray[np.bool_], int, Floats] | None = None
+        self.contacts.finite(t, y, yd)
+        for _ in range(TRIALS * (1 + len(self.contacts.contacts))):
+            self.contacts.apply()
+            state = self.contacts.state()
+            again = state in seen
+            seen.add(state)
+            found = self._settled_by(t, y, yd, settle)
+            if found is None and block is not None:  # sources that they short: one of them alone
+                self.contacts.active[:], (_, first, values), block, fewest = block[0], block, None, 0
+                self.contacts.turn(first, values)
+                continue
+            found = found or self._beside(t, y, yd, settle, seen)
+            if found is None:
+                break
+            values = self.contacts.observer(t, found[0], found[1])
+            wrong = sorted({*self.contacts.wrongs(values, found[2]), *self.contacts.backwards(t, y, found)})
+            if not wrong:
+                return found[0], found[1]
+            if again and self._done(t, wrong, y, found):  # from behind their impulses on
+                y, yd = found[:2]
+                seen.clear()
+            # diodes all at once while they become fewer (Judice and Pires 1994), else the first
+            several = MANY < len(wrong) < fewest and all(self.contacts.contacts[k].kind == "psi" for k in wrong)
+            block = (self.contacts.active.copy(), wrong[0], values) if several else None
+            fewest = min(fewest, len(wrong))
+            for k in wrong if several else wrong[:1]:
+                turned.setdefault(k, set()).add(bool(self.contacts.active[k]))
+                changed.append(k)
+                self.contacts.turn(k, values)
+        contacts = self.contacts.contacts
+        names = dict.fromkeys(contacts[k].name for k in changed[-6:] or range(min(len(contacts), 6)))
+        raise NoActiveSetError(tuple(names))
+
+    def _done(self, t: float, wrong: Sequence[int], y: Floats, found: tuple[Floats, Floats, Floats]) -> bool:
+        """Whether impulses have done what these inequalities are wrong by: one of effort has stopped what closed, and
+        nothing holds it afterwards; one of flow has passed, and nothing goes on.
+        """
+        if any(self.contacts.contacts[k].kind != "psi" for k in wrong):
+            return False
+        held = [k for k in wrong if self.contacts.active[k]]
+        if any(found[2][self.contacts.multiplier[k]] <= 0.0 for k in held):
+            return False
+        passed = self.contacts.passed(t, y, found)
+        return all(passed[k] > 0.0 for k in wrong if not self.contacts.active[k])
+
+    def _beside(
+        self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]
+    ) -> tuple[Floats, Floats, Floats] | None:
+        """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen
+        yet, that does not: the first that fits, else the first; the active set then is that.
+        """
+        before, first = self.contacts.active.copy(), None
+        for turned in self._near(before):
+            self.contacts.active[:] = before
+            self.contacts.active[list(turned)] = ~before[list(turned)]
+            self.contacts.apply()
+            open_ = len(turned) <= NEAR and self.singular(t, y, yd)
+            if open_ or self.contacts.state() in seen:
+                continue
+            found = self._settled_by(t, y, yd, settle)
+            if found is not None and self.contacts.fits(t, y, found):
+                return found
+            if found is not None and first is None:
+                first = found, self.contacts.active.copy()
+        if first is None:
+            return None
+        self.contacts.active[:] = first[1]
+        self.contacts.apply()
+        seen.add(self.contacts.state())
+        return first[0]
+
+    def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
+        """Which inequalities to turn, the fewest first, those that do not hold before those that do; where none holds,
+        all of them before.
+        """
+        contacts, frozen = self.contacts.contacts, self.contacts.frozen
+        free = [k for k, c in enumerate(contacts) if c.kind in ("phi", "psi") and k not in frozen]
+        rest = [k for k in free if not before[k]]
+        order = rest + [k for k in free if before[k]]
+        nearest = (c for number in range(1, NEAR + 1) for c in combinations(order, number))
+        if rest == free:
+            return islice(chain([rest], nearest), BESIDE)
+        return chain(islice(nearest, BESIDE), [rest] if rest else [])
+
+    def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
+        """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
+        key = tuple(self.contacts.active.tolist())
+        if key in self._contradicts:
+            return None
+        found = settle(t, y, yd)
+        if found is None and self.singular(t, y, yd):
+            self._contradicts.add(key)
+        return found

@@ -1,0 +1,163 @@
+"""Which constraints hold behind an event, and the point with them: impacts, the active set, ties between sets.
+
+Received: a point before, what was touched.  Returned: the consistent point from which the next piece begins.  What
+followed from an active set and what touched it is remembered, and tried first when that happens again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.events.contacts import Contacts
+from sysdyn.runtime.events.determined import Determined
+from sysdyn.runtime.events.impacts import UNSEEN, Impacts
+from sysdyn.runtime.events.pivoting import NoActiveSetError
+from sysdyn.runtime.events.plan import Plan
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.start.restart import Restart
+
+AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
+"""Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
+
+Point = tuple[Floats, Floats]
+
+
+class Succession:
+    """Of one run.  restart: consistent points of it, told before it is asked; blow: a flow was assigned since."""
+
+    def __init__(self, plan: Plan, contacts: Contacts, determined: Determined) -> None:
+        self.plan, self.contacts, self.observer, self.p = plan, contacts, contacts.observer, contacts.p
+        self.determined, self.impacts = determined, Impacts(contacts, plan.rest)
+        self.restart: Restart | None = None
+        self.blow = False
+        self._follows: dict[tuple[tuple[float, ...], tuple[int, ...]], tuple[float, ...]] = {}
+        self._impacts = any(c.kind in ("phi", "planar") for c in plan.contacts)
+
+    @property
+    def _restart(self) -> Restart:
+        assert self.restart is not None
+        return self.restart
+
+    def after(
+        self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool
+    ) -> tuple[Point, bool]:
+        """The consistent point with the constraints that hold from now on, and whether they were sought: what followed
+        before is not; NoActiveSetError.  stalled: no time has passed since the last event.
+        """
+        restart = self._restart
+        self._guards(t, y, yd)
+        stood = self.contacts.state()
+        known = None if stalled else self._remembered(t, (y, yd), (stood, tuple(touched)))
+        if known is not None:
+            return known, False
+        y, self.blow = self.impacts.after(t, y, yd, self._strike, blow=self.blow), False
+        values = self.observer(t, y, yd)
+        for k in touched:
+            if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
+                self.contacts.turn(k, values)
+        self.contacts.apply()
+        found = self.determined.fit(t, y, yd, restart.struck, touched)
+        if self._tied(t, found, touched if self.contacts.state() == stood else ()):
+            found = self._ahead(t, found, self.contacts.state()) or found
+        if not self._impacts:
+            self._follows[stood, tuple(touched)] = self.contacts.state()
+        return self._closed(t, found), True
+
+    def _closed(self, t: float, point: Point) -> Point:
+        """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""
+        values = self.observer(t, *point)
+        gaps = [c.value for k, c in enumerate(self.plan.contacts) if c.kind == "phi" and self.contacts.active[k]]
+        if not any(abs(values[gap]) > UNSEEN * self.observer.terms[gap] for gap in gaps):
+            return point
+        y, yd, done = self._restart.settler.moved(t, *point)
+        return (y, yd) if done else point
+
+    def _remembered(self, t: float, point: Point, key: tuple[tuple[float, ...], tuple[int, ...]]) -> Point | None:
+        """The point with the active set that followed when this happened before, where it fits; None where not."""
+        after = self._follows.get(key)
+        if after is None:
+            return None
+        before = self.contacts.active.copy(), self.p.copy()
+        self.contacts.become(after)
+        found = self._restart.struck(t, *point)
+        if found is not None:
+            fits = self.contacts.fits(t, point[0], found)
+            fits = fits and (bool(key[1]) or self._decided(before[0], self.observer(t, *found[:2])))
+            if fits and self.determined.leaves(t, *found[:2]) == 0:
+                return found[0], found[1]
+        self.contacts.active[:], self.p[:] = before
+        self.contacts.apply()
+        return None
+
+    def _decided(self, before: NDArray[np.bool_], values: Floats) -> bool:
+        """Whether the inequalities that turned could not have stayed as they were `before`: what would hold and open
+        alike at this instant (a diode that conducts beside a capacitor) stays where nothing touched it.
+        """
+        active, zero = self.contacts.active, self.observer.zero
+        turned = [k for k in np.flatnonzero(active != before) if self.plan.contacts[k].kind in ("phi", "psi")]
+        held = [self.plan.contacts[k] for k in turned if active[k]]
+        open_ = [self.plan.contacts[k] for k in turned if not active[k]]
+        return all(values[c.multiplier] > zero(c.multiplier) for c in held) and all(
+            values[c.value] > zero(c.value) or values[c.rate] > zero(c.rate) for c in open_
+        )
+
+    def _tied(self, t: float, point: Point, touched: Sequence[int]) -> bool:
+        """Whether something touched may hold or not at this instant, but a gap that has bounced; or friction that is
+        at its bound while others hold what it joins.
+        """
+        values, zero = self.observer(t, *point), self.observer.zero
+        contacts = [self.contacts.contacts[k] for k in touched]
+        stick = self.contacts.active
+        slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
+        idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)
+        return idle or any(c.kind != "phi" or abs(values[c.rate]) <= zero(c.rate) for c in contacts)
+
+    def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
+        """The point with the active set that fits a little later, None where none differs.
+
+        At t itself the old set fits as well as the new one: a multiplier that is zero and falls.  A set that leaves
+        something open (both arms of a bridge) is one that nothing has told apart yet: it is taken where none is better.
+        """
+        y, yd = point
+        kept, open_ = (self.contacts.active.copy(), self.p.copy()), None
+        for later in AHEAD:
+            time = later * self.contacts.time
+            found = self._later(t, time, (y, yd), stood)
+            if found is not None and self.determined.leaves(t, *found) == 0:
+                return found
+            if found is not None and open_ is None:
+                open_ = found, self.contacts.active.copy(), self.p.copy()
+            self.contacts.active[:], self.p[:] = kept
+            self.contacts.apply()
+        if open_ is None:
+            return None
+        self.contacts.active[:], self.p[:] = open_[1:]
+        self.contacts.apply()
+        return open_[0]
+
+    def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...]) -> Point | None:
+        """The point at t with the active set that fits `time` (s) later; None where that is the one that stood."""
+        y, yd = point
+        try:
+            self.determined.fit(t + time, y + time * yd, yd, self._restart.struck)
+        except NoActiveSetError:
+            return None
+        found = self._restart.struck(t, y, yd) if self.contacts.state() != stood else None
+        return None if found is None else (found[0], found[1])
+
+    def _strike(self, t: float, y: Floats, yd: Floats, aims: Floats) -> Point:
+        try:
+            return self._restart.instant.flows(t, y, yd, self._restart.magnitude(y.size), aims)
+        except NotFiniteError as error:
+            raise SolverFailure("nonfinite", t, 0.0) from error
+
+    def _guards(self, t: float, y: Floats, yd: Floats) -> None:
+        values = self.observer(t, y, yd)
+        for k, contact in enumerate(self.plan.contacts):
+            if contact.kind == "guarded":
+                self.contacts.active[k] = bool(values[contact.guard])
+        self.contacts.apply()

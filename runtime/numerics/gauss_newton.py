@@ -1,0 +1,332 @@
+"""Nonlinear equations with more unknowns than rows: the solution nearest to a guess.
+
+Gauss-Newton: with u = W (x - guess) / scale, each step takes the minimum-norm u of the linearised rows
+A u = A u_k - r (least_change.py), with halving of the step while the rows grow or are not finite.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+import time
+from collections.abc import Callable
+from dataclasses import field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES, Mask, in_order, least_norm
+from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
+from sysdyn.values import dataclass
+
+SMALL = 32
+"""Rows and unknowns up to which a problem that the core knows is solved there."""
+GRANTED = 3.6e9
+"""Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
+ITERATIONS = 40
+"""Iterations that a search may take however large they are."""
+EVALUATION = 1e6
+"""Operations that evaluating the rows takes whatever their number: calls, not arithmetic."""
+EACH = 40.0
+"""Operations that an entry of the matrix takes in an evaluation."""
+_ITERATIONS = 60
+FOLDS = 709
+"""Iterations that an exponential, falling by e in each, takes from the largest number."""
+_HALVINGS = 12
+_LOST = 3
+"""Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
+_ROUND_OFF = 2e-15
+_BESIDE = 1e-8
+"""Scaled rows below which round-off alone can keep them from shrinking."""
+
+
+class OutOfTimeError(Exception):
+    """The wall time granted is over."""
+
+
+@dataclass(slots=True)
+class Work:
+    """What a search has left to spend, in operations counted by size: the same on every machine.
+
+    A share of GRANTED, or as much as ITERATIONS iterations of the largest problem met take.  until: `time.monotonic()`
+    beyond which counting raises OutOfTimeError.
+    """
+
+    share: float = 1.0
+    until: float | None = None
+    spent: float = 0.0
+    largest: float = 0.0
+
+    def iteration(self, shape: tuple[int, int], entries: int) -> None:
+        """Count one linearisation with its solution, of so many rows and unknowns."""
+        rows, unknowns = shape
+        solution = 2e3 * (rows + unknowns + entries)
+        if max(shape) <= SINGULAR_VALUES:
+            solution = 15.0 * rows * unknowns * min(shape)
+        elif max(shape) <= DENSE:
+            solution = 4.0 * (rows + unknowns) ** 3
+        self.clocked()
+        whole = solution + EVALUATION + EACH * entries
+        self.largest = max(self.largest, whole)
+        self.spent += whole
+
+    def evaluation(self, entries: int) -> None:
+        """Count one evaluation of all rows."""
+        self.clocked()
+        self.spent += EVALUATION + EACH * entries
+
+    def clocked(self) -> None:
+        """Raise OutOfTimeError where the wall time is over."""
+        if self.until is not None and time.monotonic() > self.until:
+            raise OutOfTimeError
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left."""
+        return self.spent > self.share * max(GRANTED, ITERATIONS * self.largest)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Rows `use` of residual(x) [number] in the unknowns `free` of x.
+
+    jacobian(x): values at (rows, columns); guess, scale, weight [unknowns]; levels: unknowns [masks] whose moves are
+    the least in this order, each with what stands before it held, the others then (of what is too large for full
+    matrices weights alone say so); work: what all problems of one search draw on; core: the same rows and entries
+    there, at an instant t [s], used where there are no levels; check: raises what a callback of them raised.
+    """
+
+    residual: Callable[[Floats], Floats]
+    jacobian: Callable[[Floats], Floats]
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    number: int
+    use: Mask
+    free: Mask
+    guess: Floats
+    scale: Floats
+    weight: Floats
+    levels: tuple[Mask, ...] = ()
+    work: Work = field(default_factory=Work)
+    core: tuple[lib.RowsOfStart, float] | None = None
+    check: Callable[[], None] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """x, its largest scaled row and all scaled rows [number]."""
+
+    x: Floats
+    residual: float
+    scaled: Floats
+
+
+class _Linear:
+    """The linearised rows at a point: A [used rows, free unknowns] in scaled unknowns and rows."""
+
+    def __init__(self, problem: Problem, x: Floats) -> None:
+        self.unit, self.problem = problem.scale / problem.weight, problem
+        self._values = problem.jacobian(x)
+        rows, columns, values = self._taken()
+        # a row is as large as its terms are, in magnitudes
+        size = np.zeros(problem.number)
+        np.add.at(size, rows, np.abs(values) * problem.scale[columns])
+        self.row_scale = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
+        self.shape = int(problem.use.sum()), int(problem.free.sum())
+
+    def _taken(self) -> tuple[Any, Any, Floats]:
+        """Rows, columns and values of the entries in use; factors would fill from zeros too."""
+        problem = self.problem
+        take = problem.use[problem.rows] & problem.free[problem.columns] & (self._values != 0.0)
+        values = self._values[take]
+        values[~np.isfinite(values)] = 0.0
+        return problem.rows[take], problem.columns[take], values
+
+    @property
+    def entries(self) -> tuple[Any, Any, Floats]:
+        """A by its entries, made when they are asked for: a point that holds needs none."""
+        rows, columns, values = self._taken()
+        values *= self.unit[columns]
+        values *= self.row_scale[rows]
+        return *self._numbered(rows, columns), values
+
+    def _numbered(self, rows: Any, columns: Any) -> tuple[Any, Any]:
+        """Rows and columns by their numbers among those in use."""
+        numbers = (np.cumsum(mask, dtype=np.int32) - 1 for mask in (self.problem.use, self.problem.free))
+        return next(numbers)[rows], next(numbers)[columns]
+
+    def determined(self, u: Floats, r: Floats, *, beside: bool) -> Floats | None:
+        """The same where the rows, as they are, determine the step (core/linear/graded.h); None where they do not."""
+        rows, columns, values = self._taken()
+        rows, columns = self._numbered(rows, columns)
+        a, step = np.zeros(self.shape), np.zeros(u.size)
+        np.add.at(a, (rows, columns), values)
+        aim, stands = -r / self.row_scale[self.problem.use], np.zeros(u.size, dtype=bool)
+        stands[columns] = True
+        failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(aim), lib.pointer(step))
+        if failed < 0:
+            raise MemoryError
+        return None if failed else np.where(stands | beside, u + step / self.unit[self.problem.free], 0.0)
+
+    def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
+        """The least u with A u = A u_now - r; beside it, the least step: its round-off is its own."""
+        levels = [level[self.problem.free] for level in self.problem.levels]
+        ordered = any(level.any() for level in levels) and max(self.shape) <= DENSE
+        if not ordered and max(self.shape) <= SINGULAR_VALUES:
+            only = self.determined(u, r, beside=beside)
+            if only is not None:
+                return only
+        i, j, v = self.entries
+        # what costs nothing stays where it is as far as it may
+        stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else np.zeros_like(u)
+        aim = -r
+        np.add.at(aim, i, v * (u - stays)[j])
+        if ordered:
+            return stays + in_order(self.shape, (i, j, v), aim, levels)
+        return stays + least_norm(self.shape, (i, j, v), aim)
+
+
+def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) -> Solution:
+    """From x towards the solution nearest to problem.guess; the best point met in so many iterations.
+
+    folds: iterations that are not counted while rows shrink as fast as their terms do.
+    """
+    if problem.core is not None and not problem.levels:
+        small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
+        found = _in_core(problem, problem.core, x, (most, folds), measure=not small)
+        if small or found.residual <= _ROUND_OFF:  # a large one that holds is not linearised
+            return found
+    with np.errstate(all="ignore"):  # what overflows is seen as not finite
+        return _solve(problem, x, most, folds)
+
+
+def _in_core(
+    problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, limits: tuple[int, int], *, measure: bool
+) -> Solution:
+    """The same of a small problem (core/start/search.h); measure: x as it is, of any."""
+    found, scaled = x.copy(), np.zeros(problem.number)
+    use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
+    masks = lib.pointer(use), lib.pointer(free)
+    numbers = lib.pointer(problem.guess), lib.pointer(problem.scale), lib.pointer(problem.weight)
+    spent = work.share, work.spent, work.largest
+    answers = lib.pointer(found), lib.pointer(scaled)
+    search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], *limits, *spent, *answers)
+    if (lib.core.sd_search_measure if measure else lib.core.sd_search_solve)(c.byref(search)):
+        raise MemoryError
+    if problem.check is not None:
+        problem.check()
+    work.spent, work.largest = search.spent, search.largest
+    return Solution(found, search.residual, scaled)
+
+
+def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
+    x = x.copy()
+    best = Solution(x, np.inf, np.full(problem.number, np.inf))
+    stale, taken, lost = 0, 0, 0
+    for _ in range(most + folds):
+        if taken == most or lost == _LOST:
+            break
+        taken += 1
+        linear = _Linear(problem, x)
+        problem.work.iteration(linear.shape, problem.rows.size)
+
+        def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:
+            problem.work.evaluation(problem.rows.size)
+            scaled = np.where(problem.use, problem.residual(z) * linear.row_scale, 0.0)
+            largest = float(np.abs(scaled).max(initial=0.0))
+            return (largest if np.isfinite(largest) else np.inf), scaled
+
+        size, scaled = measure(x)
+        if size < best.residual:
+            stale = stale if size > 0.5 * best.residual else 0
+            best = Solution(x.copy(), size, np.abs(scaled))
+        stale += 1
+        if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
+            break
+        if problem.work.done:
+            break
+        u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
+        try:
+            target = linear.nearest(u, scaled[problem.use], beside=size < _BESIDE and stale > 1)
+        except NotFiniteError:
+            break
+        if not np.isfinite(target).all():
+            break
+        norm = float(np.linalg.norm(scaled))
+        step, tried = 1.0, x
+        for _ in range(_HALVINGS):
+            tried = x.copy()
+            tried[problem.free] += step * (target - u) * linear.unit[problem.free]
+            now = float(np.linalg.norm(measure(tried)[1]))
+            if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
+                lost = 0
+                break
+            step *= 0.5
+        else:
+            lost += 1
+        if best.residual >= 1e-12 and now <= 0.5 * norm:
+            stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
+        if not np.isfinite(problem.residual(tried)[problem.use]).all():
+            break
+        x = tried
+    return best
+
+
+def stepped(problem: Problem, x: Floats) -> Floats:
+    """The point one whole step from x.  NotFiniteError."""
+    linear, free = _Linear(problem, x), problem.free
+    u = (x - problem.guess)[free] / linear.unit[free]
+    r = (problem.residual(x) * linear.row_scale)[problem.use]
+    found = x.copy()
+    found[free] = problem.guess[free] + linear.nearest(u, r, beside=False) * linear.unit[free]
+    return found
+
+
+def corrected(problem: Problem, x: Floats) -> Floats | None:
+    """The point one step from x where the rows determine it; None where they do not, or the problem is no small one."""
+    linear, free = _Linear(problem, x), problem.free
+    if max(linear.shape) > SINGULAR_VALUES:
+        return None
+    r = (problem.residual(x) * linear.row_scale)[problem.use]
+    step = linear.determined(np.zeros(linear.shape[1]), r, beside=True)
+    found = x.copy()
+    if step is None or not np.isfinite(step).all():
+        return None
+    found[free] += step * linear.unit[free]
+    return found
+
+
+def least_residual(problem: Problem, x: Floats) -> Floats:
+    """Where the rows cannot vanish: the x near which they are least (Levenberg-Marquardt, rows scaled once, dense)."""
+    with np.errstate(all="ignore"):
+        problem = replace(problem, weight=np.ones_like(problem.weight))
+        linear = _Linear(problem, x)
+        scale, damping = linear.row_scale, 1e-3
+
+        def measure(z: Floats) -> Floats:
+            problem.work.iteration(linear.shape, problem.rows.size)
+            return (problem.residual(z) * scale)[problem.use]
+
+        r = measure(x)
+        for _ in range(_ITERATIONS):
+            linear = _Linear(problem, x)
+            i, j, v = linear.entries
+            a = np.zeros(linear.shape)
+            np.add.at(a, (i, j), v / linear.row_scale[problem.use][i] * scale[problem.use][i])
+            for _ in range(2 * _HALVINGS):
+                full = np.vstack([a, np.sqrt(damping) * np.eye(a.shape[1])])
+                step = least_squares(full, np.concatenate([-r, np.zeros(a.shape[1])]), 1e-15)
+                tried = x.copy()
+                tried[problem.free] += step * linear.unit[problem.free]
+                now = measure(tried)
+                if np.isfinite(now).all() and now @ now < r @ r:
+                    break
+                damping *= 8.0
+            else:
+                return x
+            gain = 1.0 - (now @ now) / (r @ r)
+            x, r, damping = tried, now, damping / 4.0
+            if gain < 1e-12 or problem.work.done:
+                break
+    return x
