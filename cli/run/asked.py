@@ -15,7 +15,7 @@ from sysdyn.cli.run.expectations import watch
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.columns import Read, value_of
-from sysdyn.compiler.binding.instants import instants
+from sysdyn.compiler.binding.instants import distinct, instants
 from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
@@ -184,7 +184,7 @@ def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | 
     read = Read(binding.parameters)
     text = prepared.compiled.form, replace(binding, parameters=read), t0, t1, prepared.network.tables
     found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
-    answer = np.union1d(found.times, pulses(*text)), found.note
+    answer = distinct(found.times, pulses(*text)), found.note
     kept.clear()
     kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
     return answer

@@ -11,11 +11,10 @@ each element of a family, so that nothing else shows.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.neighbourhoods import MARK, RUN, Found, Run, Site, side_by_side
+from sysdyn.compiler.network.neighbourhoods import MARK, RUN, Found, Run, Site, laws_of, side_by_side
 from sysdyn.compiler.network.skeleton import Shaped, filled, shaped
 from sysdyn.compiler.network.strands import in_strands
 from sysdyn.dsl.model.expression import Node, add, const, index, param, substitute, var, variables
@@ -38,12 +37,11 @@ def gathered(network: Network, *, irregular: bool = True) -> Network:
     """
     if len(network.branches) < LEAST:
         return network
-    free = _free(network)
-    shapes = {b.name: s for b in network.branches if b.name in free and (s := shaped(b.law, b.name)) is not None}
-    best = side_by_side(network, shapes)
+    laws = laws_of(network)
+    best = side_by_side(network, laws)
     for kept in (best, ({}, [])) if irregular else ():
         if _left(network, best) > FEW:
-            best = min(best, in_strands(network, shapes, kept), key=lambda found: _left(network, found))
+            best = min(best, in_strands(network, laws, kept), key=lambda found: _left(network, found))
     sites, runs = best
     if sum(len(run.members) for run in runs) - len(runs) < LEAST:
         return network
@@ -55,19 +53,6 @@ def _left(network: Network, found: Found) -> int:
     sites, runs = found
     fewer = sum(len(run.members) - 1 for run in runs) + len(sites) - len({family for family, _ in sites.values()})
     return len(network.branches) + len(network.nodes) - fewer
-
-
-def _free(network: Network) -> set[str]:
-    """Scalar branches between nodes that nothing but expressions names."""
-    held = {name for c in network.couplings for name in (c.first, c.second)} | {s.element for s in network.switches}
-    held |= {n for n, count in Counter(b.name for b in network.branches).items() if count > 1}
-    return {
-        b.name
-        for b in network.branches
-        if b.name not in held and not (b.loops or b.at or b.stated or MARK in b.name)
-        if None is b.on is b.energy and None is not b.law
-        if b.plus is not None and b.minus is not None and not (b.plus.at or b.minus.at)
-    }
 
 
 class _Families:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from operator import itemgetter
 
-from sysdyn.compiler.network.skeleton import Shaped
+from sysdyn.compiler.network.skeleton import Shaped, shaped
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Network, Terminal
 from sysdyn.values import dataclass
@@ -38,31 +39,65 @@ class Run:
     picked: tuple[bool, bool] = (False, False)
 
 
+@dataclass(frozen=True, slots=True)
+class Laws:
+    """By the names of branches that may stand in families: shapes of their laws, and a number that those share which
+    are of one domain, kind, side and shape.
+    """
+
+    shapes: dict[str, Shaped]
+    numbers: dict[str, int]
+
+
 Found = tuple[dict[str, Site], list[Run]]
 """Nodes and branches of families."""
 
 
-def side_by_side(network: Network, shapes: dict[str, Shaped]) -> Found:
+def laws_of(network: Network) -> Laws:
+    """What each branch that may stand in a family has for a law, and its number among those that differ."""
+    free, numbers, found = _free(network), dict[object, int](), Laws({}, {})
+    for b in network.branches:
+        shape = shaped(b.law, b.name) if b.name in free else None
+        if shape is not None:
+            found.shapes[b.name] = shape
+            key = b.domain.name, b.kind, b.side, shape.key
+            found.numbers[b.name] = numbers.setdefault(key, len(numbers))
+    return found
+
+
+def _free(network: Network) -> set[str]:
+    """Scalar branches between nodes that nothing but expressions names."""
+    held = {name for c in network.couplings for name in (c.first, c.second)} | {s.element for s in network.switches}
+    held |= {n for n, count in Counter(b.name for b in network.branches).items() if count > 1}
+    return {
+        b.name
+        for b in network.branches
+        if b.name not in held and not (b.loops or b.at or b.stated or MARK in b.name)
+        if None is b.on is b.energy and None is not b.law
+        if b.plus is not None and b.minus is not None and not (b.plus.at or b.minus.at)
+    }
+
+
+def side_by_side(network: Network, laws: Laws) -> Found:
     """Families of nodes that runs of branches go along, and these runs."""
-    sites, runs = _whole(network, shapes, _sites(network, shapes))
+    sites, runs = _whole(network, laws, _sites(network, laws))
     used = {site[0] for run in runs for site in run.ends if site[1] >= 0}
     return {n: s for n, s in sites.items() if s[0] in used}, runs
 
 
-def _sites(network: Network, shapes: dict[str, Shaped]) -> dict[str, Site]:
+def _sites(network: Network, laws: Laws) -> dict[str, Site]:
     """Where each node stands: among those of its connected part that ends of the same branches touch."""
     parts = Joined[str]()
     touched: dict[str, list[int]] = {}
-    laws: dict[tuple[object, ...], int] = {}
+    kinds: dict[tuple[object, ...], int] = {}
     for b in network.branches:
         names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
         if len(names) == 2:
             parts.join(*names)
-        key = shapes[b.name].key if b.name in shapes else ("", b.name)
-        law = laws.setdefault((b.kind, b.side or "", len(names), key), 2 * len(laws))
+        kind = kinds.setdefault((laws.numbers.get(b.name, b.name), len(names)), 2 * len(kinds))
         for k, end in enumerate((b.plus, b.minus)):
             if end is not None and end.node is not None:
-                touched.setdefault(end.node, []).append(law + k)
+                touched.setdefault(end.node, []).append(kind + k)
     found: dict[str, Site] = {}
     size: dict[str, int] = {}
     for node in network.nodes:
@@ -74,10 +109,10 @@ def _sites(network: Network, shapes: dict[str, Shaped]) -> dict[str, Site]:
     return {name: site for name, site in found.items() if size[site[0]] >= RUN}
 
 
-def _whole(network: Network, shapes: dict[str, Shaped], sites: dict[str, Site]) -> Found:
+def _whole(network: Network, laws: Laws, sites: dict[str, Site]) -> Found:
     """Sites and runs without the families that single branches tear to pieces: these stay as they are written."""
     for _ in range(ROUNDS):
-        runs = list(_runs(network, shapes, sites))
+        runs = list(_runs(network, laws, sites))
         torn = _torn(network, sites, runs)
         if not torn:
             return sites, runs
@@ -101,7 +136,7 @@ def _torn(network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> set[
     return {family for family, number in size.items() if SHORT * len(cuts.get(family, ())) > number + SHORT}
 
 
-def _runs(network: Network, shapes: dict[str, Shaped], sites: dict[str, Site]) -> Iterator[Run]:
+def _runs(network: Network, laws: Laws, sites: dict[str, Site]) -> Iterator[Run]:
     """Branches of one law whose ends go along their families by one, or stay."""
 
     def site(end: Terminal | None) -> Site:
@@ -110,21 +145,21 @@ def _runs(network: Network, shapes: dict[str, Shaped], sites: dict[str, Site]) -
 
     groups: dict[tuple[object, ...], list[tuple[int, int, Branch, tuple[Site, Site]]]] = {}
     for b in network.branches:
-        if b.name in shapes:
+        if b.name in laws.numbers:
             ends = site(b.plus), site(b.minus)
             if ends[0][1] >= 0 or ends[1][1] >= 0:
                 apart = ends[1][1] - ends[0][1] if min(ends[0][1], ends[1][1]) >= 0 else 0
-                key = (b.domain.name, b.kind, b.side, shapes[b.name].key, ends[0][0], ends[1][0], apart)
+                key = laws.numbers[b.name], ends[0][0], ends[1][0], apart
                 groups.setdefault(key, []).append((ends[0][1], ends[1][1], b, ends))
     for found in groups.values():
-        found.sort(key=lambda item: item[:2])
+        found.sort(key=itemgetter(0, 1))
         first = 0
         for k in range(1, len(found) + 1):
             if k < len(found) and _next(found[k - 1][3], found[k][3]):
                 continue
             if k - first >= RUN:
                 own = found[first:k]
-                members = tuple((b, shapes[b.name]) for _, _, b, _ in own)
+                members = tuple((b, laws.shapes[b.name]) for _, _, b, _ in own)
                 yield Run(members, own[0][3], (own[0][0] >= 0, own[0][1] >= 0))
             first = k
 

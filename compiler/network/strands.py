@@ -13,8 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from sysdyn.compiler.network.neighbourhoods import RUN, Found, Run, Site
-from sysdyn.compiler.network.skeleton import Shaped
+from sysdyn.compiler.network.neighbourhoods import RUN, Found, Laws, Run, Site
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.values import dataclass
@@ -46,7 +45,7 @@ class Strands:
 class _Graph:
     """Branches that may stand in families: loose; free: nodes that may, with their domains."""
 
-    def __init__(self, network: Network, shapes: Mapping[str, Shaped], taken: Collection[str]) -> None:
+    def __init__(self, network: Network, laws: Laws, taken: Collection[str]) -> None:
         told = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] == "ne"}
         self.free = {
             n.name: n.domain.name
@@ -64,8 +63,8 @@ class _Graph:
                 self.at.setdefault(name, []).append(b)
             if len(names) == 2 and not any(end.at for end in ends):  # of arrays only the family shows
                 self.parts.join(*names)
-            known = b.name in shapes and b.name not in taken and len(set(names)) == len(names)
-            if known and any(n in self.free for n in names) and not any(n in taken for n in names):
+            known = b.name in laws.numbers and b.name not in taken and len(set(names)) == len(names)
+            if known and not self.free.keys().isdisjoint(names) and not any(n in taken for n in names):
                 self.loose[b.name] = b
         self.joints: dict[str | None, list[Branch]] = {
             name: here
@@ -111,9 +110,9 @@ def _end(b: Branch, sense: bool) -> str | None:
     return end.node
 
 
-def in_strands(network: Network, shapes: dict[str, Shaped], kept: Found) -> Found:
+def in_strands(network: Network, laws: Laws, kept: Found) -> Found:
     """What stands in families already, and strands in others: joints go on by one, buses are picked."""
-    found = strands(network, shapes, {b.name for run in kept[1] for b, _ in run.members} | set(kept[0]))
+    found = strands(network, laws, {b.name for run in kept[1] for b, _ in run.members} | set(kept[0]))
     buses = {name: (f"bus {key}", k) for key, names in found.buses.items() for k, name in enumerate(names)}
     joints: dict[str, Site] = {}
     runs = []
@@ -124,16 +123,20 @@ def in_strands(network: Network, shapes: dict[str, Shaped], kept: Found) -> Foun
             nodes = [end.node for end in (head.plus, head.minus) if end is not None]
             one, two = (joints.get(n or "", buses.get(n or "", (n or "", -1))) for n in nodes)
             moves, picked = ((nodes[0] in of, nodes[1] in of) for of in (joints, buses))
-            members = tuple((b, shapes[b.name]) for b, _ in (strand.branches[j] for strand in same))
+            members = tuple((b, laws.shapes[b.name]) for b, _ in (strand.branches[j] for strand in same))
             runs.append(Run(members, (one, two), moves, picked))
     return {**kept[0], **buses, **joints}, [*kept[1], *runs]
 
 
-def strands(network: Network, shapes: Mapping[str, Shaped], taken: Collection[str]) -> Strands:
+def strands(network: Network, laws: Laws, taken: Collection[str]) -> Strands:
     """Classes of at least RUN strands; taken: names of nodes and branches that stand in families already."""
-    graph = _Graph(network, shapes, taken)
+    graph = _Graph(network, laws, taken)
     ways = list(graph.strands())
-    linked = _linked(ways, shapes)
+    met: dict[int, int] = {}  # laws in the order of the strands, by which one of two ways round is chosen
+    linked = [
+        (way, tuple([(not sense, met.setdefault(laws.numbers[b.name], len(met))) for b, sense in way.branches]))
+        for way in ways
+    ]
     of = _buses(network, graph, ways)
     while True:
         size = Counter(of.values())
@@ -168,16 +171,6 @@ def _buses(network: Network, graph: _Graph, ways: Sequence[Strand]) -> dict[str 
 
 Links = tuple[tuple[bool, int], ...]
 """Of the branches of a strand: whether each is passed against its sense, and the number of its law."""
-
-
-def _linked(ways: Sequence[Strand], shapes: Mapping[str, Shaped]) -> list[tuple[Strand, Links]]:
-    """Each with what it is made of."""
-    numbers: dict[object, int] = {}
-
-    def law(b: Branch) -> int:
-        return numbers.setdefault((b.domain.name, b.kind, b.side, shapes[b.name].key), len(numbers))
-
-    return [(way, tuple([(not sense, law(b)) for b, sense in way.branches])) for way in ways]
 
 
 def _classes(ways: Sequence[tuple[Strand, Links]], of: Mapping[str | None, str]) -> tuple[tuple[Strand, ...], ...]:

@@ -131,15 +131,16 @@ class Elements(Connections):
                 node = events.sticking(self, law.law, symbol.family.name, whole, loops, self.place(s.span))
                 law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
-            self.parts.branches.append(
-                self.branch(symbol, whole, loops, (law.kind, law.side, law.law), ends, self.place(s.span))
-            )
+            said = law.kind, law.side, law.law
+            branch = self.branch(symbol.family.name, symbol.domain, whole, loops, said, ends, self.place(s.span))
+            self.parts.branches.append(branch)
 
         self.pending.append(Pending(self.current, span, resolve))
 
     def branch(
         self,
-        symbol: BranchSymbol,
+        name: str,
+        domain: DomainSymbol,
         at: tuple[Node, ...],
         loops: tuple,  # type: ignore[type-arg]
         law: tuple[str, str | None, Node | None],
@@ -148,13 +149,12 @@ class Elements(Connections):
     ) -> Branch:
         """A branch as the compiler receives it; law: its kind, its side, the law."""
         kind, side, node = law
-        name = symbol.family.name
         if ends.on is not None:
-            return Branch(name, at, loops, symbol.domain, kind, side, node, None, None, ends.on.node, place)
+            return Branch(name, at, loops, domain, kind, side, node, None, None, ends.on.node, place)
         assert ends.plus is not None
         assert ends.minus is not None
-        plus, minus = (_terminal(e) for e in (ends.plus, ends.minus))
-        return Branch(name, at, loops, symbol.domain, kind, side, node, plus, minus, None, place)
+        plus, minus = _terminal(ends.plus), _terminal(ends.minus)
+        return Branch(name, at, loops, domain, kind, side, node, plus, minus, None, place)
 
     def _later_ratio(
         self,
@@ -176,7 +176,8 @@ class Elements(Connections):
                 ratio = ratio_of(self.resolver, branches, whole, kind, side, value, span)
             place = self.place(s.span)
             for symbol, end in zip(branches, ends, strict=True):
-                self.parts.branches.append(self.branch(symbol, whole, loops, ("port", None, None), end, place))
+                name, domain, port = symbol.family.name, symbol.domain, ("port", None, None)
+                self.parts.branches.append(self.branch(name, domain, whole, loops, port, end, place))
             first, second = (b.family.name for b in branches)
             self.parts.couplings.append(
                 Coupling(ratio.kind, first, second, whole, loops, ratio.side, ratio.ratio, place)
@@ -220,9 +221,9 @@ class Elements(Connections):
             if name in space.laws or not isinstance(symbol, BranchSymbol):
                 continue
             where = self.place(symbol.place.span)
-            self.parts.branches.append(
-                self.branch(symbol, space.prefix, space.loops, ("field", None, None), ends, where)
-            )
+            family, field = symbol.family.name, ("field", None, None)
+            branch = self.branch(family, symbol.domain, space.prefix, space.loops, field, ends, where)
+            self.parts.branches.append(branch)
 
 
 def _terminal(end: End) -> Terminal:

@@ -9,16 +9,15 @@ made a finding or read more than the instance's own names.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING
 
+from sysdyn.dsl.elaborate.casts import Cast, cast_of
 from sysdyn.dsl.elaborate.connections import Ends
 from sysdyn.dsl.elaborate.head import Body
-from sysdyn.dsl.elaborate.parts import Requirement
+from sysdyn.dsl.elaborate.parts import CastRequirement
 from sysdyn.dsl.model import budget
-from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Parameter
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.names.laws import LawOf, own_variables
@@ -33,6 +32,7 @@ from sysdyn.dsl.names.symbols import (
     ParameterSymbol,
     Scope,
     Space,
+    Symbol,
     Typed,
 )
 from sysdyn.dsl.text.diagnostics import Place
@@ -43,47 +43,9 @@ if TYPE_CHECKING:
     from sysdyn.dsl.elaborate.elaborate import Elaborator
     from sysdyn.dsl.elaborate.instances import Instances
 
+_NOWHERE: Mapping[str, str] = {}
+_NOTHING: dict[str, Typed] = {}
 _KINDS = {syntax.Param, syntax.Branch, syntax.Law, syntax.Require}
-_SAID = frozenset(("const", "time", "sum", "mul", "pow", "cmp", "and", "or", "not", "cond"))
-"""Operations that mean the same under any name; functions too, but for those that make events."""
-
-
-@dataclass(frozen=True, slots=True)
-class Cast:
-    """An expression in the names of its instance; steps: operation, its own name, arguments, as met first."""
-
-    steps: tuple[tuple[str, str, tuple[int, ...], Node], ...]
-
-    def under(self, path: str) -> Node:
-        """The same of another instance."""
-        made: list[Node] = []
-        for op, name, at, node in self.steps:
-            if op == "param":
-                made.append(ex.param(path + name))
-            elif op == "var":
-                made.append(ex.var(path, name))
-            else:
-                made.append(ex.rebuild(node, tuple([made[k] for k in at])) if at else node)
-        return made[-1]
-
-
-def cast_of(root: Node, path: str) -> Cast | None:
-    """An expression of parameters and branch variables of one instance; None where it reads anything else."""
-    steps: list[tuple[str, str, tuple[int, ...], Node]] = []
-    place: dict[Node, int] = {}
-    for node in ex.topological([root]):
-        name = ""
-        if node.op == "param" and not node.args and node.data.startswith(f"{path}."):
-            name = node.data[len(path) :]
-        elif node.op == "var" and not node.args and node.data[0] == path and not node.data[2]:
-            name = node.data[1]
-        elif node.op not in _SAID and (node.op != "call" or node.data in ("setsign", "signal")):
-            return None
-        place[node] = len(steps)
-        steps.append((node.op, name, tuple(place[a] for a in node.args), node))
-    return Cast(tuple(steps))
-
-
 @dataclass(frozen=True, slots=True)
 class Held:
     """A parameter: its unit and its place; value: where the instance does not give it."""
@@ -109,19 +71,54 @@ class Mould:
 
 
 class Likeness(Space):
-    """The inside of an instance that was cast: what its branch's variables are called is found when it is entered."""
+    """The inside of an instance that was cast: its names are entered when somebody looks for one."""
 
-    __slots__ = ("branch", "mould")
+    __slots__ = ("_scope", "label", "mould")
 
-    def __init__(self, outer: Space, component: ComponentSymbol, branch: BranchSymbol, mould: Mould) -> None:
-        self.branch, self.mould = branch, mould
-        around, scope, file = (*outer.chain, outer.component), Scope(component.file_scope), component.file_scope
-        super().__init__(branch.family.name, scope, file, component.source, component=component.name, chain=around)
+    def __init__(
+        self, outer: Space, component: ComponentSymbol, path: str, label: Place, mould: Mould, ends: Ends
+    ) -> None:
+        """label: where its name stands."""
+        self.label, self.mould = label, mould
+        self._scope: Scope | None = None
+        file = component.file_scope
+        super().__init__(
+            path=path,
+            scope=file,
+            file_scope=file,
+            source=component.source,
+            component=component.name,
+            chain=(*outer.chain, outer.component),
+            elsewhere=_NOWHERE,
+            bound=_NOTHING,
+            ends={"": ends},
+        )
+
+    @property
+    def scope(self) -> Scope:
+        """The names of its branch and of its parameters."""
+        if self._scope is None:
+            branch = BranchSymbol(self.path.rpartition(".")[2], self._family(""), self.mould.domain, self.label)
+            symbols: dict[str, Symbol] = {"": branch}
+            for held in self.mould.parameters:
+                family = self._family(f".{held.name}")
+                symbols[held.name] = ParameterSymbol(held.name, family, held.unit.dimension, False, held.place)
+            self._scope = Scope(self.file_scope, symbols)
+        return self._scope
+
+    @scope.setter
+    def scope(self, _: Scope) -> None:
+        """It follows from the mould."""
+
+    def _family(self, name: str) -> Family:
+        return Family(self.path + name, (), (), ())
 
     @property
     def bound(self) -> dict[str, Typed]:
         """The variables e f q p of its branch."""
-        return own_variables(self.branch, ())
+        branch = self.scope.symbols[""]
+        assert isinstance(branch, BranchSymbol)
+        return own_variables(branch, ())
 
     @bound.setter
     def bound(self, _: dict[str, Typed]) -> None:
@@ -184,13 +181,12 @@ class Moulds:
             return False
         charge(it, s, component)
         values = {name: it.resolver.scalar(value).node for name, value in given.items()}
-        space = _space(it, s, component, mould, ends)
+        path = f"{here.path}.{s.decl.name}" if here.path else s.decl.name
+        space = Likeness(here, component, path, it.place(s.decl.span), mould, ends)
         for held in mould.parameters:
-            family = Family(f"{space.path}.{held.name}", (), (), ())
-            node = values[held.name] if held.value is None else held.value.under(space.path)
-            symbol_ = ParameterSymbol(held.name, family, held.unit.dimension, False, held.place)
-            space.scope.symbols[held.name] = symbol_
-            it.parts.parameters[family.name] = Parameter(family.name, (), held.unit, (node,), (), held.place)
+            name = f"{path}.{held.name}"
+            node = values[held.name] if held.value is None else held.value.under(path)
+            it.parts.parameters[name] = Parameter(name, (), held.unit, (node,), (), held.place)
         symbol.spaces.append(space)
         it.bodies.append((space, body))
         return True
@@ -203,15 +199,6 @@ def charge(it: Instances, s: syntax.Instance, component: ComponentSymbol) -> Non
     except budget.SpentError as spent:
         spent.place = spent.place or it.place(s.span)
         raise
-
-
-def _space(it: Instances, s: syntax.Instance, component: ComponentSymbol, mould: Mould, ends: Ends) -> Likeness:
-    """The inside of a cast instance, with its branch."""
-    path = it.current.family(s.decl.name).name
-    branch = BranchSymbol(s.decl.name, Family(path, (), (), ()), mould.domain, it.place(s.decl.span))
-    space = Likeness(it.current, component, branch, mould)
-    space.scope.symbols[""], space.ends[""] = branch, ends
-    return space
 
 
 def _held(it: Instances, space: Space, name: str, *, given: bool) -> Held | None:
@@ -227,12 +214,12 @@ def _held(it: Instances, space: Space, name: str, *, given: bool) -> Held | None
 
 def law_of_cast(it: Elaborator, space: Likeness) -> None:
     """The law of an instance that was cast; that of the first takes the whole way, and all if it reads more."""
-    mould, path, symbol = space.mould, space.path, space.branch
+    mould, path = space.mould, space.path
     if mould.branch is not None:
         kind, side, law, place = mould.branch
-        node = law.under(path)
+        node, ends = law.under(path), space.ends[""]
         space.laws[""], it.resolver.laws[path] = place, LawOf(kind, side, node)
-        it.parts.branches.append(it.branch(symbol, (), (), (kind, side, node), space.ends[""], place))
+        it.parts.branches.append(it.branch(path, mould.domain, (), (), (kind, side, node), ends, place))
         return
     before, waiting = _learnt(it), len(it.pending)
     with it.entering(space):
@@ -251,7 +238,7 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
     mould = space.mould
     if mould.required is not None:
         for node, place, written in mould.required:
-            it.parts.requirements.append(Requirement(node.under(space.path), (), place, written))
+            it.parts.requirements.append(CastRequirement(node, space.path, place, written))
         return
     before, first, said = _learnt(it), len(it.parts.requirements), body.of(syntax.Require)
     with it.entering(space):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from sysdyn.dsl.elaborate.casts import Cast
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -33,6 +34,7 @@ from sysdyn.dsl.model.network import (
     Work,
 )
 from sysdyn.dsl.model.units import Unit
+from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol
@@ -51,6 +53,30 @@ class Requirement:
     loops: tuple[Loop, ...]
     place: Place
     written: syntax.Expr
+
+    def is_met(self, known: Values) -> bool:
+        """Whether the condition holds where its loops begin."""
+        return known.truth(self.condition, {ex.index(loop.index): known.number(loop.first) for loop in self.loops})
+
+
+@dataclass(slots=True)
+class CastRequirement:
+    """The same of an instance that was cast, whose node is made where somebody reads it."""
+
+    cast: Cast
+    path: str
+    place: Place
+    written: syntax.Expr
+    loops: tuple[Loop, ...] = ()
+
+    @property
+    def condition(self) -> Node:
+        """In the names of the instance."""
+        return self.cast.under(self.path)
+
+    def is_met(self, known: Values) -> bool:
+        """Whether the condition holds."""
+        return self.cast.truth(self.path, known)
 
 
 @dataclass(slots=True)
@@ -75,7 +101,7 @@ class NetworkBuilder:
     switches: list[Switch] = field(default_factory=list)
     drafts: list[Any] = field(default_factory=list)  # of switches (elaborate/events.py)
     watched: list[Observation] = field(default_factory=list)  # what events and switches read
-    requirements: list[Requirement] = field(default_factory=list)
+    requirements: list[Requirement | CastRequirement] = field(default_factory=list)
     nodes: list[NodeFamily] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)

@@ -29,6 +29,8 @@ class Values:
 
     def number(self, node: Node, bound: Mapping[Node, float] | None = None) -> float:
         """The value of a node made of parameters and bound loop variables; NaN if it holds anything else."""
+        if node.op == "const":
+            return float(node.data)
         if node.op == "param" and not node.args and not bound:
             return self._element(node.data, ())
         return float(evaluate([node], lambda n: self._lookup(n, bound or {}))[0])
@@ -61,7 +63,7 @@ class Values:
         return self._known[key]
 
     def _compute(self, parameter: Parameter, at: tuple[int, ...]) -> float:
-        bound = {ex.index(name): float(i) for name, i in zip(parameter.indices, at, strict=False)}
+        bound = {ex.index(name): float(i) for name, i in zip(parameter.indices, at, strict=False)} if at else {}
         k = 0
         if len(parameter.values) > 1:
             k = at[-1] - int(self.number(parameter.shape[-1][0]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from functools import cache
 
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
@@ -43,6 +44,22 @@ from sysdyn.dsl.tree import syntax
 STATICS = ("coordinates", "m1", "m2", "dof", "configuration_dof", "redundant", "order", "manifold", "index")
 
 
+def _scaled(text: str, scale: Fraction) -> float:
+    """The double nearest to a number, as written, times a scale."""
+    power = _power_of_ten(scale)
+    if power is None or not text.replace(".", "").isdecimal():
+        return float(Fraction(text) * scale)
+    return float(f"{text}e{power}")
+
+
+@cache
+def _power_of_ten(scale: Fraction) -> int | None:
+    """Its exponent, where the scale is one, as that of most units is."""
+    digits = len(str(max(scale.numerator, scale.denominator))) - 1
+    power = digits if scale > 1 else -digits
+    return power if Fraction(10) ** power == scale else None
+
+
 class Names(Context):
     """Names, quantities, elements of arrays, inlined definitions."""
 
@@ -66,7 +83,7 @@ class Names(Context):
             help_ = f"celsius({e.text})"
             raise self.fail("E201", "degC is no unit of a quantity: its zero is not 0 K", e.span, help=help_)
         self._looks_like_division(e)
-        value = e.value if unit.scale == 1 else float(Fraction(e.text) * unit.scale)
+        value = e.value if unit.scale == 1 else _scaled(e.text, unit.scale)
         found = Typed(ex.const(value), unit.dimension)
         if "$" not in e.unit.text:
             self._quantities[key] = scope, found

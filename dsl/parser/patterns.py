@@ -122,24 +122,25 @@ class Patterns:
         automaton = self._automaton
         text, notes, scanner = automaton.source.text, automaton.notes, automaton.scanner
         slots: list[Any] = [None, automaton.values[-1]]
-        add = slots.append
+        add, take, new = slots.append, slots.__getitem__, tuple.__new__
         for kind, a, b, c, d in recipe.leaves:
             a += at
             b += at
-            if kind in ("<name>", "<function>"):
-                add(Word(text[a:b], Span(a, b)))
+            span = new(Span, (a, b))  # without the function that a named tuple has around it
+            if kind == "<name>":
+                add(Word(text[a:b], span))
             elif kind == "<quantity>":
                 c += at
-                add(notes.quantity(text[a:c].rstrip(), Span(a, b), Span(c, d + at)))
+                add(notes.quantity(text[a:c].rstrip(), span, new(Span, (c, d + at))))
             elif kind == "<number>":
-                add(notes.number(text[a:b], Span(a, b)))
+                add(notes.number(text[a:b], span))
             elif kind == "<text>":
-                add(Text(text[a + 1 : b - 1], Span(a, b)))
+                add(Text(text[a + 1 : b - 1], span))
             else:
-                add(kind)
+                add(Word(text[a:b], span) if kind == "<function>" else kind)
         for build, parts, a, b in recipe.rules:
-            values = [slots[k] for k in parts]
-            add(values if build is None else build(values, Span(at + a, at + b), notes))
+            values = list(map(take, parts))
+            add(values if build is None else build(values, new(Span, (at + a, at + b)), notes))
         automaton.cut(len(automaton.states) - 1)
         for state, value, a, b in recipe.left:
             automaton.states.append(state)

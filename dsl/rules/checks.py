@@ -134,6 +134,8 @@ def results(model: Elaborator, report: Report) -> None:
     read += [(b.law, b.place) for b in parts.branches if b.law is not None]
     read += [(c.ratio, c.place) for c in parts.couplings] + [(e.expression, e.place) for e in parts.energies]
     for node, place in read:
+        if not any(map(_is_result, ex.variables(node))):
+            continue
         found = unknowns_of(node, "audit")
         if found:
             name = f"audit.{found[0].data[0]}"
@@ -143,6 +145,11 @@ def results(model: Elaborator, report: Report) -> None:
         if classes:
             name = f"{classes[0].data[0]}.{classes[0].data[1].partition(':')[2]}"
             report.error("E102", f"{name} is a result: no law can read it", place, help="the expression of that effort")
+
+
+def _is_result(node: Node) -> bool:
+    """Whether an unknown is one of the audit, or an effort by its class."""
+    return node.op == "var" and (letter(node) == "audit" or ":" in node.data[1])
 
 
 def smoothness(model: Elaborator, report: Report) -> None:
@@ -192,7 +199,7 @@ def set_valued_results(model: Elaborator, observations: Iterable[Observation], r
 
 
 def _has_setsign(root: Node) -> bool:
-    return any(n.op == "call" and n.data == "setsign" for n in ex.topological([root]))
+    return any(n.op == "call" and n.data == "setsign" for n in _nodes(root))
 
 
 def _no_set(place: Place, report: Report) -> None:
@@ -239,6 +246,8 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
 def values(model: Elaborator, known: Values, report: Report) -> None:
     """E322, E324, E805, E807 with the values bound."""
     for r in model.parts.requirements:
+        if r.is_met(known):
+            continue
         node, loops, place = r.condition, r.loops, r.place
         bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
         if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
@@ -253,8 +262,12 @@ def values(model: Elaborator, known: Values, report: Report) -> None:
 
 
 def _parameters(node: Node) -> list[Node]:
-    nodes = ex.topological([node]) if any(a.args for a in node.args) else (*node.args, node)
-    return [n for n in dict.fromkeys(nodes) if n.op == "param"]
+    return [n for n in dict.fromkeys(_nodes(node)) if n.op == "param"]
+
+
+def _nodes(root: Node) -> Sequence[Node]:
+    """All nodes of an expression; most are no deeper than one operation."""
+    return ex.topological([root]) if any(a.args for a in root.args) else (*root.args, root)
 
 
 def _valued(node: Node, value: float, model: Elaborator) -> str:
@@ -264,7 +277,7 @@ def _valued(node: Node, value: float, model: Elaborator) -> str:
 
 
 def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
-    for inner in _always(node) if node.args else ():
+    for inner in _always(node) if any(a.args for a in node.args) else (node,):
         if inner.op != "mul" or not any(e < 0 for e in inner.data):
             continue
         for exponent, factor in zip(inner.data, inner.args, strict=True):
@@ -323,12 +336,16 @@ def _elements(model: Elaborator, known: Values, report: Report) -> None:
 
 def _volume(shape: Shape, known: Values) -> float:
     """Number of elements of a box; 0 where that is not known."""
+    if not shape:
+        return 1.0
     lengths = [known.number(last) - known.number(first) + 1.0 for first, last in shape]
     return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0
 
 
 def _count(loops: Sequence[Loop], known: Values) -> float:
     """Number of elements of the box around nested loops; 0 where that is not known."""
+    if not loops:
+        return 1.0
     spans = [(known.bounds(ex.index(loop.index), loops[: k + 1])) for k, loop in enumerate(loops)]
     lengths = [high - low + 1.0 for low, high in spans]
     return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0

@@ -38,35 +38,66 @@ def regular(path: str | Path) -> None:
 
 def replaceable(path: str | Path) -> bool:
     """Nothing is lost where a new trace takes this path: there is nothing yet, an empty file, or a trace of sysdyn."""
+    import h5py
+
     try:
         if not os.stat(path).st_size:  # noqa: PTH116
             return True
-        with opened(path) as file:
-            return "time" in file and bytes(file.attrs.get("source", b"")).startswith(b"sysdyn")
+        regular(path)
+        with h5py.File(path, "r") as file:
+            return _outside_but_parameters(file) is None and _is_ours(file)
     except FileNotFoundError:
         return True
     except (OSError, RuntimeError, ValueError, KeyError, TypeError):
         return False
 
 
+def _is_ours(file: Any) -> bool:
+    return "time" in file and bytes(file.attrs.get("source", b"")).startswith(b"sysdyn")
+
+
+def _outside_but_parameters(file: Any) -> str | None:
+    """As `_outside`; parameters, tens of thousands behind a netlist, are left out: nothing is read of what goes."""
+    from h5py import h5d, h5g, h5l, h5o
+
+    for name in file.id:
+        kind = file.id.links.get_info(name).type
+        item = h5o.open(file.id, name) if kind == h5l.TYPE_HARD and name != b"parameters" else None
+        inner = _outside(item) if isinstance(item, h5g.GroupID) else None
+        own = kind not in (h5l.TYPE_HARD, h5l.TYPE_SOFT) or (isinstance(item, h5d.DatasetID) and _elsewhere(item))
+        if inner or own:
+            return inner or _shown(name)
+    return None
+
+
 def _alone(file: Any) -> None:
     """OSError where a link or a data set leads out of the file; nothing is followed on the way."""
-    from h5py import h5d, h5l, h5o
+    outside = _outside(file.id)
+    if outside is not None:
+        raise OSError(f"'{outside}' leads to another file: not followed")
+
+
+def _outside(group: Any) -> str | None:
+    """The first link or data set below a group that leads out of the file."""
+    from h5py import h5l, h5o
 
     def link(name: bytes, info: Any) -> str | None:
         return None if info.type in (h5l.TYPE_HARD, h5l.TYPE_SOFT) else _shown(name)
 
     def data(name: bytes, info: Any) -> str | None:
-        if info.type != h5o.TYPE_DATASET:
-            return None
-        layout = h5o.open(file.id, name).get_create_plist()
-        return _shown(name) if layout.get_layout() == h5d.VIRTUAL or layout.get_external_count() else None
+        is_data = info.type == h5o.TYPE_DATASET
+        return _shown(name) if is_data and _elsewhere(h5o.open(group, name)) else None
 
-    outside = file.id.links.visit(link, info=True)
-    if outside is None:
-        outside = h5o.visit(file.id, data, info=True)
-    if outside is not None:
-        raise OSError(f"'{outside}' leads to another file: not followed")
+    found = group.links.visit(link, info=True)
+    return h5o.visit(group, data, info=True) if found is None else found
+
+
+def _elsewhere(data: Any) -> bool:
+    """Whether a data set's numbers lie in another file."""
+    from h5py import h5d
+
+    layout = data.get_create_plist()
+    return bool(layout.get_layout() == h5d.VIRTUAL or layout.get_external_count())
 
 
 def _shown(name: bytes) -> str:

@@ -4,8 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from sysdyn.compiler.network.neighbourhoods import RUN, side_by_side
-from sysdyn.compiler.network.skeleton import shaped
+from sysdyn.compiler.network.neighbourhoods import RUN, laws_of, side_by_side
 from sysdyn.compiler.network.strands import in_strands, strands
 from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report
@@ -24,7 +23,7 @@ def network(text):
     (model,) = document.models.values()
     found = load.network(document, model, next(iter(document.scenes.values()), None), report)
     assert found is not None, list(report)[:3]
-    return found, {b.name: s for b in found.branches if b.law is not None and (s := shaped(b.law, b.name)) is not None}
+    return found, laws_of(found)
 
 
 def written(nodes, elements):
@@ -107,8 +106,7 @@ def test_strands_in_other_senses_are_other_classes():
 
 
 def test_buses_of_one_kind_are_a_family():
-    whole, shapes = star(12)
-    sites, runs = in_strands(whole, shapes, ({}, []))
+    sites, runs = in_strands(*star(12), ({}, []))
     joints = {sites[f"j{k}"] for k in range(12)}
     assert len({family for family, _ in joints}) == 1
     assert sorted(place for _, place in joints) == list(range(12))
