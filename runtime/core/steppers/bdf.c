@@ -337,7 +337,7 @@ static void project(sd_bdf *bdf)
 int sd_bdf_step(sd_bdf *bdf)
 {
     int32_t error_failures = 0, order_next = 1;
-    double ck, error;
+    double ck, error, norm[3];
     sd_bdf_weights(bdf);
     bdf->cause = SD_FINE;
     bdf->jacobian_age++;
@@ -350,7 +350,7 @@ int sd_bdf_step(sd_bdf *bdf)
         sd_bdf_coefficients(bdf, &ck);
         sd_bdf_predict(bdf);
         int cause = correct(bdf);
-        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, &error, &order_next) || bdf->fixed_h > 0.0))
+        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, norm, &error, &order_next) || bdf->fixed_h > 0.0))
             break;
         sd_bdf_restore(bdf);
         bdf->cause = cause ? cause : SD_ERROR_TEST;
@@ -375,9 +375,11 @@ int sd_bdf_step(sd_bdf *bdf)
     bdf->cause = SD_FINE;
     double t = bdf->t + bdf->h;
     bdf->t = fabs(bdf->t_end - t) <= 1e-12 * bdf->h ? bdf->t_end : t;
-    if (bdf->project)
+    if (bdf->project) {
         project(bdf);
-    sd_bdf_accept(bdf, order_next);
+        sd_bdf_orders(bdf, norm);
+    }
+    sd_bdf_accept(bdf, norm, order_next);
     return SD_FINE;
 }
 

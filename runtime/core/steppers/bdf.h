@@ -78,8 +78,8 @@ void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, c
 void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const double *beta);
 void sd_bdf_shift(sd_bdf *bdf);
 /* controller.c */
-int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next);
-void sd_bdf_accept(sd_bdf *bdf, int32_t order_next);
+int sd_bdf_test(sd_bdf *bdf, double ck, double *norm, double *error, int32_t *order_next);
+void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next);
 double sd_bdf_first_step(const sd_bdf *bdf, double span);
 
 #endif
