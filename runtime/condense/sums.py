@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.condense.composition import Composition, composed, ranges
-from sysdyn.runtime.condense.elimination import Elimination, Longs
+from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
@@ -76,6 +76,9 @@ class Straights:
         broken = np.zeros(number, dtype=bool)
         broken[np.repeat(np.arange(number), count)[~steps]] = True
         begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
+        unlike = np.zeros(number, dtype=bool)
+        unlike[np.repeat(np.arange(number), count)[inner][found.factor[inner] != found.factor[above[inner]]]] = True
+        begin = self._cut(begin, unlike)
         ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
         made = (lib.Straight * max(begin.size, 1))()
         order = np.arange(found.factor.size)
@@ -98,6 +101,15 @@ class Straights:
         sizes = (ends - begin)[long] * terms_of[long]
         entries = found.start[begin[long]]
         self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
+
+    @staticmethod
+    def _cut(begin: Longs, unlike: Mask) -> Longs:
+        """Where stretches begin, once long ones are cut where factors change, if these are few: an end of a line."""
+        unlike[begin] = False
+        changes = np.add.reduceat(unlike, begin, dtype=np.int64) if begin.size else begin
+        length = np.diff(np.concatenate([begin, [unlike.size]]))
+        unlike &= np.repeat(changes * LONG <= length, length)
+        return np.union1d(begin, np.flatnonzero(unlike))
 
     def renew(self, found: Sums) -> None:
         """Takes the numbers of other sums of the same structure."""

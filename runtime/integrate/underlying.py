@@ -242,7 +242,7 @@ class Underlying(Accelerations):
         self.matrix.call = c.addressof(parts.calls)
         self.applied = lib.System.from_buffer_copy(system.core)
         self.applied.call, self.applied.calls = c.addressof(parts.applied), parts.kept
-        self.applied.kinematics = 0  # rows that nobody solves
+        self.applied.kinematics = self.applied.k_spans = 0  # rows that nobody solves
         core.matrix, core.applied = c.addressof(self.matrix), c.addressof(self.applied)
         core.position, core.velocity = (item and c.addressof(item) for item in (parts.position, parts.velocity))
         core.direct, core.displaced = int(parts.direct), lib.pointer(parts.displaced)

@@ -1,6 +1,7 @@
 /* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
 #include "linear/sparse.h"
 #include "linear/blocks.h"
+#include "linear/chains.h"
 #include "linear/dense_rest.h"
 
 #include <math.h>
@@ -16,6 +17,7 @@ void sd_sparse_free(sd_sparse *lu)
 {
     if (!lu)
         return;
+    leave_chains(lu);
     free(lu->order);
     free(lu->l_start);
     free(lu->l_row);
@@ -367,6 +369,8 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     }
     lu->widest = failed ? 0 : widest_block(lu);
     leave_search(lu);
+    if (!failed)
+        find_chains(lu);
     return failed;
 }
 
@@ -425,7 +429,8 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     lu->smallest = 1.0;
     unsigned before = sd_no_subnormals();
     for (int32_t k = 0; k < lu->rest && !failed; k++)
-        failed = lu->source[k] >= 0 && refactor_column(lu, column, row, value, k, block);
+        failed = is_link(lu, k) ? refactor_link(lu, column, row, value, k)
+                                : lu->source[k] >= 0 && refactor_column(lu, column, row, value, k, block);
     if (!failed && lu->rest < lu->n)
         failed = renew_rest(lu, column, row, value, block);
     sd_subnormals(before);
@@ -486,6 +491,11 @@ static inline __attribute__((always_inline)) void substitute(const sd_sparse *lu
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
+    if (lu->lowers) {
+        descend_chains(lu, x, row_scale, work);
+        ascend_chains(lu, x, column_scale, work);
+        return;
+    }
     for (int32_t k = 0; k < n; k++) {
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];

@@ -45,6 +45,7 @@ class System(c.Structure):
         ("entries", I),
         ("calls", I),
         ("kinematics", I),
+        ("k_spans", I),
         ("column", P),
         ("row", P),
         ("call", P),
@@ -53,6 +54,7 @@ class System(c.Structure):
         ("k_f", P),
         ("k_slot_q", P),
         ("k_slot_f", P),
+        ("k_span", P),
         ("k_scale", P),
         ("held", I),
         ("clear", I),
@@ -95,9 +97,10 @@ class Condensed(c.Structure):
     _fields_ = [
         ("left", Left),
         ("full", P),
-        *[(name, I) for name in ["unknowns", "rows", "unknown_spans", "row_spans", "straights"]],
+        *[(name, I) for name in ["unknowns", "rows", "unknown_spans", "row_spans"]],
+        *[(name, I) for name in ["rate_spans", "rest_spans", "own_spans", "straights"]],
         ("observed_rates", I),
-        *[(name, P) for name in ["unknown", "row", "straight"]],
+        *[(name, P) for name in ["unknown", "row", "rate", "rest", "own", "straight"]],
         ("products", L),
         *[(name, P) for name in ["from_", "to", "share", "y", "yd", "r", "slope"]],
     ]
